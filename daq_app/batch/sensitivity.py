@@ -119,10 +119,7 @@ def sensitivity(
     `samples` is a power of two. `sed` answers one scene; the solver does unless told. Raises TooFewAnswers where a
     scene of the design has no answer, SceneError where a range leaves what a scene may hold.
     """
-    problem = {"num_vars": len(design), "names": list(design), "bounds": [list(span) for span in design.values()]}
-    draw: Any = importlib.import_module("SALib.sample.sobol")  # slow to load
-    analyse: Any = importlib.import_module("SALib.analyze.sobol")
-    points: NDArray[np.float64] = draw.sample(problem, samples, calc_second_order=False, seed=seed)
+    points = saltelli_points(design, samples, seed)
     answer = sed or _settled
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     found = np.empty(len(points))
@@ -138,15 +135,30 @@ def sensitivity(
             f"{len(failed)} of {len(points)} scenes of the design have no settled state; narrow its ranges (the first: "
             f"{failed[0]})"
         )
-    result: Any = analyse.analyze(problem, found, calc_second_order=False, seed=seed, num_resamples=200)
+    return sobol_indices(design, found, seed, lambda name: _one_sided(scene, name, design[name])), found
+
+
+def saltelli_points(design: Design, samples: int, seed: int) -> NDArray[np.float64]:
+    """Return the points (samples * (numbers + 2), numbers) of a design; `samples` is a power of two."""
+    draw: Any = importlib.import_module("SALib.sample.sobol")  # slow to load
+    return draw.sample(_problem(design), samples, calc_second_order=False, seed=seed)
+
+
+def sobol_indices(
+    design: Design, answers: NDArray[np.float64], seed: int, one_sided: Callable[[str], bool]
+) -> tuple[Index, ...]:
+    """Return the index of each number of a design, greatest total first, from `answers` at its `saltelli_points`."""
+    analyse: Any = importlib.import_module("SALib.analyze.sobol")
+    result: Any = analyse.analyze(_problem(design), answers, calc_second_order=False, seed=seed, num_resamples=200)
     columns = zip(
         design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
     )
-    indices = [
-        Index(name, *design[name], *values, one_sided=_one_sided(scene, name, design[name]))
-        for name, *values in columns
-    ]
-    return tuple(sorted(indices, key=lambda index: -index.total)), found
+    indices = [Index(name, *design[name], *values, one_sided=one_sided(name)) for name, *values in columns]
+    return tuple(sorted(indices, key=lambda index: -index.total))
+
+
+def _problem(design: Design) -> dict[str, Any]:
+    return {"num_vars": len(design), "names": list(design), "bounds": [list(span) for span in design.values()]}
 
 
 def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:

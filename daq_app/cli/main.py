@@ -25,7 +25,7 @@ VERBS = {
     "decide": "record what a person decides about a stroke, or undo it",
     "predict": "predict the receptor's strain-energy density for each trial",
     "solve": "run the solver on a scene file",
-    "sensitivity": "tell which of a scene's numbers moves the SED (Sobol indices)",
+    "sensitivity": "tell which of a scene's numbers moves the SED, or on which fingers a response keeps its sign",
     "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
     "report": "write a session's report as one page",
     "study": "pool many sessions: group statistics, a page, a table of all trials",

@@ -34,6 +34,9 @@ from sessions.strokes.decisions import DECISIONS, content_of
 VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
 PIPELINE = "daq-app"
+DERIVED = (  # tables that are made of a recording, in their order
+    "answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "responses", "alternatives",
+)  # fmt: skip
 SOURCE = "sourcedata"  # BIDS lets it hold anything
 _KNOWN = frozenset({"onset", "duration"})  # BIDS itself says what they are
 _MARK = Column("simulated", "", "1: transducer or subject were simulated", ())
@@ -66,7 +69,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     made.mkdir(parents=True)
     write_json(derived / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
     (derived / "README.md").write_text(_readme(recording), encoding="utf-8")
-    for name in ("answers", "positions", "strokes", "friction", "flaws", "decisions", "predictions", "alternatives"):
+    for name in DERIVED:
         if name in found:
             _write_table(made / f"{names.stem}_desc-{name}_beh", found[name], recording, task)
 

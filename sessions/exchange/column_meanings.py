@@ -142,6 +142,15 @@ ALTERNATIVE = {
     ),
 }
 
+RESPONSE = {
+    "trial": ("", "number of the trial"),
+    "quantity": ("", "its name in files and options"),
+    "value": ("", "averaged over the ending, in the unit of its row"),
+    "error": ("", "estimated by the solver, in the same unit"),
+    "unit": ("", "of value and error; - for a strain"),
+    "meaning": ("", "what the quantity is"),
+}
+
 PREDICTION = {
     "trial": ("", "number of the trial"),
     "stroke": ("", "position of the stroke it was made for, from 0"),

@@ -14,6 +14,7 @@ from sessions.exchange.column_meanings import (
     FRICTION,
     POSITION,
     PREDICTION,
+    RESPONSE,
     STROKE,
 )
 from sessions.exchange.given_and_made import given, made_with
@@ -97,6 +98,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         row |= _force_intervals(told.get("interval"))
         row |= made_with(prediction, told)
     predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, PREDICTION)
+    made = (*made, predicted, *_responses(prediction))
     otherwise = [
         {
             "trial": row["trial"],
@@ -110,9 +112,20 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         for one in row.get("alternatives", ())
     ]
     if not otherwise:
-        return (*made, predicted)
+        return made
     meaning = "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
-    return (*made, predicted, _of("alternatives", meaning, otherwise, ALTERNATIVE))
+    return (*made, _of("alternatives", meaning, otherwise, ALTERNATIVE))
+
+
+def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
+    """Return the table of every quantity at the ending, where the prediction holds them: older ones do not."""
+    rows: list[dict[str, Any]] = []
+    for row in prediction["trials"]:
+        solved: Mapping[str, Any] = row.get("solver") or {"responses": {}}
+        held: Mapping[str, Mapping[str, Any]] = solved.get("responses", {})
+        rows += [{"trial": row["trial"], "quantity": name, **found} for name, found in held.items()]
+    meaning = "every quantity at the ending for each predicted trial"
+    return (_of("responses", meaning, rows, RESPONSE),) if rows else ()
 
 
 def _sed_interval(name: str, told: Mapping[str, Any] | None) -> dict[str, Any]:

@@ -19,16 +19,22 @@ from sessions.prediction.solving import (
 )
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from solver import Friction, Prediction, Scene
+from solver.prediction import Response
+from solver.quantities import QUANTITIES, SED, Quantity
 from solver.response.nearby import Nearby
 
 __all__ = [
     "DEFAULT_SPEED",
+    "QUANTITIES",
+    "SED",
     "SLIDES",
     "Friction",
     "Nearby",
     "Prediction",
     "PredictionOptions",
     "Progress",
+    "Quantity",
+    "Response",
     "Scene",
     "SessionPrediction",
     "TrialPrediction",

@@ -15,7 +15,7 @@ from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.decisions import Decision
 from sessions.toml_file import from_table
 from solver import Prediction, Scene
-from solver.prediction import History, Skin
+from solver.prediction import History, Response, Skin
 from solver.response.fields import Fields, fields_of
 
 _NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found
@@ -62,6 +62,11 @@ class TrialPrediction:
     opposite_error: float | None = None
     matching_depth_error: float | None = None
     matching_depth_interval: Ends | None = None  # that friction and the measured force make of it [mm]
+
+    @property
+    def responses(self) -> Mapping[str, Response]:
+        """Return every quantity at the ending by its name; none where there is no prediction."""
+        return {} if self.prediction is None else self.prediction.responses
 
     @property
     def history(self) -> History | None:

@@ -1,8 +1,10 @@
 """What a report holds: plain data, ready for any export. Null numbers carry their reason."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from sessions.prediction import Response
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.statistics.multiverse import PathFinding
@@ -137,6 +139,7 @@ class PredictionFinding:
     direction: int | None
     sed: float | None  # [MPa], averaged over the ending
     error_estimate: float | None  # relative, of sed
+    responses: Mapping[str, Response]  # every quantity at the ending by its name; none where there is no prediction
     normal_per_mm: float | None  # [N/mm]
     normal_force: float | None  # normal_per_mm times the finger's width [N]
     tangential_force: float | None  # likewise [N]
@@ -161,6 +164,7 @@ class PredictionFinding:
     settled_rate: float | None = None  # likewise
     peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
     settled_rate_interval: Ends | None = None  # likewise
+    row: tuple[tuple[float, float], ...] = ()  # SED [MPa] of the same ending at arc positions along the skin [mm]
     doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
     opposite_doubt: str = ""  # likewise of the state slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for

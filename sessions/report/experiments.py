@@ -8,23 +8,24 @@ import numpy as np
 from sessions.plan.plan import Block, SessionPlan
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Seds, path_findings
-from sessions.statistics.rivals import GIVEN, MODEL, QUANTITIES, rivals_of_means
+from sessions.statistics.rivals import FIELDS, GIVEN, MODEL, NAMES, RESPONSES, rivals_of_means
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.friction import rule_for
 
-Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `QUANTITIES` -> block and index -> number
+Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` -> block and index -> number
 
 
 def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
     """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
-    given: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in QUANTITIES}
+    given: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in NAMES}
     by_number = {stroke.number: stroke for stroke in strokes}
     for one in predictions:
         if one.index is not None:
-            for name, attribute in QUANTITIES.items():
-                holder = one if name in (MODEL, GIVEN) else by_number.get(one.stroke or 0)
-                value = getattr(holder, attribute, None)
+            stroke = by_number.get(one.stroke or 0)
+            numbers = {name: getattr(one if name in (MODEL, GIVEN) else stroke, FIELDS[name], None) for name in FIELDS}
+            numbers |= {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
+            for name, value in numbers.items():
                 if value is not None:
                     given[name][one.experiment, one.index].append(value)
     return {name: {key: float(np.mean(all_of)) for key, all_of in values.items()} for name, values in given.items()}

@@ -111,10 +111,20 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         "code": "" if row.stimulus is None else row.stimulus.code,
         "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
         "reasons": reasons,
+        "responses": row.responses,
+        "row": _row(row),
         "doubt": "" if row.prediction is None else doubt_of(row.prediction),
         "opposite_doubt": "" if row.opposite is None else doubt_of(row.opposite),
     }
     return PredictionFinding(**{**same_fields(row, PredictionFinding), **told})
+
+
+def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:
+    """Return arc position and SED of every ending of the row that has one."""
+    if row.prediction is None:
+        return ()
+    pairs = zip(row.prediction.row.arc.tolist(), row.prediction.row.sed.tolist(), strict=True)
+    return tuple((arc, sed) for arc, sed in pairs if np.isfinite(sed))
 
 
 def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing | None) -> PredictionFinding:

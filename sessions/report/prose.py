@@ -1,11 +1,11 @@
 """What a report says in sentences: its question and, in short, its answer."""
 
-from sessions.prediction.variants import Variant
 from sessions.report import Experiment, Report
+from sessions.report.robustness import robustness
 from sessions.report.tables.multiverse import paths_sentence
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.report.wording import correlation, digits, plural, spread_share
-from sessions.statistics.scores import Relation, relation
+from sessions.report.wording import correlation, digits, ends_of, plural, spread_share
+from sessions.statistics.scores import Relation
 
 
 def question(report: Report) -> str:
@@ -40,7 +40,7 @@ def summary(report: Report) -> tuple[str, ...]:
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     if any(p.sed is not None for p in report.predictions):
-        sentences.append(_otherwise(report))
+        sentences += robustness(report)
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
         sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
@@ -71,49 +71,14 @@ def _predicted(experiment: Experiment, low: float, high: float, strain: str) -> 
     return words + related_words(experiment.score_relation) + "."
 
 
-def _otherwise(report: Report) -> str:
-    """Return what the other strain says of the same scores, or that it was not asked."""
-    other = "finite" if report.model.startswith("small") else "small"
-    told: list[str] = []
-    for experiment in report.experiments:
-        means = {mean.index: mean.mean for mean in experiment.scores}
-        points = [
-            (p.index, means[p.index], one.sed)
-            for p in report.predictions
-            for one in p.alternatives
-            if p.experiment == experiment.name and p.index in means and one.sed is not None
-            and one.variant == Variant(other, "computed", "depth")
-        ]  # fmt: skip
-        asked = any(
-            one.variant.kinematics == other
-            for p in report.predictions
-            if p.experiment == experiment.name
-            for one in p.alternatives
-        )
-        if asked:
-            seds, scores = [point[2] for point in points], [point[1] for point in points]
-            found = relation(seds, scores, [point[0] for point in points])
-            r = found.reason if found.pearson is None else f"r = {correlation(found.pearson)}{_ends(found)}"
-            told.append(f"{experiment.name} {r}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}")
-    if told:
-        return f"At {other} strain the SED goes with the mean scores thus: {'; '.join(told)}."
-    return f"At {other} strain, which was not tried here, the sign of r may be another."
-
-
 def related_words(related: Relation | None) -> str:
     """Return r with its interval and n as the end of a sentence, or why there is none."""
     if related is None:
         return "; there are no scores to hold it against"
     if related.pearson is None:
         return f"; no correlation with the scores: {related.reason}"
-    words = f"; against the mean scores r = {correlation(related.pearson)}{_ends(related)}"
+    words = f"; against the mean scores r = {correlation(related.pearson)}{ends_of(related)}"
     return words + f", n = {related.n} stimuli"
-
-
-def _ends(related: Relation) -> str:
-    if related.low is None or related.high is None:
-        return ""
-    return f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
 
 
 def _plural(n: int, one: str, many: str) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from sessions.exchange.csv_text import write_rows
+from sessions.prediction import QUANTITIES, SED
 from sessions.statistics.multiverse import Path
 from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
@@ -55,6 +56,11 @@ _MEANING: Mapping[str, tuple[str, str]] = {
     "flaws": ("", "names of the flaws graded doubtful or worse, with blanks between"),
     "why": ("", "why there is no SED"),
 }
+_RESPONSES: Mapping[str, tuple[str, str]] = {
+    one.name: ("" if one.unit == "-" else one.unit, f"of the model, averaged over the ending: {one.meaning}")
+    for one in QUANTITIES
+    if one is not SED
+}
 _OWN: Mapping[str, str] = {
     SIMULATED: "yes where transducer or subject were simulated",
     "session": "folder of the session",
@@ -64,7 +70,7 @@ _OWN: Mapping[str, str] = {
 
 
 def _heading(name: str) -> str:
-    unit = _MEANING[name][0]
+    unit = {**_MEANING, **_RESPONSES}[name][0]
     return f"{name}_{_SUFFIXES.get(unit, unit)}" if unit else name
 
 
@@ -73,7 +79,7 @@ def columns_csv(study: StudyFindings) -> str:
     out = io.StringIO()
     first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
     rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
-    rows += [[_heading(name), *_MEANING[name]] for name in _MEANING]
+    rows += [[_heading(name), *told] for name, told in {**_MEANING, **_RESPONSES}.items()]
     write_rows(out, [*rows, ["excluded", "", _OWN["excluded"]]])
     return out.getvalue()
 
@@ -118,7 +124,7 @@ def trials_csv(study: StudyFindings) -> str:
     R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
     """
     names = list(_MEANING)  # paths have a table of their own
-    heads = [_heading(name) for name in names]
+    heads = [_heading(name) for name in (*names, *_RESPONSES)]
     mark = [SIMULATED] if study.simulated else []
     out = io.StringIO()
     rows: list[list[object]] = [[*mark, "session", "subject", *heads, "excluded"]]
@@ -129,7 +135,8 @@ def trials_csv(study: StudyFindings) -> str:
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             told = ["yes" if visit.simulated else "no"] if mark else []
-            rows.append([*told, visit.session, visit.subject, *(_plain(getattr(row, n)) for n in names), why])
+            numbers = [*(getattr(row, name) for name in names), *map(row.responses.get, _RESPONSES)]
+            rows.append([*told, visit.session, visit.subject, *map(_plain, numbers), why])
     write_rows(out, rows)
     return out.getvalue()
 

@@ -4,6 +4,8 @@ import math
 import re
 from collections.abc import Callable
 
+from sessions.statistics.scores import Relation
+
 NONE = "–"
 
 
@@ -91,6 +93,13 @@ def correlation(r: float) -> str:
     """
     text = f"{r:+.2f}" if abs(r) < 0.995 or abs(r) > 0.9995 else f"{r:+.3f}"
     return text.replace("-", "−")
+
+
+def ends_of(related: Relation) -> str:
+    """Return the 95 % interval of a correlation as the end of a sentence, "" where there is none."""
+    if related.low is None or related.high is None:
+        return ""
+    return f", 95 % interval {correlation(related.low)} to {correlation(related.high)}"
 
 
 def spread_share(low: float, high: float) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sessions.prediction import QUANTITIES, SED
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from sessions.statistics.dependent_correlations import (
@@ -21,8 +22,10 @@ from sessions.statistics.within_subjects import repeated_correlation
 
 MODEL = "SED"
 GIVEN = "µ of the model"
-# Name for people, and the field of a stroke or trial that holds it; the first is the model's, to which all compare.
-QUANTITIES: Mapping[str, str] = {
+# Name for people, and that of the model's other quantities at the receptor.
+RESPONSES: Mapping[str, str] = {one.label: one.name for one in QUANTITIES if one is not SED}
+# Name for people, and the field of a stroke or trial that holds it; to the first, the model's, all are compared.
+FIELDS: Mapping[str, str] = {
     MODEL: "sed",
     GIVEN: "mu",
     "µ dynamic": "mu_dynamic",
@@ -32,6 +35,7 @@ QUANTITIES: Mapping[str, str] = {
     "N": "normal_force",
     "speed": "speed",
 }
+NAMES = (MODEL, *RESPONSES, *(name for name in FIELDS if name != MODEL))
 _RESAMPLES = 10_000
 _NO_LINE = "without some surface the others fix no line"
 _LEAST_SUBJECTS = 3  # of a bootstrap over subjects, and of the jackknife beside it
@@ -72,17 +76,17 @@ class RivalTrial:
 def rivals_of_means(scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> tuple[Rival, ...]:
     """Return how each quantity of the surfaces goes with their mean scores; () where the model has no quantity.
 
-    `scores` and each of `series` go by a surface's index; the quantities' names are those of `QUANTITIES`.
+    `scores` and each of `series` go by a surface's index; the quantities' names are those of `NAMES`.
     """
     if MODEL not in series:
         return ()
-    return tuple(_of_means(name, scores, series) for name in QUANTITIES if name in series)
+    return tuple(_of_means(name, scores, series) for name in NAMES if name in series)
 
 
 def rivals_of_surfaces(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
     counted = [trial for trial in trials if MODEL in trial.values]
-    names = [name for name in QUANTITIES if any(name in trial.values for trial in counted)]
+    names = [name for name in NAMES if any(name in trial.values for trial in counted)]
     return rivals_of_means(*_means(counted, names))
 
 
@@ -93,7 +97,7 @@ def rivals_within(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
     on these very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
     counted = [trial for trial in trials if MODEL in trial.values]
-    names = [name for name in QUANTITIES if any(name in trial.values for trial in counted)]
+    names = [name for name in NAMES if any(name in trial.values for trial in counted)]
     if not counted:
         return ()
     deviances = {name: _deviance(name, counted) for name in names}

@@ -9,7 +9,7 @@ from solver import _kernels as kernels
 from solver._kernels import HELD_X, HELD_Y, bind_arguments
 from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ProbeArrays, SymbolicFactorization
 from solver.arrays import Array, Indices, Narrow
-from solver.body.receptor import Endings
+from solver.body.receptor import Endings, patch_means
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law, log1p
 from solver.element import Q2P1
@@ -251,16 +251,10 @@ class FiniteProbes:
         return np.bincount(self.patch, self.energy(body, displacement) * self.weights, len(self.areas)) / self.areas
 
     def responses(self, body: FiniteBody, displacement: Array) -> Array:
-        """Return every quantity averaged over each patch (q, r, ...) for displacements (nodes, 2, ...), even complex."""
+        """Return every quantity averaged over each patch (q, r, ...) for displacements (nodes, 2, ...)."""
         state = self._state(body, displacement)
-        wide = (slice(None), *([None] * (displacement.ndim - 2)))
-        means = []
-        for quantity in QUANTITIES:
-            values = quantity.finite(state) * self.weights[wide]
-            total = np.zeros((len(self.areas), *values.shape[1:]), values.dtype)
-            np.add.at(total, self.patch, values)
-            means.append(total / self.areas[wide])
-        return np.stack(means)
+        values = (quantity.finite(state) for quantity in QUANTITIES)
+        return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
 
     def _state(self, body: FiniteBody, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""

@@ -36,15 +36,23 @@ class Endings:
         return np.stack([self._means(quantity.small(state)) for quantity in QUANTITIES])
 
     def _means(self, values: Array) -> Array:
-        """Return values (p, c) averaged over each patch (r, c); nan where no patch."""
-        total = np.zeros((self.count, values.shape[1]), values.dtype)
-        np.add.at(total, self.patch, values * self.weights[:, None])
         area = np.bincount(self.patch, self.weights, self.count)
-        return total / np.where(area > 0.0, area, np.nan)[:, None]
+        return patch_means(values, self.weights, self.patch, np.where(area > 0.0, area, np.nan))
 
     def nodes(self, mesh: Mesh) -> Indices:
         """Return the numbers of the nodes that the probes need."""
         return distinct(mesh.elements[distinct(self.probes.element)])
+
+
+def patch_means(values: Array, weights: Array, patch: Indices, areas: Array) -> Array:
+    """Return values (p, ...) averaged over patches (r, ...) by weights (p,); `patch` (p,) says whose each is.
+
+    `areas` (r,) are the sums of weights, nan where there is no patch.
+    """
+    wide = (slice(None), *([None] * (values.ndim - 1)))
+    total = np.zeros((len(areas), *values.shape[1:]), values.dtype)
+    np.add.at(total, patch, values * weights[wide])
+    return total / areas[wide]
 
 
 def endings(finger: FingerMesh, elements: Centred, receptor: Receptor, arcs: Array) -> Endings:

@@ -117,7 +117,7 @@ class FingerModel:
         return self.ending.responses(self.geometry.mesh, self.body.elastic, displacement)[:, 0].T
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r) [MPa]; nan where the finger ends."""
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
         row = self.row.average(self.geometry.mesh, self.body.elastic, self._recovered(states, self.row))
         return np.hstack([self.all_numbers(states), row.T])
 

@@ -91,7 +91,7 @@ class FiniteFinger:
         return self.ending.responses(self.newton.body, displacement)[:, 0].T
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r) [MPa]; nan where the finger ends."""
+        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
         row = [self.row.average(self.newton.body, state.u) for state in states]
         return np.hstack([self.all_numbers(states), row])
 

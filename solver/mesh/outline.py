@@ -82,7 +82,7 @@ class Outline:
 
     def world(self, x: Array, y: Array) -> Array:
         """Return the points (..., 2) of the world for finger coordinates `x`, `y`."""
-        return self._turned(x, y) + [0.0, self.finger.tip_radius]
+        return self._turned(x, y) + np.array([0.0, self.finger.tip_radius])
 
     def _turned(self, x: Array, y: Array) -> Array:
         """Return vectors (..., 2) of the finger frame in the world."""

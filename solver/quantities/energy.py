@@ -25,7 +25,7 @@ def _small_volumetric(at: LocalState) -> Array:
 
 def _finite_volumetric(at: LocalState) -> Array:
     """Return W of the same change of volume, alike in all three directions."""
-    dilated = 3.0 * np.expm1(2.0 / 3.0 * at.log_J) - 2.0 * at.log_J  # tr C - 3 - 2 ln J
+    dilated = 3.0 * np.expm1(2.0 / 3.0 * at.log_volume) - 2.0 * at.log_volume  # tr C - 3 - 2 ln J
     return at.shear / 2.0 * shape(at.stiffening, dilated) + at.lame / 2.0 * at.dilatation**2
 
 

@@ -27,20 +27,20 @@ class LocalState:
     tangent: tuple[Array, Array]
 
     @property
-    def J(self) -> Array:
-        """Volume by undeformed volume at the place itself [-]."""
+    def volume(self) -> Array:
+        """J: volume by undeformed volume at the place itself [-]."""
         return 1.0 + self._grown
 
     @property
-    def log_J(self) -> Array:
-        """Logarithm of J to the digits of the strains [-]."""
+    def log_volume(self) -> Array:
+        """Logarithm of the volume to the digits of the strains [-]."""
         return log1p(self._grown)
 
     @property
     def excess(self) -> Array:
-        """tr C - 3 - 2 ln J at the place itself, to the digits of the strains [-]."""
+        """Tr C - 3 - 2 ln J at the place itself, to the digits of the strains [-]."""
         squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
-        return 2.0 * (self.trace - self.log_J) + squares
+        return 2.0 * (self.trace - self.log_volume) + squares
 
     @property
     def _grown(self) -> Array:

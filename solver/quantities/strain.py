@@ -49,7 +49,7 @@ def _finite_along(at: LocalState) -> Array:
 
 def _finite_shear_along(at: LocalState) -> Array:
     x, y, across, up = _lines(at)
-    return _size((x * across + y * up) / at.J)
+    return _size((x * across + y * up) / at.volume)
 
 
 def _size(number: Array) -> Array:

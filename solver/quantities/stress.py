@@ -22,7 +22,7 @@ def _small(at: LocalState) -> Stress:
 
 def _finite(at: LocalState) -> Stress:
     """Return sigma = (G f (F F^T - 1) + lambda ln J 1) / J of plane strain."""
-    J = at.J
+    J = at.volume
     shear = at.shear * slopes(at.stiffening, at.excess)[0] / J
     bulk = at.lame * at.dilatation / J
     return (

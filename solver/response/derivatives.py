@@ -7,7 +7,7 @@ stay. Differences across a kink lie between the derivatives of both sides.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -121,7 +121,8 @@ def slope(responses: Callable[[Array], Array], displacement: Array, steps: Array
     `responses` makes (c, q) of (nodes, 2, c). By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40,
     110), exact to round-off.
     """
-    return responses(displacement[:, :, None] + 1j * IMAGINARY * steps).imag.T / IMAGINARY
+    beside = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
+    return responses(beside).imag.T / IMAGINARY
 
 
 def _spread(newton: FiniteNewton, unknowns: Array) -> Array:

@@ -101,7 +101,9 @@ class FinitePicture(LivePicture):
         body, mesh = finger.newton.body, finger.geometry.mesh
         element, local = _middles(mesh)
         probes = Probes.at(mesh, Elastic.of(mesh, settled_moduli(scene.materials)), element, local)
-        each = Endings(probes, np.ones(len(element)), np.arange(len(element)), len(element), np.tile([1.0, 0.0], (len(element), 1)))
+        each = Endings(
+            probes, np.ones(len(element)), np.arange(len(element)), len(element), np.tile([1.0, 0.0], (len(element), 1))
+        )
         return cls(_faces(mesh), mesh.nodes, body, FiniteProbes.of(body, each))
 
     def nodes(self, state: EquilibriumState) -> Array:

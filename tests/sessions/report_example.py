@@ -196,6 +196,7 @@ def prediction(number, descriptor, index):
         direction=DIRECTION[descriptor],
         sed=sed,
         error_estimate=0.001,
+        responses={},
         normal_per_mm=0.2,
         normal_force=3.0,
         tangential_force=2.0,

@@ -49,7 +49,8 @@ def folder(found, tmp_path):
 def test_every_field_of_a_trial_has_a_column_with_its_meaning(found):
     heads = trials_csv(found).splitlines()[0].split(",")
     assert heads == [row[0] for row in list(csv.reader(columns_csv(found).splitlines()))[1:]]
-    assert {field.name for field in fields(TrialRow)} - {"paths"} == set(_MEANING)
+    assert {field.name for field in fields(TrialRow)} - {"paths", "responses"} == set(_MEANING)
+    assert {"stretch_along_skin", "von_mises_mpa"} <= {head.lower() for head in heads}
 
 
 @pytest.mark.skipif(RSCRIPT is None, reason="no R to open the table in")

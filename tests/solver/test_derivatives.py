@@ -229,7 +229,9 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     local = np.random.default_rng(1).uniform(-0.9, 0.9, (len(elements), 2))
     places = Probes.at(mesh, Elastic.of(mesh, [Hooke(0.08, 0.48)]), elements, local)
     count = len(elements)
-    probes = FiniteProbes.of(body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1))))
+    probes = FiniteProbes.of(
+        body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1)))
+    )
     draw = np.random.default_rng(2)
     u, steps = draw.uniform(-0.015, 0.015, mesh.nodes.shape), draw.normal(size=(*mesh.nodes.shape, 2))
     found = slope(lambda moved: probes.responses(body, moved)[0].T, u, steps)

@@ -14,13 +14,13 @@ BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 EVERY = pytest.mark.parametrize("name", NAMES)
 
 
-def state(H, law=LAWS[0], angle=0.3, small=False):
-    """Return what is known of places with displacement gradients H (n, 2, 2), the skin's tangent turned by an angle."""
-    H = np.asarray(H, float)
-    volume = np.trace(H, axis1=-2, axis2=-1) if small else np.log(np.linalg.det(np.eye(2) + H))
-    along = np.full(len(H), np.cos(angle)), np.full(len(H), np.sin(angle))
+def state(grad, law=LAWS[0], angle=0.3, small=False):
+    """Return what is known of places with displacement gradients (n, 2, 2), the skin's tangent turned by an angle."""
+    grad = np.asarray(grad, float)
+    volume = np.trace(grad, axis1=-2, axis2=-1) if small else np.log(np.linalg.det(np.eye(2) + grad))
+    along = np.full(len(grad), np.cos(angle)), np.full(len(grad), np.sin(angle))
     moduli = (np.array(number) for number in (law.shear, law.lame, law.stiffening))
-    return LocalState(H[:, 0, 0], H[:, 0, 1], H[:, 1, 0], H[:, 1, 1], volume, *moduli, along)
+    return LocalState(grad[:, 0, 0], grad[:, 0, 1], grad[:, 1, 0], grad[:, 1, 1], volume, *moduli, along)
 
 
 def drawn(size, count=20):
@@ -30,49 +30,51 @@ def drawn(size, count=20):
 @EVERY
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_a_rotation_of_the_deformed_body_changes_no_quantity(name, law):
-    H = drawn(0.25)
+    grad = drawn(0.25)
     turn = np.array([[np.cos(0.9), -np.sin(0.9)], [np.sin(0.9), np.cos(0.9)]])
-    turned = turn @ (np.eye(2) + H) - np.eye(2)
+    turned = turn @ (np.eye(2) + grad) - np.eye(2)
     finite = BY_NAME[name].finite
-    np.testing.assert_allclose(finite(state(turned, law)), finite(state(H, law)), rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(finite(state(turned, law)), finite(state(grad, law)), rtol=1e-9, atol=1e-13)
 
 
 @EVERY
 def test_at_small_strain_a_small_rotation_changes_no_quantity(name):
-    H = drawn(0.01)
+    grad = drawn(0.01)
     small = BY_NAME[name].small
-    turned = H + 0.02 * np.array([[0.0, -1.0], [1.0, 0.0]])
-    np.testing.assert_allclose(small(state(turned, small=True)), small(state(H, small=True)), rtol=1e-9, atol=1e-15)
+    turned = grad + 0.02 * np.array([[0.0, -1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(small(state(turned, small=True)), small(state(grad, small=True)), rtol=1e-9, atol=1e-15)
 
 
 @EVERY
 @pytest.mark.parametrize("law", LAWS, ids=str)
 def test_the_small_strain_form_is_the_limit_of_the_finite_one(name, law):
     """The part by which they differ falls with the strain, so ten times less strain leaves a tenth of it."""
-    H, off = drawn(1.0), []
+    grad, off = drawn(1.0), []
     for size in (1e-4, 1e-5):
-        small = BY_NAME[name].small(state(size * H, law, small=True))
-        finite = BY_NAME[name].finite(state(size * H, law))
+        small = BY_NAME[name].small(state(size * grad, law, small=True))
+        finite = BY_NAME[name].finite(state(size * grad, law))
         off.append(np.abs(finite - small).max() / np.abs(small).max())
     assert off[0] < 1e-3
     assert off[1] <= 0.15 * off[0]
 
 
 def test_energy_and_stresses_are_those_of_the_laws():
-    H = drawn(0.2)
-    F, det = np.eye(2) + H, np.linalg.det(np.eye(2) + H)
+    grad = drawn(0.2)
+    deformed, det = np.eye(2) + grad, np.linalg.det(np.eye(2) + grad)
     for law in LAWS:
-        at = state(H, law)
-        np.testing.assert_allclose(BY_NAME["sed"].finite(at), energy(law, F), rtol=1e-12)
-        cauchy = np.zeros((len(H), 3, 3))
-        cauchy[:, :2, :2] = stress(law, F) @ np.swapaxes(F, 1, 2) / det[:, None, None]
+        at = state(grad, law)
+        np.testing.assert_allclose(BY_NAME["sed"].finite(at), energy(law, deformed), rtol=1e-12)
+        cauchy = np.zeros((len(grad), 3, 3))
+        cauchy[:, :2, :2] = stress(law, deformed) @ np.swapaxes(deformed, 1, 2) / det[:, None, None]
         cauchy[:, 2, 2] = law.lame * np.log(det) / det
         np.testing.assert_allclose(BY_NAME["pressure"].finite(at), -np.trace(cauchy, axis1=1, axis2=2) / 3, rtol=1e-10)
         deviator = cauchy - np.trace(cauchy, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
         mises = np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2)))
         np.testing.assert_allclose(BY_NAME["von_mises"].finite(at), mises, rtol=1e-9)
     hooke = Hooke(E, NU)
-    np.testing.assert_allclose(BY_NAME["sed"].small(state(H, hooke_like(), small=True)), hooke.energy(H), rtol=1e-12)
+    np.testing.assert_allclose(
+        BY_NAME["sed"].small(state(grad, hooke_like(), small=True)), hooke.energy(grad), rtol=1e-12
+    )
 
 
 def hooke_like():
@@ -81,13 +83,13 @@ def hooke_like():
 
 
 def test_principal_strains_are_singular_values_of_the_deformation():
-    H = drawn(0.3)
-    values = np.linalg.svd(np.eye(2) + H, compute_uv=False)
-    at = state(H)
+    grad = drawn(0.3)
+    values = np.linalg.svd(np.eye(2) + grad, compute_uv=False)
+    at = state(grad)
     np.testing.assert_allclose(BY_NAME["principal_strain_greatest"].finite(at), values[:, 0] - 1.0, rtol=1e-12)
     np.testing.assert_allclose(BY_NAME["principal_strain_least"].finite(at), values[:, 1] - 1.0, rtol=1e-11)
     np.testing.assert_allclose(BY_NAME["shear_greatest"].finite(at), values[:, 0] - values[:, 1], rtol=1e-11)
-    strains = np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2.0)
+    strains = np.linalg.eigvalsh((grad + np.swapaxes(grad, 1, 2)) / 2.0)
     np.testing.assert_allclose(BY_NAME["principal_strain_greatest"].small(at), strains[:, 1], rtol=1e-11, atol=1e-15)
     np.testing.assert_allclose(BY_NAME["shear_greatest"].small(at), strains[:, 1] - strains[:, 0], rtol=1e-11)
 

@@ -15,14 +15,22 @@ from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
 from daq_app.cli.model_option import add_kinematics, add_tau
 from daq_app.console import Console, WrongValue, number, span, table
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, finger_in
+from sessions.prediction import (
+    QUANTITIES,
+    SED,
+    PredictionOptions,
+    Quantity,
+    SessionPrediction,
+    TrialPrediction,
+    finger_in,
+)
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
 from sessions.prediction.sed_interval import SedInterval
 from sessions.prediction.variants import Alternative
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
-HEAD = ["trial", "surface", "mu", "tau_max [kPa]", "SED [kPa]", "error", "model N [N]", "measured [N]", "match [mm]"]
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 
 INTERVALS = ["trial", "SED [kPa]", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]", "slid the other way [kPa]"]
 MARKED = "by the solver's tangent, or where marked * by solving draws"
@@ -45,6 +53,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="scene file with another finger; friction and loading are the trials'",
     )
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
+    parser.add_argument(
+        "--quantity",
+        choices=list(BY_NAME),
+        default=SED.name,
+        metavar="NAME",
+        help=f"of the ending, to print in place of the SED: {', '.join(BY_NAME)}; --json has all",
+    )
     parser.add_argument(
         "--beside",
         choices=["none", "small", "both"],
@@ -102,21 +117,27 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({**prediction.to_dict(), **seal, **firing})
     if recording.simulated_sentence:
         console.say(recording.simulated_sentence)
+    quantity = BY_NAME[options.quantity]
+    unit = "kPa" if quantity.unit == "MPa" else quantity.unit
+    head = ["trial", "surface", "mu", "tau_max [kPa]", f"{quantity.label} [{unit}]", "error"]
     rows = [
         [
             str(row.trial or (row.stroke or 0) + 1),
             "–" if row.stimulus is None else row.stimulus.called,
             number(row.mu),
             number(None if row.tau_max is None else row.tau_max * 1e3),
-            number(None if row.sed is None else row.sed * 1e3, 4),
-            "–" if row.error_estimate is None else f"{100 * row.error_estimate:.2g} %",
+            *_response(row, quantity),
             number(row.normal_force),
             number(row.measured_normal),
             number(row.matching_depth),
         ]
         for row in prediction.trials
     ]
-    console.say(table(rows, head=HEAD) if rows else "nothing to predict: no forces were recorded")
+    console.say(
+        table(rows, head=[*head, "model N [N]", "measured [N]", "match [mm]"])
+        if rows
+        else "nothing to predict: no forces were recorded"
+    )
     _print_beside(prediction, console)
     if asked.intervals:
         _print_intervals(prediction, console)
@@ -133,6 +154,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for (missing, reason), trials in without.items():
         console.say(f"{', '.join(trials)}: no {missing}: {reason}")
     return 3 if any(row.sed is None for row in prediction.trials) else 0
+
+
+def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
+    """Return the value of a quantity at the ending, stresses in kPa, and its relative error."""
+    if quantity.name not in row.responses:
+        return "–", "–"
+    value, error = row.responses[quantity.name]
+    factor = 1e3 if quantity.unit == "MPa" else 1.0
+    return number(factor * value, 4), f"{100 * error / abs(value):.2g} %" if value else "–"
 
 
 def _print_beside(prediction: SessionPrediction, console: Console) -> None:

@@ -1,35 +1,66 @@
-"""Tell which of a scene's numbers moves the predicted SED: Sobol indices over a design.
+"""Tell what moves the predicted response: Sobol indices over a design, or the sign of its slope over many fingers.
 
-Without --design geometry, stiffness, depth, angle and friction are varied around the scene's own values by ranges that
-nobody measured; they are printed with the result. A design is a TOML file: "finger.tip_radius" = [4.0, 6.5] and so on.
+With a scene: which of its numbers moves its SED. Without --design geometry, stiffness, depth, angle and friction are
+varied around the scene's own values by ranges that nobody measured; they are printed with the result. A design is a
+TOML file: "finger.tip_radius" = [4.0, 6.5] and so on.
+
+Without a scene: whether a response at the receptor rises or falls over the published surfaces, and on which fingers it
+keeps that sign: single changes, a map over the receptor's place and the tip radius, and fingers drawn at random.
 """
 
 import argparse
 from pathlib import Path
 
-from daq_app.batch.sensitivity import checked, doubts, left_as_it_is, sensitivity, usual_design
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.batch import sign_map
+from daq_app.batch.sensitivity import Index, checked, doubts, left_as_it_is, saltelli_points, sensitivity, usual_design
+from daq_app.batch.sign_map import Answer
+from daq_app.cli.model_option import add_kinematics
 from daq_app.console import Console, WrongValue, number, table
+from sessions.prediction import QUANTITIES, SED, Quantity
+from sessions.prediction.series_slopes import SERIES
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
+NAMES = [quantity.name for quantity in QUANTITIES]
+SAMPLES, OF_FINGERS = 32, 64  # usual ones
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare scene, design, samples and seed."""
-    parser.add_argument("scene", type=Path, metavar="SCENE.toml")
+    """Declare scene, design, samples and seed, and what is asked of many fingers."""
+    parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="without it: many fingers")
     parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers are varied, and how far")
     parser.add_argument(
-        "--samples", type=int, default=32, metavar="N", help="a power of two; N (numbers + 2) solves (32)"
+        "--samples",
+        type=int,
+        metavar="N",
+        help=f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {len(sign_map.DESIGN) + 2} N fingers "
+        f"({OF_FINGERS})",
     )
     parser.add_argument("--seed", type=int, default=0, help="of the samples (0)")
+    parser.add_argument(
+        "--quantity", choices=NAMES, default=SED.name, metavar="NAME", help=f"whose signs are shown: {', '.join(NAMES)}"
+    )
+    add_kinematics(parser, "strain of every finger but the one change that takes the other")
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, written as they come: another run goes on")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes of this computer (its cores)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, in place of this computer")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Solve the design and print the indices."""
-    samples: int = options.samples
+    """Solve the design and print the indices, or ask the fingers and print their signs."""
+    samples: int = options.samples or (OF_FINGERS if options.scene is None else SAMPLES)
     if not 2 <= samples <= 4096 or samples & (samples - 1):
         raise WrongValue(f"--samples {samples} is not allowed: a power of two from 2 to 4096")
+    if options.scene is None:
+        if options.design is not None:
+            raise WrongValue("--design needs a scene: daq-app sensitivity SCENE.toml --design FILE")
+        if options.workers is not None and not 1 <= options.workers <= 1024:
+            raise WrongValue(f"--workers {options.workers} is not allowed: 1 to 1024")
+        return _signs(options, samples, console)
     scene = load_toml(options.scene, Scene)
     if options.design is None:
         design, origin = usual_design(scene), "default: nobody set it"
@@ -66,3 +97,145 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for sentence in doubted:
         console.say(sentence)
     return 0
+
+
+def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
+    """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
+    quantity = QUANTITIES[NAMES.index(options.quantity)]
+    changes = sign_map.single_changes(options.kinematics)
+    mapped = sign_map.map_trials(options.kinematics)
+    points = saltelli_points(sign_map.DESIGN, samples, options.seed)
+    drawn = sign_map.drawn_fingers(points, options.kinematics)
+    trials = [*changes.values(), *mapped.values(), *drawn]
+    try:
+        answers = sign_map.answers_of(
+            trials,
+            lambda part: console.progress(part, f"{round(part * len(trials))} of {len(trials)} fingers"),
+            keep=options.keep,
+            workers=options.workers,
+            scheduler=options.scheduler,
+        )
+    except OSError as error:
+        raise WrongValue(f"--keep {options.keep} cannot be used ({error.strerror})") from error
+    single = dict(zip(changes, answers, strict=False))
+    radii = dict(zip(mapped, answers[len(changes) :], strict=False))
+    random = answers[len(changes) + len(mapped) :]
+    published = single["as published"]
+    assert not isinstance(published, str)  # a finger that can be
+    kept = sign_map.kept_signs(random, published)
+    shares = {name: sign_map.share(column) for name, column in zip(NAMES, kept.T, strict=True)}
+    at = NAMES.index(quantity.name)
+    indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
+    console.result(
+        {
+            "quantity": quantity.name,
+            "kinematics": options.kinematics,
+            "quantities": NAMES,
+            "changes": single,
+            "map": {"places": sign_map.PLACES, "radii": {f"{radius:g}": one for radius, one in radii.items()}},
+            "design": sign_map.DESIGN,
+            "samples": samples,
+            "seed": options.seed,
+            "fingers": len(random),
+            "without_answer": int(np.isnan(kept[:, at]).sum()),
+            "shares": shares,
+            "indices": {name: [one.to_dict() for one in found] for name, (found, _) in indices.items()},
+        }
+    )
+    _print_changes(single, quantity, console)
+    _print_map(radii, quantity, console)
+    console.say(
+        f"\n{len(random)} fingers drawn at random from ranges that nobody measured (below), "
+        f"{int(np.isnan(kept[:, at]).sum())} of them without a settled state on three surfaces of each series. "
+        "Share of the others that keep both published signs:"
+    )
+    rows = [
+        [one.label, f"{100 * found[0]:.0f} %", f"{100 * found[1]:.0f} to {100 * found[2]:.0f} %"]
+        for one, found in zip(QUANTITIES, shares.values(), strict=True)
+        if found is not None
+    ]
+    console.say(table(rows, head=["quantity", "share", "95 % interval"]))
+    for found, _ in indices.values():
+        if found:
+            _print_thirds(found[0].name, points, kept[:, at], quantity, console)
+            break
+    for name, (found, count) in indices.items():
+        _print_indices(name, found, count, samples, quantity, console)
+    return 0
+
+
+def _print_changes(single: dict[str, Answer | str], quantity: Quantity, console: Console) -> None:
+    console.say(
+        f"{quantity.label}: correlation r with the makers' index over the published surfaces, and change from the "
+        "least to the greatest mu by the mean"
+    )
+    at = NAMES.index(quantity.name)
+    rows = [
+        [name, *(text for series in SERIES for text in _cells(answer, series, at))] for name, answer in single.items()
+    ]
+    head = ["the published finger, but", *(text for series in SERIES for text in (f"r {series}", "change"))]
+    console.say(table(rows, head=head))
+
+
+def _cells(answer: Answer | str, series: str, at: int) -> tuple[str, str]:
+    if isinstance(answer, str):
+        return "–", "–"
+    with_index, change = (part[0][at] for part in answer[series])
+    if with_index is None or change is None:
+        return "no slide", "–"
+    return f"{with_index:+.2f}", f"{100 * change:+.0f} %"
+
+
+def _print_map(radii: dict[float, Answer | str], quantity: Quantity, console: Console) -> None:
+    """Print the signs of stickiness and slipperiness for each tip radius and place of the receptor."""
+    at = NAMES.index(quantity.name)
+    console.say(
+        f"\nSigns of r of the {quantity.label} with stickiness and with slipperiness, over the receptor's place along "
+        "the skin [mm, positive to the tip] and the tip radius [mm]:"
+    )
+    rows = [
+        [f"{radius:g}", *(_mark(answer, place, at) for place in range(len(sign_map.PLACES)))]
+        for radius, answer in radii.items()
+    ]
+    console.say(table(rows, head=["", *(f"{place:g}" for place in sign_map.PLACES)]))
+
+
+def _mark(answer: Answer | str, place: int, at: int) -> str:
+    if isinstance(answer, str):
+        return "··"
+    numbers = [answer[series][0][place][at] for series in SERIES]
+    return "".join("·" if one is None else "+" if one > 0.0 else "\N{MINUS SIGN}" for one in numbers)
+
+
+def _print_thirds(
+    name: str, points: NDArray[np.float64], kept: NDArray[np.float64], quantity: Quantity, console: Console
+) -> None:
+    """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
+    values = points[:, list(sign_map.DESIGN).index(name)]
+    told = [
+        f"{100 * part:.0f} % at {number(low)} to {number(high)}"
+        for low, high, part in sign_map.shares_by_thirds(kept, values)
+        if part is not None
+    ]
+    console.say(f"The {quantity.label} keeps both signs, by {name}: {', '.join(told)}.")
+
+
+def _print_indices(
+    name: str, found: tuple[Index, ...], count: int, samples: int, quantity: Quantity, console: Console
+) -> None:
+    console.say(f"\nWhat moves the change of the {quantity.label} over {name} (Sobol indices, {count} fingers):")
+    if not found:
+        console.say("too few whole blocks of the design have an answer: ask for more --samples")
+        return
+    rows = [
+        [
+            one.name,
+            f"{number(one.low)} to {number(one.high)}",
+            f"{one.first:.2f} ± {one.first_error:.2f}",
+            f"{one.total:.2f} ± {one.total_error:.2f}",
+        ]
+        for one in found
+    ]
+    console.say(table(rows, head=["number", "varied", "alone", "with others"]))
+    for sentence in doubts(found, samples):
+        console.say(sentence)

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.cli.main import DONE, FLAWED, STOPPED
-from daq_app.console import Console, number, table
+from daq_app.console import Console, WrongValue, number, table
+from solver.quantities import QUANTITIES, Quantity
 
 if TYPE_CHECKING:
-    from solver import Prediction
+    from solver import Prediction, Receptor, Scene
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
@@ -32,6 +33,13 @@ AUDITS = {
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the scene file."""
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="finger, materials, friction, loading, receptor")
+    parser.add_argument(
+        "--row",
+        type=float,
+        metavar="MM",
+        help="also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie; without "
+        "error estimates",
+    )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -40,6 +48,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from solver import Scene, SolveFailure, solve
 
     scene = load_toml(options.scene, Scene)
+    deep = _row_receptor(scene, options.row)
     before: list[Prediction] = []
     try:
         with console.working("solving") as told:
@@ -50,16 +59,28 @@ def run(options: argparse.Namespace, console: Console) -> int:
     except KeyboardInterrupt:
         if not before:
             raise
+        deep = None
         found = replace(before[-1], warnings=(*before[-1].warnings, UNFINISHED))
         _print(found, scene.title or options.scene.name, console)
         return STOPPED
-    _print(found, scene.title or options.scene.name, console)
+    _print(found, scene.title or options.scene.name, console, deep)
     asked = scene.solve.tolerance
     return DONE if asked is None or found.error_estimate <= asked else FLAWED
 
 
-def _print(found: "Prediction", title: str, console: Console) -> None:
-    console.result(found.to_dict())
+def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
+    """Return an ending like the scene's at another depth [mm]. Raises WrongValue where the skin has no room for it."""
+    if depth is None:
+        return None
+    half, skin = scene.receptor.ending[0] / 2.0, scene.finger.epidermis + scene.finger.dermis
+    if not half <= depth <= skin - half:
+        raise WrongValue(f"--row {depth:g} is not allowed: {half:g} to {skin - half:g} mm, within the skin")
+    return replace(scene.receptor, depth=depth)
+
+
+def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
+    row = {} if deep is None else _row(found, deep)
+    console.result({**found.to_dict(), **({} if deep is None else {"row_at": {"depth": deep.depth, **row}})})
     console.say(title)
     rows = [
         ["SED at the ending", number(found.sed_ending * 1e3, 5), "kPa", _percent(found.error_estimate)],
@@ -80,6 +101,16 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
         ["estimating errors took", number(found.estimate_s * 1e3, 3), "ms", ""],
     ]
     console.say(table(rows, head=["", "", "", "error, estimated"]))
+    console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
+    responses = [_response(one, *found.responses[one.name]) for one in QUANTITIES]
+    console.say(table(responses, head=["", "", "", "error, estimated"]).lstrip("\n"))
+    if deep is not None:
+        console.say(
+            f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; MPa and shares):"
+        )
+        head = ["arc [mm]", *(one.name for one in QUANTITIES)]
+        columns = zip(*row.values(), strict=True)
+        console.say(table([[number(cell, 4) for cell in cells] for cells in columns], head=head).lstrip("\n"))
     left = [[name, _percent(entry["estimate"])] for name, entry in found.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
@@ -90,6 +121,21 @@ def _print(found: "Prediction", title: str, console: Console) -> None:
     console.say(table(shown, head=["", ""]).lstrip("\n"))
     for warning in found.warnings:
         console.note(f"note: {warning}")
+
+
+def _row(found: "Prediction", receptor: "Receptor") -> dict[str, list[float | None]]:
+    """Return arc positions [mm] and every quantity there, None where the finger ends."""
+    from solver.prediction import ROW
+    from solver.response.receptor_row import responses_along
+
+    columns = zip(QUANTITIES, responses_along([found], receptor=receptor)[0].tolist(), strict=True)
+    told = {one.name: [value if value == value else None for value in values] for one, values in columns}
+    return {"arc": ROW.tolist(), **told}
+
+
+def _response(quantity: Quantity, value: float, error: float) -> list[str]:
+    factor, unit = (1e3, "kPa") if quantity.unit == "MPa" else (1.0, "")
+    return [quantity.label, number(factor * value, 4), unit, number(factor * error, 2)]
 
 
 def _length(error: float | None) -> str:

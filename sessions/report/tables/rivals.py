@@ -6,7 +6,7 @@ from textwrap import fill
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
 from sessions.report.wording import NONE, correlation, digits, p_value, places
 from sessions.statistics.dependent_correlations import POWER
-from sessions.statistics.rivals import MODEL, Rival
+from sessions.statistics.rivals import MODEL, RESPONSES, Rival
 
 _ALPHA = 0.05
 _LINE = 44  # characters that a line of a picture's title has room for
@@ -29,8 +29,9 @@ def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], model: str) ->
 
 
 def rival_words(rivals: Sequence[Rival]) -> str:
-    """Return lines with the r of each rival for the title of a picture, "" where there is none."""
-    told = [(rival.name, correlation(rival.r)) for rival in rivals if rival.name != MODEL and rival.r is not None]
+    """Return lines with the r of each measured rival for the title of a picture, "" where there is none."""
+    measured = [rival for rival in rivals if rival.name != MODEL and rival.name not in RESPONSES]
+    told = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
     unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in told]
     return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if told else ""
 

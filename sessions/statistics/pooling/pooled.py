@@ -25,7 +25,7 @@ from sessions.statistics.pooling.findings import (
 )
 from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
 from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
-from sessions.statistics.rivals import QUANTITIES, RivalTrial, rivals_of_surfaces, rivals_within
+from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
 from sessions.statistics.scores import (
     Relation,
     ScoreTable,
@@ -151,7 +151,8 @@ def _descriptor(
 
 def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
     """Return a scored trial with those quantities that its row has."""
-    held = {name: getattr(row, attribute) for name, attribute in QUANTITIES.items()}
+    held = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
+    held |= {label: row.responses.get(name) for label, name in RESPONSES.items()}
     return RivalTrial(subject, row.index, score, {name: value for name, value in held.items() if value is not None})
 
 

@@ -79,6 +79,7 @@ class TrialRow:
     sed_high: float | None = None
     sed_interval: str = ""  # how it was found, or why there is none
     error_estimate: float | None = None  # relative, of sed
+    responses: Mapping[str, float] = field(default_factory=dict[str, float])  # each quantity at the ending, by name
     model_normal_force: float | None = None  # [N]
     model_normal_force_error: float | None = None  # relative, estimated by the solver
     matching_depth: float | None = None  # [mm]
@@ -236,6 +237,7 @@ def _with_prediction(row: TrialRow, answer: TrialPrediction) -> TrialRow:
         sed_high=None if interval is None else interval.high,
         sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
         error_estimate=answer.error_estimate,
+        responses={name: found.value for name, found in answer.responses.items()},
         model_normal_force=answer.normal_force,
         model_normal_force_error=answer.normal_force_error,
         matching_depth=answer.matching_depth,

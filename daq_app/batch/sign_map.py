@@ -1,0 +1,295 @@
+"""On which fingers a response keeps the sign of its slope: single changes, a map, and fingers drawn at random.
+
+A finger's answer is `sessions.prediction.series_slopes`: how each quantity at the ending goes with the published
+surfaces. Fingers are computed side by side, and kept as they come where a file is given.
+"""
+
+import hashlib
+import importlib
+import json
+import math
+import os
+from collections.abc import Callable, Generator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.batch.cluster import ANSWERS, SchedulerError, refuse_other_workers
+from daq_app.batch.sensitivity import Index, sobol_indices
+from daq_app.batch.workers import attend
+from daq_app.child_process import fresh_processes
+from sessions.prediction.series_slopes import SERIES, Press, series_slopes
+from sessions.recording.provenance import software_versions
+from solver import Friction, Loading, Receptor, Scene, Solve
+
+Kinematics = Literal["small", "finite"]
+Array = NDArray[np.float64]
+
+# What is drawn at random, and over which range. Nobody measured these: fingers of a lab's subjects would be better.
+# Thicknesses, bone and press go with the tip radius or the series, so that every draw is a finger that can be.
+DESIGN: Mapping[str, tuple[float, float]] = {
+    "tip radius [mm]": (4.0, 8.0),
+    "epidermis by tip radius": (0.10, 0.20),
+    "dermis by tip radius": (0.18, 0.32),
+    "bone radius by tip radius": (0.20, 0.30),
+    "contact angle [degrees]": (30.0, 60.0),
+    "stiffness of epidermis by the published": (0.5, 2.0),
+    "stiffness of dermis by the published": (0.5, 2.0),
+    "stiffness of fat by the published": (0.5, 2.0),
+    "Poisson's ratio of fat": (0.46, 0.495),
+    "place of the receptor along the skin [mm]": (-1.0, 1.0),
+    "depth of the receptor by the skin's": (0.5, 1.0),
+    "depth of the press by the published": (0.75, 1.25),
+}
+RADII = tuple(np.arange(4.5, 8.01, 0.5).tolist())  # of the map [mm]
+PLACES = tuple(np.arange(-2.0, 2.01, 0.25).tolist())  # of the map [mm]
+FORCE = 0.1  # of the change "pressed by one force" [N/mm]: 1.5 N on a finger 15 mm wide
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One finger to be asked."""
+
+    finger: Scene
+    press: Press
+    arcs: tuple[float, ...] = (0.0,)
+
+    def key(self, versions: Mapping[str, str]) -> str:
+        """Return what its answer is kept under: all that it comes from, and the `versions` that computed it."""
+        told = json.dumps([asdict(self), versions], sort_keys=True, default=str)
+        return hashlib.sha256(told.encode()).hexdigest()
+
+
+# For each series the correlation with the index (r, q), then the change over the range of mu (r, q), both by place
+Answer = Mapping[str, list[list[list[float | None]]]]
+
+
+def published(kinematics: Kinematics = "small") -> Scene:
+    """Return the published finger."""
+    return Scene(friction=Friction(0.0), loading=Loading(1.0), solve=Solve(kinematics))
+
+
+def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
+    """Return fingers that differ from the published one in one thing, by what that is."""
+    base = published(kinematics)
+    other: Kinematics = "finite" if kinematics == "small" else "small"
+
+    def finger(**changes: float) -> Scene:
+        return replace(base, finger=replace(base.finger, **changes))
+
+    def stiffer(tissue: str, factor: float) -> Scene:
+        return _stiffened(base, {tissue: factor})
+
+    here = Press()
+    return {
+        "as published": Trial(base, here),
+        f"{other} strain": Trial(published(other), here),
+        f"pressed by {FORCE:g} N/mm": Trial(base, Press(force=FORCE)),
+        "receptor 1 mm proximal": Trial(base, here, (-1.0,)),
+        "receptor 0.25 mm proximal": Trial(base, here, (-0.25,)),
+        "receptor 0.25 mm distal": Trial(base, here, (0.25,)),
+        "receptor 1 mm distal": Trial(base, here, (1.0,)),
+        "tip radius 6 mm": Trial(finger(tip_radius=6.0), here),
+        "tip radius 7 mm": Trial(finger(tip_radius=7.0), here),
+        "contact angle 30°": Trial(finger(contact_angle=30.0), here),
+        "fat half as stiff": Trial(stiffer("fat", 0.5), here),
+        "epidermis three times as stiff": Trial(stiffer("epidermis", 3.0), here),
+        "pressed a quarter less deep": Trial(base, Press(depth=0.75)),
+    }
+
+
+def map_trials(kinematics: Kinematics) -> Mapping[float, Trial]:
+    """Return the published finger with other tip radii [mm], asked at every place of the map."""
+    base = published(kinematics)
+    return {
+        radius: Trial(replace(base, finger=replace(base.finger, tip_radius=radius)), Press(), PLACES)
+        for radius in RADII
+    }
+
+
+def drawn_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
+    """Return the fingers at points (n, numbers) of the design."""
+    return [_finger(dict(zip(DESIGN, point, strict=True)), published(kinematics)) for point in points.tolist()]
+
+
+def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
+    radius, epidermis, dermis, bone, angle, *stiff, nu, place, depth, press = drawn.values()
+    finger = base.finger
+    scaled = replace(
+        finger,
+        tip_radius=radius,
+        epidermis=epidermis * radius,
+        dermis=dermis * radius,
+        bone_radius=bone * radius,
+        bone_centre=tuple(part * radius / finger.tip_radius for part in finger.bone_centre),
+        shaft_length=finger.shaft_length * radius / finger.tip_radius,
+        contact_angle=angle,
+    )
+    other = _stiffened(base, dict(zip(("epidermis", "dermis", "fat"), stiff, strict=True)))
+    fat = replace(other.materials.fat, nu=nu)
+    half = base.receptor.ending[0] / 2.0
+    within = half + depth * ((epidermis + dermis) * radius - 2.0 * half)
+    drawn_scene = replace(
+        other,
+        finger=scaled,
+        materials=replace(other.materials, fat=fat),
+        receptor=Receptor(depth=within, ending=base.receptor.ending),
+    )
+    return Trial(drawn_scene, Press(depth=press), (place,))
+
+
+def _stiffened(scene: Scene, factors: Mapping[str, float]) -> Scene:
+    held = scene.materials
+    changed = {name: replace(held.of(name), E=factor * held.of(name).E) for name, factor in factors.items()}
+    return replace(scene, materials=replace(held, **changed))
+
+
+def answered(trial: Trial) -> Answer | str:
+    """Return what one finger answers, or why it cannot be asked."""
+    found = series_slopes(trial.finger, trial.press, trial.arcs)
+    if isinstance(found, str):
+        return found
+    return {
+        name: [[_plain(one.with_index) for one in slopes], [_plain(one.change) for one in slopes]]
+        for name, slopes in found.items()
+    }
+
+
+def _plain(numbers: Array) -> list[float | None]:
+    return [number if math.isfinite(number) else None for number in numbers.tolist()]
+
+
+def answers_of(
+    trials: Sequence[Trial],
+    progress: Callable[[float], None],
+    *,
+    keep: Path | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> list[Answer | str]:
+    """Return the answer of each finger, from processes of this computer or a Dask cluster.
+
+    With `keep` what is done is written there, and not computed again by the next run. Raises SchedulerError, OSError.
+    """
+    versions = software_versions()
+    keys = [trial.key(versions) for trial in trials]
+    known = _kept(keep)
+    missing = [number for number, key in enumerate(keys) if key not in known]
+    done = len(trials) - len(missing)
+    if missing:
+        with _executor(scheduler, workers or min(os.cpu_count() or 1, len(missing))) as pool:
+            waiting = {pool.submit(answered, trials[number]): keys[number] for number in missing}
+            for future in as_completed(waiting):
+                key = waiting[future]
+                known[key] = future.result()
+                if keep is not None:
+                    with keep.open("a", encoding="utf-8") as file:
+                        file.write("\n" + json.dumps({"key": key, "answer": known[key]}))
+                done += 1
+                progress(done / len(trials))
+    return [known[key] for key in keys]
+
+
+def _kept(keep: Path | None) -> dict[str, Any]:
+    """Return the answers that a file holds; a line that a crash cut short is left out."""
+    held: dict[str, Any] = {}
+    if keep is not None and keep.exists():
+        for line in keep.read_text(encoding="utf-8").splitlines():
+            with suppress(ValueError, KeyError, TypeError):
+                one = json.loads(line)
+                held[one["key"]] = one["answer"]
+    return held
+
+
+@contextmanager
+def _executor(scheduler: str | None, workers: int) -> Generator[Executor]:
+    """Give what runs work: processes of this computer, or the workers of a cluster. Raises SchedulerError."""
+    if scheduler is None:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads cost more than they bring at these sizes
+        pool = ProcessPoolExecutor(workers, mp_context=fresh_processes(), initializer=attend)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+        return
+    try:
+        library: Any = importlib.import_module("distributed")
+    except ImportError as error:
+        raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
+    try:
+        client: Any = library.Client(scheduler, timeout=ANSWERS, set_as_default=False)
+    except OSError as error:
+        raise SchedulerError(f"{scheduler}: no Dask scheduler answers there ({error})") from error
+    with client:
+        refuse_other_workers(client, list(client.nthreads()), scheduler)
+        yield client.get_executor(pure=False)
+
+
+def kept_signs(answers: Sequence[Answer | str], as_published: Answer) -> Array:
+    """Return which quantities keep the published signs in both series (n, q): 1 or 0, nan without an answer."""
+    mine = _signs(as_published)
+    rows = [np.full(mine.shape, np.nan) if isinstance(answer, str) else _signs(answer) for answer in answers]
+    return np.array([np.where(np.isnan(row).any(axis=0), np.nan, (row == mine).all(axis=0)) for row in rows])
+
+
+def _signs(answer: Answer) -> Array:
+    """Return the signs of the correlations with the index (series, q) at the first place; nan where there is none."""
+    return np.sign(np.array([answer[name][0][0] for name in SERIES], np.float64))
+
+
+def share(kept: Array) -> tuple[float, float, float] | None:
+    """Return the share of ones among numbers (n,), nan left out, with its 95 % interval; None of nothing.
+
+    The interval is that of Wilson (1927, J. Am. Stat. Assoc. 22, 209).
+
+    >>> [round(number, 3) for number in share(np.array([1.0] * 4 + [0.0] * 9)) or ()]
+    [0.308, 0.127, 0.576]
+    """
+    known = kept[np.isfinite(kept)]
+    of = len(known)
+    if not of:
+        return None
+    z, part = 1.959963984540054, float(known.mean())
+    middle = (part + z * z / (2 * of)) / (1 + z * z / of)
+    half = z / (1 + z * z / of) * math.sqrt(part * (1 - part) / of + z * z / (4 * of * of))
+    return part, max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def shares_by_thirds(kept: Array, values: Array) -> list[tuple[float, float, float | None]]:
+    """Return the share of ones among `kept` (n,) in each third of the range of `values` (n,), with that third's ends.
+
+    >>> shares_by_thirds(np.array([1.0, 1.0, 0.0]), np.array([0.0, 1.0, 3.0]))
+    [(0.0, 1.0, 1.0), (1.0, 2.0, None), (2.0, 3.0, 0.0)]
+    """
+    low, high = float(values.min()), float(values.max())
+    ends = [low + third * (high - low) / 3.0 for third in range(4)]
+    place = np.clip(np.searchsorted(ends, values, side="left") - 1, 0, 2)
+    shares = [share(kept[place == third]) for third in range(3)]
+    return [(*pair, None if found is None else found[0]) for pair, found in zip(pairwise(ends), shares, strict=True)]
+
+
+def slope_indices(
+    answers: Sequence[Answer | str], series: str, quantity: int, seed: int
+) -> tuple[tuple[Index, ...], int]:
+    """Return the Sobol indices of a quantity's change over a series, and how many fingers they rest on.
+
+    A block of the design with a finger without an answer is left out whole.
+    """
+    block = len(DESIGN) + 2
+    values = np.array(
+        [np.nan if isinstance(one, str) else _number(one[series][1][0][quantity]) for one in answers]
+    ).reshape(-1, block)
+    whole = values[np.isfinite(values).all(axis=1)]
+    if len(whole) < 2:
+        return (), 0
+    return sobol_indices(DESIGN, whole.ravel(), seed, lambda _: False), whole.size
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -1,0 +1,111 @@
+"""Sentences on what would change the sign between prediction and scores: the strain, the ending's place, the drive."""
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+from sessions.prediction.variants import Variant
+from sessions.report.contents import Experiment, PredictionFinding, Report
+from sessions.report.wording import correlation, digits, ends_of
+from sessions.statistics.scores import Relation, relation
+
+REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
+_Value = Callable[[PredictionFinding], float | None]
+
+
+def robustness(report: Report) -> list[str]:
+    """Return three sentences: what the other strain, the ending's place and a given force make of r with the scores."""
+    kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
+    other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
+    return [
+        _in_variant(
+            report,
+            Variant(other, "computed", "depth"),
+            f"At {other} strain the SED goes with the mean scores thus",
+            f"At {other} strain, which was not tried here, the sign of r may be another.",
+        ),
+        _by_place(report),
+        _in_variant(
+            report,
+            Variant(kind, "computed", "force"),
+            "Pressed by the force measured, and not to a depth, thus",
+            "Pressed by the force measured, which was not tried here, the sign of r may be another.",
+        ),
+    ]
+
+
+def _in_variant(report: Report, variant: Variant, said: str, untried: str) -> str:
+    """Return r of the scores with the SED in a variant, for each experiment."""
+
+    def sed(one: PredictionFinding) -> float | None:
+        return next((found.sed for found in one.alternatives if found.variant == variant), None)
+
+    tried = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
+    told = [
+        f"{experiment.name} {_words(found)}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}"
+        for experiment in report.experiments
+        if experiment.name in tried
+        for found in [_related(report, experiment, sed)]
+    ]
+    return f"{said}: {'; '.join(told)}." if told else untried
+
+
+def _words(found: Relation) -> str:
+    return str(found.reason) if found.pearson is None else f"r = {correlation(found.pearson)}{ends_of(found)}"
+
+
+def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
+    """Return how the mean scores of an experiment go with a value of its predictions."""
+    means = {mean.index: mean.mean for mean in experiment.scores}
+    points = [
+        (p.index, means[p.index], number)
+        for p in report.predictions
+        if p.experiment == experiment.name and p.index in means
+        for number in [value(p)]
+        if number is not None
+    ]
+    return relation([point[2] for point in points], [point[1] for point in points], [point[0] for point in points])
+
+
+def _by_place(report: Report) -> str:
+    """Return how far along the skin the ending may lie without another sign of r."""
+    told: list[str] = []
+    for experiment in report.experiments:
+        by_place = {arc: _related(report, experiment, _at(arc)).pearson for arc in _places(report, experiment)}
+        known = {arc: r for arc, r in by_place.items() if r is not None}
+        if 0.0 in known:
+            low, high = _alike(known)
+            told.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
+    if not told:
+        return "What another place of the ending would say of the sign of r is not known here."
+    return (
+        f"An ending elsewhere along the skin, looked at up to {REACH:g} mm to each side, keeps the sign of r in "
+        f"{' and in '.join(told)} of its place, positive towards the tip."
+    )
+
+
+def _at(arc: float) -> _Value:
+    return lambda one: dict(one.row).get(arc)
+
+
+def _places(report: Report, experiment: Experiment) -> list[float]:
+    """Return the places [mm] that every prediction of an experiment has an SED of."""
+    rows = [dict(p.row) for p in report.predictions if p.experiment == experiment.name and p.row]
+    return sorted(arc for arc in rows[0] if abs(arc) <= REACH and all(arc in row for row in rows)) if rows else []
+
+
+def _alike(known: Mapping[float, float]) -> tuple[float, float]:
+    """Return the ends of the stretch about 0 in which the sign is that at 0.
+
+    >>> _alike({-0.5: -0.9, -0.25: 0.3, 0.0: 0.9, 0.25: 0.8})
+    (-0.25, 0.25)
+    """
+    ends = [0.0, 0.0]
+    for side, places in (
+        (0, sorted((a for a in known if a < 0.0), reverse=True)),
+        (1, sorted(a for a in known if a > 0.0)),
+    ):
+        for arc in places:
+            if known[arc] * known[0.0] <= 0.0:
+                break
+            ends[side] = arc
+    return ends[0], ends[1]

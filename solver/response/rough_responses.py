@@ -1,0 +1,89 @@
+"""Responses of many scenes without error estimates: for surveys, where a scene may cost no more than its solve.
+
+On one coarse mesh for all scenes that share a finger. `sessions.prediction.series_slopes` says how good that is for
+what it is used for.
+"""
+
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+from numpy.linalg import LinAlgError
+
+from solver.accuracy.adaptivity import COARSE, WIDER
+from solver.arrays import Array
+from solver.body.finite import FiniteProbes
+from solver.body.receptor import endings
+from solver.continuation.finite_states import roughly
+from solver.continuation.limit_point import sound
+from solver.continuation.small_existence import direct
+from solver.continuation.wedging import WIDE
+from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.load_stepping import never
+from solver.equilibrium.newton import EquilibriumState
+from solver.failures import SolveFailure
+from solver.mesh.grid import MeshError
+from solver.mesh.mesher import Sizing
+from solver.quantities import NAMES
+from solver.scene import Scene, SceneError
+
+FINENESS = 6.0  # elements to a tip radius, at small strain
+
+
+def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> Array:
+    """Return every quantity (n, q, r) of settled slides at endings at arc positions [mm]; nan where there is none.
+
+    All scenes are of one finger and one kinematics. Raises SceneError where the finger cannot be meshed.
+    """
+    first = scenes[0]
+    if first.solve.kinematics == "finite":
+        return _finite(scenes, np.asarray(arcs, np.float64))
+    out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
+    depth = max(expected_depth(scene) for scene in scenes)
+    pending = list(range(len(scenes)))
+    for margin in (1.0, WIDE):
+        try:
+            finger = FingerModel.of(first, Sizing(FINENESS, depth, margin=margin))
+        except (MeshError, LinAlgError) as bad:
+            key, value = "finger.tip_radius", first.finger.tip_radius
+            raise SceneError(key, value, f"no mesh fits this finger ({bad})") from bad
+        states: dict[int, EquilibriumState] = {}
+        for number in pending:
+            try:
+                state = direct(scenes[number], finger, widest=margin == WIDE)
+            except SolveFailure:
+                continue
+            if state is not None and not finger.reaches_out(state, finger.displacement(state), state.pull.depth):
+                states[number] = state
+        if states:
+            moved = finger.body.displacement(np.stack([state.u for state in states.values()], axis=2))
+            row = endings(finger.geometry, finger.body.elastic, first.receptor, np.asarray(arcs, np.float64))
+            found = row.responses(finger.geometry.mesh, finger.body.elastic, moved)
+            out[list(states)] = np.moveaxis(found, 2, 0)
+        pending = [number for number in pending if number not in states]
+        if not pending:
+            break
+    return out
+
+
+def _finite(scenes: Sequence[Scene], arcs: Array) -> Array:
+    """Return the same at finite strain: those pressed alike share a mesh, each begun at the one with less friction."""
+    out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
+    order = sorted(range(len(scenes)), key=lambda n: (scenes[n].pressed, float(scenes[n].friction.mu)))
+    for _, numbers in groupby(order, lambda n: scenes[n].pressed):
+        group, near = list(numbers), None
+        depth = max(expected_depth(scenes[number]) for number in group)
+        finger = FiniteFinger.of(scenes[group[0]], Sizing(COARSE, depth, margin=WIDER))
+        body = finger.newton.body
+        row = FiniteProbes.of(body, endings(finger.geometry, body, scenes[0].receptor, arcs))
+        for number in group:
+            try:
+                state = roughly(finger, scenes[number], never, near)
+            except SolveFailure:
+                continue
+            if sound(finger, state):
+                near = state
+                out[number] = row.responses(body, state.u)
+    return out

@@ -1,0 +1,107 @@
+"""Fingers that keep the published signs: counted right, kept as they come, and never asked twice."""
+
+import json
+
+import numpy as np
+import pytest
+
+from daq_app.batch import sign_map
+from daq_app.batch.sensitivity import saltelli_points
+from daq_app.cli.main import run
+
+
+def answer(sticky, slippery):
+    return {"stickiness": [[[sticky]]] * 2, "slipperiness": [[[slippery]]] * 2}
+
+
+def test_signs_are_kept_where_both_series_have_the_published_one_and_unknown_without_an_answer():
+    kept = sign_map.kept_signs(
+        [answer(0.1, -0.2), answer(0.1, 0.2), answer(None, -0.2), "no mesh fits"], answer(0.9, -0.9)
+    )
+    assert kept[:2, 0].tolist() == [1.0, 0.0]
+    assert np.isnan(kept[2:]).all()
+    assert sign_map.share(kept[:, 0])[0] == 0.5
+    assert sign_map.share(kept[2:, 0]) is None
+
+
+def test_the_slope_of_a_number_that_alone_moves_it_has_an_index_of_one():
+    # The change is linear in the place of the receptor and in nothing else.
+    points = saltelli_points(sign_map.DESIGN, 128, 0)
+    column = list(sign_map.DESIGN).index("place of the receptor along the skin [mm]")
+    answers = [answer(float(one), 1.0) for one in points[:, column]]
+    indices, count = sign_map.slope_indices(answers, "stickiness", 0, 0)
+    assert count == len(points)
+    assert indices[0].name == "place of the receptor along the skin [mm]"
+    assert indices[0].total == pytest.approx(1.0, abs=0.05)
+    assert all(abs(one.total) < 0.01 for one in indices[1:])
+
+
+def test_a_block_with_a_finger_without_an_answer_is_left_out_whole():
+    block = len(sign_map.DESIGN) + 2
+    answers = [answer(float(n % 7), 1.0) for n in range(4 * block)]
+    answers[3] = "no mesh fits"
+    assert sign_map.slope_indices(answers, "stickiness", 0, 0)[1] == 3 * block
+    assert sign_map.slope_indices(["no"] * 2 * block, "stickiness", 0, 0) == ((), 0)
+
+
+def test_every_corner_of_the_design_is_a_finger_that_can_be():
+    low, high = np.array(list(sign_map.DESIGN.values())).T
+    bits = np.random.default_rng(0).integers(0, 2, (500, len(low)))
+    sign_map.drawn_fingers(np.where(bits, high, low), "small")
+    sign_map.single_changes("finite")
+    sign_map.map_trials("small")
+
+
+def test_what_is_kept_is_not_computed_again_and_a_line_cut_short_is(tmp_path, monkeypatch):
+    trials = list(sign_map.single_changes("small").values())[2:5]
+    keep = tmp_path / "answers.jsonl"
+    parts = []
+    first = sign_map.answers_of(trials, parts.append, keep=keep, workers=2)
+    assert parts[-1] == 1.0
+    lines = keep.read_text().strip().splitlines()
+    assert len(lines) == 3
+    monkeypatch.setattr(sign_map, "_executor", lambda *_: pytest.fail("all was kept"))
+    assert sign_map.answers_of(trials, parts.append, keep=keep) == first
+    monkeypatch.undo()
+    keep.write_text("\n".join([*lines[:2], lines[2][:40]]))  # as a crash leaves it
+    assert sign_map.answers_of(trials, parts.append, keep=keep, workers=1) == first
+
+
+def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
+    keep = str(tmp_path / "keep.jsonl")
+    assert run(["sensitivity", "--samples", "2", "--keep", keep, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["fingers"] == 28
+    assert set(told["shares"]) == set(told["quantities"])
+    assert run(["sensitivity", "--samples", "2", "--keep", keep, "--quantity", "shear_along_skin"]) == 0
+    said = capsys.readouterr().out
+    assert "receptor 0.25 mm distal" in said
+    assert "no slide" in said  # at finite strain
+    assert "+\N{MINUS SIGN}" in said
+
+
+def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
+    design = tmp_path / "design.toml"
+    design.write_text("")
+    for wrong in (["--design", str(design)], ["--workers", "0"], ["--samples", "3"], ["--keep", str(tmp_path)]):
+        assert run(["sensitivity", *wrong]) == 2
+        assert capsys.readouterr().err.count("\n") <= 1
+
+
+@pytest.mark.slow
+def test_a_dask_cluster_answers_as_this_computer_does():
+    distributed = pytest.importorskip("distributed")
+    trials = list(sign_map.single_changes("small").values())[:3]
+    here = sign_map.answers_of(trials, lambda _: None, workers=1)
+    with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        there = sign_map.answers_of(trials, lambda _: None, scheduler=cluster.scheduler_address)
+    assert there == here
+
+
+def test_an_address_without_a_scheduler_is_a_sentence(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(sign_map, "ANSWERS", 0.5)
+    with pytest.raises(sign_map.SchedulerError, match="no Dask scheduler answers"):
+        sign_map.answers_of(
+            list(sign_map.single_changes("small").values())[:1], lambda _: None, scheduler="tcp://127.0.0.1:9"
+        )

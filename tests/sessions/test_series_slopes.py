@@ -1,0 +1,57 @@
+"""The slope of a response over the published surfaces: against full solves, and against a referee's numbers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sessions.prediction.series_slopes import SERIES, Press, series_slopes
+from solver import Finger, Friction, Loading, Scene, Solve, solve_many
+from solver.quantities import NAMES
+from solver.scene.published import scene
+
+PUBLISHED = Scene(friction=Friction(0.0), loading=Loading(1.0))
+SED = NAMES.index("sed")
+
+
+def signs(finger, name="sed", **kwargs):
+    found = series_slopes(finger, **kwargs)
+    return [round(float(found[series][0].with_index[NAMES.index(name)]), 2) for series in SERIES]
+
+
+def test_correlations_and_changes_are_those_of_full_solves():
+    found = series_slopes(PUBLISHED)
+    for series, surfaces in SERIES.items():
+        scenes = [replace(scene(one), solve=Solve(tolerance=0.003, evidence="quick")) for one in surfaces]
+        sed = [answer.sed_ending for answer in solve_many(scenes)]
+        mu, index = [one.mu for one in surfaces], [one.index for one in surfaces]
+        mine = found[series][0]
+        assert mine.surfaces == 5
+        assert mine.with_mu[SED] == pytest.approx(np.corrcoef(mu, sed)[0, 1], abs=0.02)
+        assert mine.with_index[SED] == pytest.approx(np.corrcoef(index, sed)[0, 1], abs=0.02)
+        change = np.polyfit(mu, sed, 1)[0] * np.ptp(mu) / np.mean(sed)
+        assert mine.change[SED] == pytest.approx(change, abs=0.01)
+
+
+def test_signs_are_those_that_a_referee_found_with_other_meshes():
+    assert signs(PUBLISHED) == pytest.approx([0.97, -0.89], abs=0.015)
+    assert signs(PUBLISHED, "stretch_along_skin") == pytest.approx([-0.98, 0.88], abs=0.015)
+    assert signs(PUBLISHED, "shear_along_skin") == pytest.approx([0.98, -0.86], abs=0.015)
+    assert signs(replace(PUBLISHED, finger=Finger(tip_radius=7.0))) == pytest.approx([-0.52, 0.85], abs=0.06)
+    assert signs(PUBLISHED, arcs=(-1.0,)) == pytest.approx([-0.80, -0.87], abs=0.02)
+    assert signs(PUBLISHED, arcs=(1.0,)) == pytest.approx([0.98, 0.81], abs=0.02)
+
+
+def test_at_finite_strain_four_sticky_surfaces_have_no_slide_so_that_there_is_no_slope():
+    found = series_slopes(replace(PUBLISHED, solve=Solve("finite")))
+    assert found["stickiness"][0].surfaces == 1
+    assert np.isnan(found["stickiness"][0].with_mu).all()
+    assert found["slipperiness"][0].with_index[SED] > 0.7
+
+
+def test_under_one_force_the_sed_falls_with_stickiness():
+    assert signs(PUBLISHED, press=Press(force=0.1))[0] < -0.9
+
+
+def test_a_press_deeper_than_the_finger_is_a_sentence():
+    assert "loading.indentation" in series_slopes(PUBLISHED, Press(depth=4.0))

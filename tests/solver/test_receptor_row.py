@@ -1,0 +1,49 @@
+"""Responses beside those of the ending: along a row at any depth, and of many scenes without estimates."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Friction, Loading, Receptor, Scene, Solve, solve
+from solver.prediction import ROW
+from solver.quantities import NAMES
+from solver.response.receptor_row import responses_along
+from solver.response.rough_responses import rough_responses
+
+SCENES = {
+    kind: Scene(friction=Friction(0.3, 0.02), loading=Loading(1.2, "-x"), solve=Solve(kind, "steady", 0.005, "quick"))
+    for kind in ("small", "finite")
+}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def found(request):
+    return solve(SCENES[request.param])
+
+
+def test_along_the_row_the_sed_is_that_of_the_prediction_and_in_its_middle_every_quantity_is_the_ending_s(found):
+    (row,) = responses_along([found])
+    np.testing.assert_allclose(row[0], found.row.sed, rtol=1e-9)
+    middle = row[:, np.flatnonzero(ROW == 0.0)[0]]
+    np.testing.assert_allclose(middle, [found.responses[name].value for name in NAMES], rtol=1e-9)
+
+
+def test_an_ending_elsewhere_answers_as_the_reference_ending_of_a_scene_that_has_it_there(found):
+    deep = Receptor(depth=0.4)
+    here = responses_along([found], np.array([0.0]), deep)[0, :, 0]
+    there = solve(replace(found.scene, receptor=deep))
+    for name, value in zip(NAMES, here, strict=True):
+        exact, error = there.responses[name]
+        # two meshes, framed about endings at different depths, each with an error of its own
+        assert value == pytest.approx(exact, abs=3.0 * error + 0.01 * abs(exact)), name
+
+
+def test_without_estimates_the_same_states_are_found_and_a_scene_that_cannot_slide_is_nan(found):
+    scene = found.scene
+    wedged = replace(scene, friction=Friction(3.0), loading=Loading(2.0, "+x"))
+    rough = rough_responses([scene, wedged])
+    assert rough.shape == (2, len(NAMES), 1)
+    exact = np.array([found.responses[name].value for name in NAMES])
+    assert np.abs(rough[0, :, 0] / exact - 1.0).max() < 0.03  # a mesh of 4 to 6 elements to the tip radius
+    assert np.isnan(rough[1]).all()
