@@ -101,7 +101,7 @@ class Study:
         """Return the place of a subject, from which its plan is made; `key` is needed where the study is blinded."""
         labels = self.protocol.labels if key is None else labels_of(key)
         sealed = None if self.unblinded else self.key_sha256
-        return StudyPlace(self.name, self.row(member.slot), self.seed, labels, sealed)
+        return StudyPlace(self.name, member.slot, self.row(member.slot), self.seed, labels, sealed)
 
 
 def free_slot(members: Sequence[Member]) -> int:

@@ -12,6 +12,7 @@ from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
 from sessions.report.tables.multiverse import paths_sentence
 from sessions.report.tables.rivals import rivals_sentences
+from sessions.report.tables.scales import scale_sentences
 from sessions.report.wording import correlation, digits, plural, significant
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
@@ -29,6 +30,7 @@ def summary(study: StudyFindings) -> list[str]:
         said += _related(one, strain)
         said += rivals_sentences(f"{one.descriptor}, by means over subjects", one.rivals_of_means)
         said += rivals_sentences(f"{one.descriptor}, within subjects", one.rivals)
+        said += scale_sentences(one)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
     if study.friction is not None:
         f = study.friction

@@ -213,7 +213,7 @@ def test_the_same_surfaces_bear_the_same_labels_in_all_built_in_protocols():
 
 def test_the_rows_of_a_williams_design_are_balanced_over_ten_subjects(tmp_path):
     williams = edited(tmp_path, ('rule = "shuffled"', 'rule = "williams"'))
-    places = [StudyPlace("s", row, 5, williams.labels) for row in range(1, 11)]
+    places = [StudyPlace("s", row - 1, row, 5, williams.labels) for row in range(1, 11)]
     plans = [plan(williams, "S01", 1, place=place) for place in places]
     follows = Counter(pair for made in plans for pair in pairwise(indices(made.blocks[1])))
     assert set(follows.values()) == {2}
@@ -221,7 +221,7 @@ def test_the_rows_of_a_williams_design_are_balanced_over_ten_subjects(tmp_path):
     assert [made.order_row for made in plans] == list(range(1, 11))
     assert plans[2].order_rule == "williams, row 3 of 10"
     # Another study deals the letters of the design otherwise.
-    other = plan(williams, "S01", 1, place=StudyPlace("t", 1, 6, williams.labels))
+    other = plan(williams, "S01", 1, place=StudyPlace("t", 0, 1, 6, williams.labels))
     assert indices(other.blocks[0]) != indices(plans[0].blocks[0])
 
 
@@ -260,9 +260,52 @@ def test_a_subjects_own_value_out_of_range_is_refused(body, named):
 
 def test_a_blinded_plan_names_codes_alone():
     paper = protocol(PAPER)
-    made = plan(paper, "S01", 1, place=StudyPlace("s", 1, 5, paper.labels, key_sha256="ab"))
+    made = plan(paper, "S01", 1, place=StudyPlace("s", 0, 1, 5, paper.labels, key_sha256="ab"))
     assert made.blinded
     assert {trial.stimulus.index for trial in made.trials} == {None}
     assert [t.stimulus.code for t in made.trials] == [t.stimulus.code for t in plan(paper, "S01", 1).trials]
     with pytest.raises(Blinded, match="unblind"):
         _ = made.trials[0].stimulus.known_index
+
+
+def counterbalanced(tmp_path, name=PAPER, blocks=2):
+    """Return a built-in protocol with its first blocks counterbalanced."""
+    head, *tables = (FOLDER / f"{name}.toml").read_text().split("[[blocks]]")
+    file = tmp_path / "ours.toml"
+    file.write_text(
+        "[[blocks]]".join([head.replace("[order]", '[order]\nblocks = "counterbalanced"'), *tables[:blocks]])
+    )
+    return protocol(file)
+
+
+def test_counterbalanced_blocks_begin_with_each_block_for_half_of_the_subjects_and_the_plan_says_so(tmp_path):
+    ours = counterbalanced(tmp_path)
+    places = [StudyPlace("study", slot, 1, 3, ours.labels) for slot in range(4)]
+    made = [plan(ours, "S01", 9, place=place) for place in places]
+    assert [[block.name for block in one.blocks] for one in made] == [
+        ["stickiness", "slipperiness"], ["slipperiness", "stickiness"],
+    ] * 2  # fmt: skip
+    assert [trial.number for trial in made[1].trials] == list(range(1, 11))
+    assert made[1].order_rule.endswith("blocks counterbalanced, slipperiness first")
+    by_seed = {plan(ours, "S01", seed).blocks[0].name for seed in (4, 5)}
+    assert by_seed == {"stickiness", "slipperiness"}
+
+
+def test_within_a_block_the_order_of_surfaces_is_the_same_wherever_the_block_comes(tmp_path):
+    ours, listed = counterbalanced(tmp_path), protocol(PAPER)
+    for name in ("stickiness", "slipperiness"):
+        orders = [
+            [
+                trial.stimulus.index
+                for block in plan(one, "S01", 5).blocks
+                if block.name == name
+                for trial in block.trials
+            ]
+            for one in (ours, listed)
+        ]
+        assert orders[0] == orders[1]
+
+
+def test_one_block_alone_cannot_be_counterbalanced(tmp_path):
+    with pytest.raises(SettingsError, match="at least two blocks"):
+        counterbalanced(tmp_path, "magnitude-estimation", blocks=1)

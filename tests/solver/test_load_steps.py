@@ -10,9 +10,11 @@ from solver.continuation.small_states import end
 from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import Sizing
+from solver.prediction import COUNT
+from solver.quantities import NAMES
 from solver.scene.published import SLIPPERINESS, scene
 
-WHOLE = np.array([1.0, 2.0, -0.5, 1.5, -0.2, 6.0, 1.1])
+WHOLE = np.ones(COUNT)
 
 
 @pytest.mark.parametrize(("tolerance", "times"), [(0.02, 1), (0.01, 2), (0.005, 3), (1e-4, 16)])
@@ -22,7 +24,7 @@ def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, ti
 
 
 def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_says():
-    true, first = WHOLE, np.array([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3])  # what the usual steps add
+    true, first = WHOLE, np.resize([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3], COUNT)  # what the usual steps add
     steps = Steps.of(true + first, true + 2.0 * first, 0.003)
     np.testing.assert_allclose(steps.taken(true + first), true + first / steps.times, rtol=1e-12)
     assert (steps.error(true) >= np.abs(first) / steps.times).all()
@@ -36,7 +38,7 @@ def finely(asked, fineness, shift):
 
 @pytest.fixture(scope="module")
 def held():
-    """Return a press with friction, a drag that sticks, and the true numbers (7,) of both."""
+    """Return a press with friction, a drag that sticks, and the true numbers (COUNT,) of both."""
     press = Scene(friction=Friction(0.5), loading=Loading(1.5, "none"))
     drag = replace(press, loading=Loading(normal_force=0.1, tangential_force=0.03, slide="-x"))
     return [
@@ -45,8 +47,11 @@ def held():
 
 
 def test_the_ends_of_courses_at_small_strain_lie_within_their_estimates(held):
-    for asked, (sed, normal, _, depth, shift, width, _) in held:
+    for asked, (sed, normal, _, depth, shift, width, _, *responses) in held:
         found = solve(asked)
+        for name, true in zip(NAMES, responses, strict=True):
+            value, error = found.responses[name]
+            assert value == pytest.approx(true, abs=error), name
         assert found.sed_ending == pytest.approx(sed, rel=found.error_estimate)
         assert found.contact_width == pytest.approx(width, rel=found.contact_width_error)
         if asked.normal_force is None:

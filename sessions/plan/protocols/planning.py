@@ -40,6 +40,7 @@ class StudyPlace:
     """A subject's place in a study: the row of its design, and the labels that hold throughout it."""
 
     study: str
+    slot: int  # of the subject among all that were enrolled, from 0
     row: int  # from 1
     seed: int  # of the study: decides which stimulus is which letter of the design
     labels: Labels
@@ -86,12 +87,17 @@ def plan(
     rows = design_rows(protocol)
     row = None if rows is None else (seed % rows if place is None else place.row - 1) % rows + 1
     design_seed = protocol.label_seed if place is None else place.seed
-    blocks = _Blocks(protocol, seed, row, design_seed, own, protocol.labels if place is None else place.labels)
+    outlines = block_order(protocol, seed if place is None else place.slot)
+    labels = protocol.labels if place is None else place.labels
+    blocks = _Blocks(protocol, outlines, seed, row, design_seed, own, labels)
+    rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}"
+    if protocol.order.blocks == "counterbalanced":
+        rule += f"; blocks counterbalanced, {outlines[0].name} first"
     made = SessionPlan(
         protocol=protocol.name,
         subject=subject,
         seed=seed,
-        order_rule=protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}",
+        order_rule=rule,
         blocks=tuple(blocks.of(asked)),
         forces=forces,
         frame=held.frame or protocol.face.frame,
@@ -118,6 +124,15 @@ def design_rows(protocol: Protocol) -> int | None:
     if protocol.order.rule != "williams":
         return None
     return max(len(williams(len(block.indices))) for block in protocol.blocks)
+
+
+def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
+    """Return the blocks as a subject meets them; counterbalanced ones begin one later with each `number`, from 0.
+
+    With two blocks half of all subjects begin with each; with more, each block comes equally often at each place.
+    """
+    first = number % len(protocol.blocks) if protocol.order.blocks == "counterbalanced" else 0
+    return protocol.blocks[first:] + protocol.blocks[:first]
 
 
 def blinded(plan: SessionPlan) -> SessionPlan:
@@ -152,6 +167,7 @@ class _Blocks:
     """Makes the blocks of a plan one after the other, trials numbered on."""
 
     protocol: Protocol
+    outlines: Sequence[BlockOutline]  # in the order they are met in
     seed: int
     row: int | None
     design_seed: int
@@ -164,8 +180,8 @@ class _Blocks:
     def of(self, phases: Sequence[Phase]) -> Iterator[Block]:
         """Yield the pre-evaluation of every descriptor, then each block after its practice."""
         if "pre-evaluation" in phases:
-            yield from (self._pre_evaluation(outline) for outline in self.protocol.blocks)
-        for outline in self.protocol.blocks:
+            yield from (self._pre_evaluation(outline) for outline in self.outlines)
+        for outline in self.outlines:
             if "practice" in phases and outline.practice:
                 yield self._practice(outline)
             if "main" in phases:

@@ -85,6 +85,7 @@ class OrderRules:
     """How stimulus orders are made."""
 
     rule: Literal["shuffled", "williams"] = "shuffled"
+    blocks: Literal["as listed", "counterbalanced"] = "as listed"  # counterbalanced: each subject begins one later
     neighbours_apart: bool = False  # no two neighbours of the scale in a row
     not_first: tuple[int, ...] = ()  # indices that begin no block
     first_differs: bool = False  # repetitions of a block begin with different stimuli
@@ -175,6 +176,8 @@ class Protocol:
         if not self.blocks:
             raise NotAllowed("blocks", [], "there must be at least one")
         check_phases(self, self.phases)
+        if self.order.blocks == "counterbalanced" and len(self.blocks) < 2:
+            raise NotAllowed("order.blocks", self.order.blocks, "counterbalancing takes at least two blocks")
         names = [block.name for block in self.blocks]
         for i, (name, block) in enumerate(zip(names, self.blocks, strict=True)):
             if name in names[:i]:

@@ -7,6 +7,7 @@ from sessions.report.predictions import model_in_short
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.rivals import rivals_table
+from sessions.report.tables.scales import scales_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table
 from sessions.report.tables.study_trials import trials_table
@@ -22,7 +23,14 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
     """Return the tables a study has numbers for, by section."""
     sections = {
         "visits": (_visits(study),),
-        "scores": (_scores(study), _normalised(study), _differences(study), _agreement(study), _estimates(study)),
+        "scores": (
+            _scores(study),
+            _normalised(study),
+            _differences(study),
+            _agreement(study),
+            _estimates(study),
+            scales_table(study.descriptors),
+        ),
         "surfaces": (_surfaces(study), _forces(study)),
         "relation": (_relation(study), _rivals(study), models_table(study)),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),

@@ -10,6 +10,8 @@ from sessions.statistics.pooling.averages import Average, Estimates
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.visit import Visit, VisitOptions
 from sessions.statistics.rivals import Rival
+from sessions.statistics.scales.paired import Consistence, PairedScale
+from sessions.statistics.scales.stevens import Exponent
 from sessions.statistics.scores import MeanScore, Relation
 from sessions.statistics.variance_components import Spread
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
@@ -81,6 +83,9 @@ class DescriptorFindings:
     normalised: Normalised
     differences: tuple[Difference, ...]
     estimates: Estimates | None
+    exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
+    scales: tuple[PairedScale, ...]  # of choices between two, by both models; () where nobody chose
+    consistence: Mapping[str, Consistence]  # of each subject who chose in every pair
     on_sed: MixedModel | str  # score on SED [kPa], drift and carry-over; or why there is no model
     on_index: MixedModel | str  # score on the maker's index, drift and carry-over
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over

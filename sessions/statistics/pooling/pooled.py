@@ -10,6 +10,7 @@ import numpy as np
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
 from sessions.statistics.multiverse import PathTrial, path_findings
+from sessions.statistics.pooling.answers import choices, exponent
 from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
 from sessions.statistics.pooling.exclusions import Exclusion, decided
 from sessions.statistics.pooling.findings import (
@@ -26,6 +27,7 @@ from sessions.statistics.pooling.findings import (
 from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
 from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
 from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
+from sessions.statistics.scales.paired import MODELS, consistence, paired_scale
 from sessions.statistics.scores import (
     Relation,
     ScoreTable,
@@ -117,6 +119,7 @@ def _descriptor(
     level = standardised(matrix)
     points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
+    chosen = choices(trials)
     competing = [_rival_trial(v.subject, r, r.score) for v, r in trials if r.sed is not None and r.score is not None]
     return DescriptorFindings(
         descriptor=name,
@@ -136,6 +139,9 @@ def _descriptor(
         normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
         estimates=estimates(trials),
+        exponent=exponent(trials),
+        scales=tuple(paired_scale(chosen, model) for model in MODELS) if chosen else (),
+        consistence=consistence(chosen),
         on_sed=_model([(p[0], p[1], p[3]) for p in points], SED),
         on_index=_model(scored, INDEX),
         on_friction=_model([one for one in scored if one[1].mu is not None], INDEX, FRICTION),

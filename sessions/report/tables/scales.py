@@ -1,0 +1,73 @@
+"""Table and sentences of scales from choices between two, and the sentence of Stevens' exponent."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
+from sessions.report.wording import digits, p_value, places
+from sessions.statistics.pooling.findings import DescriptorFindings
+from sessions.statistics.scales.paired import Ends, PairedScale
+
+CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
+
+
+def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
+    """Return the values of each surface by both models, where subjects chose between two."""
+    notes = Notes()
+    groups = [Group(one.descriptor, tuple(_rows(one, notes))) for one in descriptors if one.scales]
+    caption = (
+        "Scales from choices between two surfaces, with mean 0: Bradley and Terry's in logits, Thurstone's case V in z,"
+        " by maximum likelihood, with 95 % intervals of a bootstrap over subjects. Last row: what coming first adds."
+    )
+    return table("table-scales", caption, "surface | Bradley–Terry [logit] | Thurstone V [z]", groups, notes)
+
+
+def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:
+    indices = sorted({index for scale in one.scales for index in scale.values}) or list(one.indices)
+    for index in indices:
+        yield (Cell(str(index)), *(_value(scale, scale.values.get(index), notes) for scale in one.scales))
+    yield (Cell("first of two"), *(_value(scale, scale.first, notes) for scale in one.scales))
+
+
+def _value(scale: PairedScale, found: Ends | None, notes: Notes) -> Cell:
+    if found is None:
+        return notes.number(None, str, scale.reason or "this surface was not chosen between")
+    ends = None if found.low is None or found.high is None else (found.low, found.high)
+    return notes.estimate(found.value, places(2), None, ends, scale.interval_reason or None)
+
+
+def scale_sentences(one: DescriptorFindings) -> list[str]:
+    """Return what choices and estimates of a descriptor say beside their tables."""
+    said: list[str] = []
+    name = one.descriptor[:1].upper() + one.descriptor[1:]
+    if one.scales and one.scales[0].p is not None:
+        fits = [
+            f"{scale.model} {digits(scale.deviance, 1)} on {scale.freedom} degrees of freedom (p {_p(scale.p)})"
+            for scale in one.scales
+            if scale.deviance is not None and scale.p is not None
+        ]
+        said.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
+    if one.consistence:
+        zeta = [found.zeta for found in one.consistence.values()]
+        orders = sum(value == CONSISTENT for value in zeta)
+        said.append(
+            f"{name}: {orders} of {len(zeta)} subjects chose by one order without a circle; mean coefficient of "
+            f"consistence {digits(float(np.mean(zeta)), 2)}."
+        )
+    found = one.exponent
+    if found is not None and found.plain is not None:
+        plain = found.plain
+        words = f"{digits(plain.estimate, 2)} ({digits(plain.low, 2)} to {digits(plain.high, 2)}) with µ taken as exact"
+        if found.both is not None:
+            value, low, high = found.both
+            words += f", {digits(value, 2)} ({digits(low, 2)} to {digits(high, 2)}) with errors in both"
+        said.append(f"{name}: estimates grow as a power of µ, with an exponent of {words}.")
+    elif found is not None and found.reason:
+        said.append(f"{name}: no exponent of the estimates by µ: {found.reason}.")
+    return said
+
+
+def _p(p: float) -> str:
+    text = p_value(p)
+    return text if text.startswith("<") else f"= {text}"

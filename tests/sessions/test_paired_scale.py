@@ -1,0 +1,112 @@
+"""Scales from choices between two: against a textbook's season of baseball, another maximiser, and planted values."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import optimize, stats
+
+from sessions.statistics.scales.paired import Choice, consistence, paired_scale
+
+# Games of the American League East in 1987: home team in the row, its wins and losses against the team of the column
+# (Agresti 2002, Categorical Data Analysis, 2nd ed., Table 10.11).
+TEAMS = ("Milwaukee", "Detroit", "Toronto", "New York", "Boston", "Cleveland", "Baltimore")
+SEASON = (
+    (None, (4, 3), (4, 2), (4, 3), (6, 1), (4, 2), (6, 0)),
+    ((3, 3), None, (4, 2), (4, 3), (6, 0), (6, 1), (4, 3)),
+    ((2, 5), (4, 3), None, (2, 4), (4, 3), (4, 2), (6, 0)),
+    ((3, 3), (5, 1), (2, 5), None, (4, 3), (4, 2), (6, 1)),
+    ((5, 1), (2, 5), (3, 3), (4, 2), None, (5, 2), (6, 0)),
+    ((2, 5), (3, 3), (3, 4), (4, 3), (4, 2), None, (2, 4)),
+    ((2, 5), (1, 5), (1, 6), (2, 4), (1, 6), (3, 4), None),
+)
+
+
+def season():
+    return [
+        Choice("league", home, away, won)
+        for home, row in enumerate(SEASON)
+        for away, games in enumerate(row)
+        if games is not None
+        for won, count in zip((True, False), games, strict=True)
+        for _ in range(count)
+    ]
+
+
+def test_a_season_of_baseball_has_the_printed_abilities_and_home_advantage():
+    found = paired_scale(season())
+    worth = np.exp([found.values[n].value for n in range(7)])
+    # Agresti's Table 10.11, column 5, and his 0.302 for the home team
+    assert (worth / worth.sum()).round(3).tolist() == [0.220, 0.190, 0.164, 0.157, 0.137, 0.088, 0.044]
+    assert round(found.first.value, 3) == 0.302
+    assert found.first.low is None
+    assert "takes 3" in found.interval_reason
+
+
+@pytest.mark.parametrize("model", ["Bradley–Terry", "Thurstone V"])
+def test_the_values_are_where_a_general_maximiser_finds_the_likelihood_greatest(model):
+    cdf = stats.logistic.cdf if model == "Bradley–Terry" else stats.norm.cdf
+    choices = season()
+
+    def lost(beta):
+        values = np.append(beta[:6], -beta[:6].sum())
+        chance = cdf([values[c.first] - values[c.second] + beta[6] for c in choices])
+        return -np.sum(np.log(np.where([c.first_chosen for c in choices], chance, 1.0 - chance)))
+
+    best = optimize.minimize(lost, np.zeros(7), method="BFGS", options={"gtol": 1e-9}).x
+    found = paired_scale(choices, model)
+    assert [found.values[n].value for n in range(6)] == pytest.approx(best[:6], abs=1e-6)
+    assert found.first.value == pytest.approx(best[6], abs=1e-6)
+    own = sum(
+        n * math.log(n / sum(games))
+        for row in SEASON for games in row if games is not None for n in games if n
+    )  # fmt: skip
+    assert found.deviance == pytest.approx(2.0 * (lost(best) + own), abs=1e-6)
+    assert found.freedom == 42 - 7
+
+
+def drawn(rng, values, first, subjects, spread=0.0):
+    """Return choices of subjects who compare every pair once in each order, by Thurstone's law."""
+    out = []
+    for subject in range(subjects):
+        own = values + rng.normal(0.0, spread, len(values))
+        for a in range(len(values)):
+            for b in range(len(values)):
+                if a != b:
+                    chosen = rng.normal(own[a] - own[b] + first, 1.0) > 0.0
+                    out.append(Choice(f"P{subject}", a, b, bool(chosen)))
+    return out
+
+
+@pytest.mark.slow
+def test_intervals_hold_planted_values_in_90_to_98_of_a_hundred():
+    values, first = np.array([-0.8, -0.3, 0.0, 0.4, 0.7]), 0.2
+    held, studies = np.zeros(6), 60
+    for study in range(studies):
+        rng = np.random.default_rng([11, study])
+        found = paired_scale(drawn(rng, values, first, 20, 0.2), "Thurstone V", study)
+        # people of different scales make the mean chance flatter: 1 / sqrt(1 + 2 spread^2) of the values
+        truth = np.append(values, first) / math.sqrt(1.0 + 2.0 * 0.2**2)
+        ends = [*found.values.values(), found.first]
+        held += [one.low <= true <= one.high for one, true in zip(ends, truth, strict=True)]
+    assert 0.90 <= held.sum() / (6 * studies) <= 0.98
+
+
+def test_a_surface_that_was_always_chosen_has_no_finite_value_and_is_named():
+    always = [Choice("P1", 0, 1, True), Choice("P1", 1, 2, True), Choice("P1", 2, 1, True), Choice("P2", 2, 0, False)]
+    found = paired_scale(always)
+    assert not found.values
+    assert "preferred to 0," in found.reason
+    assert paired_scale([]).reason
+
+
+def test_a_circle_of_three_is_one_triad_and_an_order_none():
+    order = [Choice("P1", a, b, True) for a in range(5) for b in range(a + 1, 5)]
+    assert consistence(order)["P1"].zeta == 1.0
+    circle = [Choice("P2", 0, 1, True), Choice("P2", 1, 2, True), Choice("P2", 0, 2, False)]
+    found = consistence(circle)["P2"]
+    assert (found.triads, found.most, found.zeta) == (1, 1, 0.0)
+    # A regular tournament of seven has 14 circular triads, as many as there can be (Kendall and Babington Smith 1940)
+    regular = [Choice("P3", a, (a + step) % 7, True) for a in range(7) for step in (1, 2, 3)]
+    assert (consistence(regular)["P3"].triads, consistence(regular)["P3"].zeta) == (14, 0.0)
+    assert not consistence([*circle, Choice("P2", 1, 0, True)])  # a pair chosen once each way
