@@ -3,12 +3,15 @@
 Results are kept by the content they were made of, in OUT/results: what was computed once is not computed again, and
 Ctrl-C loses nothing that was done. A session that cannot be read is named and left out. Subjects are left out by
 decisions in FOLDER/exclusions.toml ([[exclude]] subject, why, who, and descriptor for one alone).
+With --power no session is needed: simulated studies say how many subjects and surfaces one needs.
 With --synthetic a study of ten simulated subjects is made first, and what was planted is held against what is found.
 """
 
 import argparse
 import json
 import re
+from collections.abc import Sequence
+from dataclasses import asdict, fields
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -17,7 +20,7 @@ from daq_app.batch.pool import Shelf, visits
 from daq_app.cli.area_option import add_area, area_law
 from daq_app.cli.calibration_option import add_calibration, calibration_error
 from daq_app.cli.model_option import add_kinematics, add_paths, add_tau
-from daq_app.console import Console, WrongValue
+from daq_app.console import Console, WrongValue, table
 from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
 from sessions.prediction import PredictionOptions
@@ -28,11 +31,13 @@ from sessions.statistics.pooling.findings import UNITS, StudyFindings
 from sessions.statistics.pooling.ground_truth import checked_planted
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import VisitOptions
+from sessions.statistics.power import Planted, power
 from sessions.strokes.contact_area import FIXED
 
 EXAMPLE = "daq-app study recordings --out results"
 PLANTED = "planted.json"
 LARGEST_SEED = 10_000_000
+SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # designs whose power is told
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,12 +66,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
         "it takes longer)",
     )
+    parser.add_argument(
+        "--power",
+        nargs="*",
+        metavar="NAME=VALUE",
+        help="how many subjects and surfaces a study needs, by simulation; what is planted may be set: "
+        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(Planted))}",
+    )
+    parser.add_argument(
+        "--studies", type=int, default=400, metavar="N", help="with --power: simulated per design (400)"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="with --power: of the simulated studies (0)")
     add_area(parser, "fixed for all sessions, however each was analysed before")
     add_calibration(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Pool the study, write page, table and numbers, and print what it says in short."""
+    """Pool the study, write page, table and numbers, and print what it says in short; or print the power of designs."""
+    if options.power is not None:
+        return _power(options, console)
     folder, out = _places(options, console)
     sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
     if not sessions:
@@ -90,6 +108,53 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _print(study, files, console)
     flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
     return 3 if failed or flawed else 0
+
+
+def _power(options: argparse.Namespace, console: Console) -> int:
+    """Print the power of designs of so many subjects and surfaces."""
+    if options.folder is not None or options.synthetic is not None:
+        raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
+    if not 20 <= options.studies <= 100_000 or not 0 <= options.seed <= LARGEST_SEED:
+        raise WrongValue(f"--studies is 20 to 100000, and --seed 0 to {LARGEST_SEED}")
+    planted = _set(options.power)
+    found = power(
+        planted,
+        SUBJECTS,
+        SURFACES,
+        options.studies,
+        options.seed,
+        lambda part: console.progress(part, f"{part:.0%} of the designs"),
+    )
+    console.result({"planted": asdict(planted), "designs": [{**asdict(one), "power": one.share} for one in found]})
+    rows = [
+        [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in found if one.subjects == people)]
+        for people in SUBJECTS
+    ]
+    told = ", ".join(f"{one.name} = {getattr(planted, one.name):g}" for one in fields(planted))
+    console.say(f"Planted: {told}. The usual values are assumed, not measured.")
+    console.say(table(rows, head=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
+    console.say(
+        "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
+        f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
+    )
+    return 0
+
+
+def _set(given: Sequence[str]) -> Planted:
+    """Return what is planted, with the values that were set. Raises WrongValue."""
+    changes: dict[str, float] = {}
+    for one in given:
+        name, _, value = one.partition("=")
+        try:
+            changes[name] = float(value)
+        except ValueError:
+            raise WrongValue(f"--power {one} is not allowed: NAME=VALUE, such as effect=20") from None
+        if name not in (field.name for field in fields(Planted)):
+            raise WrongValue(f"--power {one} is not allowed: one of {', '.join(f.name for f in fields(Planted))}")
+        least = -100.0 if name == "effect" else 0.0
+        if not least <= changes[name] <= 100.0:
+            raise WrongValue(f"--power {one} is not allowed: {least:g} to 100")
+    return Planted(**changes)
 
 
 def _planted(folder: Path) -> dict[str, Any] | None:
