@@ -29,6 +29,7 @@ VERBS = {
     "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
     "report": "write a session's report as one page",
     "study": "pool many sessions: group statistics, a page, a table of all trials",
+    "translate": "write the file in which a translator puts the subject's texts",
     "export": "write a session as CSV, BIDS, HDF5 or NWB",
     "selftest": "pull its own plug on this computer and disk, and write a certificate",
     "simulate": "serve the other end of a wire, to try a driver without hardware",

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from daq_app.qt.languages import translator
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
@@ -22,6 +23,7 @@ from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable
 from sessions.plan.plan import Frame
+from sessions.plan.protocols.languages import ENGLISH
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
@@ -199,7 +201,8 @@ class Bridge(QObject):
         if self.state is self._shown:
             return
         self._shown = self.state
-        view = derive_view(self.state)
+        session = self.state.session
+        view = derive_view(self.state, translator(ENGLISH if session is None else session.plan.language))
         if view != self.view:
             self.view = view
             self.changed.emit(view)

@@ -97,13 +97,20 @@ class ChoiceOfTwo(_Field):
         """Begin another answer."""
         self._take(Choice())
 
+    def set_words(self, first: str, second: str) -> None:
+        """Name the buttons."""
+        for made, words in ((self.first, first), (self.second, second)):
+            made.setText(words)
+            made.setAccessibleName(words)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Choose with 1 and 2, or the arrows."""
+        """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
+        mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
         keys: dict[int, Which] = {
             Qt.Key.Key_1: "first",
-            Qt.Key.Key_Left: "first",
+            Qt.Key.Key_Right if mirrored else Qt.Key.Key_Left: "first",
             Qt.Key.Key_2: "second",
-            Qt.Key.Key_Right: "second",
+            Qt.Key.Key_Left if mirrored else Qt.Key.Key_Right: "second",
         }
         if event.key() in keys:
             self._take(self.answer.changed(self.now(), keys[event.key()], "keyboard"))

@@ -22,6 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.card import CardFrame
+from daq_app.qt.languages import missing_glyphs, name_of, translator
 from daq_app.qt.parts import button, choice, label, say, scrolled
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
@@ -38,10 +39,13 @@ from daq_app.window.new_session import (
     enrolment,
     offered,
     place_of,
+    subject_texts,
     unfinished,
 )
+from daq_app.window.subject_texts import SubjectText
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
+from sessions.plan.protocols.languages import ENGLISH
 
 TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
 HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
@@ -78,6 +82,7 @@ class NewSessionPage(QFrame):
         self.seed.setPlaceholderText("a new one")
         self.height_above = _line("height of the face above the transducer's origin in millimetres; may be empty")
         self.height_above.setPlaceholderText("as stated")
+        self.language = choice("language that the subject reads")
         self.normal = choice("axis of the transducer along which pressing is positive")
         self.normal.addItems(["as stated", *AXES])
         self.area = _line("contact area of finger and surface in square millimetres; may be empty")
@@ -97,7 +102,8 @@ class NewSessionPage(QFrame):
                 made.setMinimumHeight(TARGET - GRID)
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
-        self._screen = ""  # how far the length of the subject's line is known
+        self._line_words = ""  # how far the length of the subject's line is known
+        self._screen = ""  # with that, which characters of the texts no font here has
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
@@ -110,6 +116,8 @@ class NewSessionPage(QFrame):
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
+        self.language.currentIndexChanged.connect(self._show_screen)
+        self.language.currentIndexChanged.connect(self.changed)
         for line in (self.study, self.folder):
             line.textChanged.connect(self._place_changed)
         self._place_changed()
@@ -128,6 +136,7 @@ class NewSessionPage(QFrame):
             answering_hand=HANDS[self.answering.currentIndex()][1],
             pre_evaluation=self.pre_evaluation.isVisibleTo(self) and self.pre_evaluation.isChecked(),
             practice=self.practice.isVisibleTo(self) and self.practice.isChecked(),
+            language=self.language.currentData() or "",
             forces=self.with_forces.isChecked(),
             height=self.height_above.text() if self._height.isVisibleTo(self) else "",
             normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
@@ -158,7 +167,17 @@ class NewSessionPage(QFrame):
 
     def show_line(self, known: Millimetres) -> None:
         """Say how far the length of the subject's line can be trusted."""
-        self._screen = f"Line of {LENGTH:.0f} mm, {known.words}."
+        self._line_words = f"Line of {LENGTH:.0f} mm, {known.words}."
+        self._show_screen()
+
+    def _show_screen(self) -> None:
+        """Say what is worth knowing of the subject's screen: the line's length, and characters no font here has."""
+        _, texts = subject_texts(self.form())
+        words = translator(self.form().language or ENGLISH)
+        lost = missing_glyphs([*texts, *map(words, SubjectText)], self.font())
+        self._screen = (
+            f"{self._line_words} No font here draws {lost}: install one that does." if lost else self._line_words
+        )
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
@@ -221,9 +240,21 @@ class NewSessionPage(QFrame):
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
         self._enrol.setVisible(found is not None and found.may_enrol)
+        self._show_languages()
         for made in (self.protocol, self.seed):
             made.setEnabled(found is None)
             made.setToolTip("" if found is None else f"the study's own: {found.protocol}")
+
+    def _show_languages(self) -> None:
+        """Offer the languages of the protocol, keeping the one that was chosen where it is among them."""
+        offered_now, _ = subject_texts(self.form())
+        held = [self.language.itemData(at) for at in range(self.language.count())]
+        if list(offered_now) != held:
+            before = self.language.currentData()
+            self.language.clear()
+            for code in offered_now:
+                self.language.addItem(name_of(code), code)
+            self.language.setCurrentIndex(max(self.language.findData(before), 0))
 
     def _enrolled(self) -> None:
         refused = enrolled(self.form())
@@ -344,6 +375,7 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._area)
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
+        _field(layout, "Language that the subject reads", self.language)
         layout.addWidget(button("Check with a ruler  Ctrl+M", "check the subject's line with a ruler", self._ruler))
 
     def _build_disk(self, layout: QVBoxLayout) -> None:

@@ -40,7 +40,8 @@ KEYS = {
 class ScoreLine(QAbstractSlider):
     """Takes mouse, touch, pen and keyboard alike; every position is kept with its time.
 
-    To assistive technology it is a slider from 0 to 100.
+    Where the subject reads from right to left, 0 is at the right end, and the arrows move the mark as they point. To
+    assistive technology it is a slider from 0 to 100.
     """
 
     changed = Signal()
@@ -95,8 +96,8 @@ class ScoreLine(QAbstractSlider):
 
     def place_of(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
-        line = self._line()
-        return QPointF(line.left() + position / 100.0 * line.width(), line.center().y())
+        line, along = self._line(), position / 100.0
+        return QPointF(line.left() + (1.0 - along if self._mirrored else along) * line.width(), line.center().y())
 
     def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
         """Return the size that holds the line and its reach."""
@@ -130,6 +131,8 @@ class ScoreLine(QAbstractSlider):
         if step is None:
             super().keyPressEvent(event)
             return
+        if self._mirrored and event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
+            step = -step
         self._take(self._answer.stepped(self._now(), step))
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
@@ -185,13 +188,18 @@ class ScoreLine(QAbstractSlider):
         self.update()
         self.changed.emit()
 
+    @property
+    def _mirrored(self) -> bool:
+        return self.layoutDirection() == Qt.LayoutDirection.RightToLeft
+
     def _line(self) -> QRectF:
         width = LENGTH * self._pixels_per_mm
         return QRectF((self.width() - width) / 2, 0, width, self.height())
 
     def _position(self, at: QPointF) -> float:
         line = self._line()
-        return 100.0 * (at.x() - line.left()) / line.width()
+        along = 100.0 * (at.x() - line.left()) / line.width()
+        return 100.0 - along if self._mirrored else along
 
     def _resize(self) -> None:
         self.setFixedSize(self.sizeHint())

@@ -7,16 +7,20 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
+from daq_app.qt.languages import direction, translator
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.press_bar import PressBar
 from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, millimetres
 from daq_app.qt.tokens import GRID, Tokens, font
+from daq_app.window.subject_texts import SubjectText as Text
 from daq_app.window.view_subject import Kind, SubjectView
 from sessions.plan.plan import Hand
+from sessions.plan.protocols.languages import ENGLISH
 
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
+SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of it, until a page holds its texts
 WIDEST = 1100  # row of the button
 GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
 TEXT_WIDTH = 900  # of a text that is still easily read
@@ -38,14 +42,14 @@ class SubjectWindow(QWidget):
         self._view: SubjectView | None = None
         self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
-        self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
-        self._text = _large(label(wrap=True), LARGE, scale)
+        self._language = ENGLISH
+        self._type = scale  # of the letters, by their size at 100 %
+        self._title, self._text = label(role="title", wrap=True), label(wrap=True)
         self.press = PressBar(tokens, scale)
         self.press.hide()
-        self._question = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
-        self._hint = _large(label(wrap=True), LARGE, scale)
+        self._question, self._hint = label(role="title", wrap=True), label(wrap=True)
         self.line = ScoreLine(tokens, now)
-        self._scale = _Scale(self.line, scale)
+        self._scale = _Scale(self.line)
         self.number = NumberField(scale, now)
         self.choice = ChoiceOfTwo(scale, now)
         self._ways = QStackedWidget()
@@ -93,6 +97,8 @@ class SubjectWindow(QWidget):
         before, self._view, self._stated_hand = self._view, view, hand
         if before == view:
             return
+        if view.language != self._language:
+            self._speak(view.language)
         self._place_next(view.hand)
         self.press.setVisible(view.force)
         if view.asks:
@@ -106,6 +112,45 @@ class SubjectWindow(QWidget):
             say(self._text, view.text)
         if not self.measuring:
             self._turn()
+        self._fit_type()
+
+    def _fit_type(self) -> None:
+        """Make the letters as large as they should be, or as small as lets all of the page be read."""
+        for part in SHRINKING:
+            for made, size in (
+                (self._title, LARGER),
+                (self._question, LARGER),
+                (self._text, LARGE),
+                (self._hint, LARGE),
+            ):
+                _set_type(made, size * part, self._type, bold=size == LARGER)
+            self._scale.set_type(LARGE * part, self._type)
+            if self._needed() <= self.height():
+                return
+
+    def _needed(self) -> int:
+        """Return the height that the texts of the page need [px]."""
+        if self.scoring:
+            width, rest = self.width() - 4 * GRID, (self._question, self._hint)
+            way = max(self._scale.height() if self.asks == "line" else 0, self._ways.sizeHint().height())
+            held = way + self.next.minimumHeight() + 15 * GRID
+        else:
+            width, rest = min(self.width() - 14 * GRID, TEXT_WIDTH), (self._title, self._text)
+            held = 30 * GRID + (0 if self.press.isHidden() else self.press.sizeHint().height())
+        return held + sum(made.heightForWidth(width) for made in rest if made.text())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Let the texts fit the room there is."""
+        super().resizeEvent(event)
+        self._fit_type()
+
+    def _speak(self, language: str) -> None:
+        """Turn the page's own words and its direction to another language."""
+        self._language = language
+        words = translator(language)
+        self.setLayoutDirection(direction(language))
+        self.next.setText(words(Text.NEXT))
+        self.choice.set_words(words(Text.FIRST), words(Text.SECOND))
 
     def _begin(self, view: SubjectView) -> None:
         """Begin an answer."""
@@ -192,6 +237,7 @@ class SubjectWindow(QWidget):
         page = QWidget()
         layout = QVBoxLayout(page)
         layout.setContentsMargins(2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
+        layout.setSpacing(GRID)
         self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         layout.addWidget(self._question)
         layout.addStretch(2)
@@ -203,6 +249,7 @@ class SubjectWindow(QWidget):
         self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
         held = QWidget()  # keeps the button's place while there is none
         held.setLayout(self._next_row)
+        held.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
         held.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
         held.setMaximumWidth(WIDEST)
         layout.addLayout(_centred(held, 1000))
@@ -240,7 +287,7 @@ class SubjectWindow(QWidget):
         given = self._way.given(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view = None
-        say(self._title, "Thank you")
+        say(self._title, translator(self._language)(Text.THANKS))
         say(self._text, "")
         self._pages.setCurrentIndex(0)
         self.answered.emit(given)
@@ -249,11 +296,11 @@ class SubjectWindow(QWidget):
 class _Scale(QWidget):
     """The line with the words for its two ends, each under the end it is for."""
 
-    def __init__(self, line: ScoreLine, scale: float) -> None:
+    def __init__(self, line: ScoreLine) -> None:
         super().__init__()
         self._line = line
         line.setParent(self)
-        self._ends = [_large(label(wrap=True), LARGE, scale) for _ in range(2)]
+        self._ends = [label(wrap=True) for _ in range(2)]
         for end in self._ends:
             end.setParent(self)
             end.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -264,12 +311,18 @@ class _Scale(QWidget):
             say(shown, words)
         self.fit()
 
+    def set_type(self, size: float, scale: float) -> None:
+        """Set the words in letters of a size."""
+        for end in self._ends:
+            _set_type(end, size, scale)
+        self.fit()
+
     def fit(self) -> None:
         """Place the words: beside each other without touching, as wide as there is room."""
         line = self._line
         line.move((self.width() - line.width()) // 2, 0)
         ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
-        width = int(min(ends[1] - ends[0] - 2 * GRID, 2 * ends[0]))
+        width = int(min(abs(ends[1] - ends[0]) - 2 * GRID, 2 * min(ends)))
         tallest = 0
         for shown, at in zip(self._ends, ends, strict=True):
             tallest = max(tallest, shown.heightForWidth(width))
@@ -283,11 +336,10 @@ class _Scale(QWidget):
         self.fit()
 
 
-def _large(made: QLabel, size: int, scale: float, *, bold: bool = False) -> QLabel:
-    """Return a label in large type: the style sheet's sizes are those of the experimenter's window."""
+def _set_type(made: QLabel, size: float, scale: float, *, bold: bool = False) -> None:
+    """Set a label in large type: the style sheet's sizes are those of the experimenter's window."""
     made.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
-    made.setFont(font(size, scale, bold=bold))
-    return made
+    made.setFont(font(round(size), scale, bold=bold))
 
 
 def _centred(widget: QWidget, weight: int) -> QHBoxLayout:

@@ -44,6 +44,7 @@ class SessionForm:
     area: str = ""  # of finger and surface [mm2], for tau_max; empty: likewise
     pre_evaluation: bool = False  # every stimulus judged once before all else
     practice: bool = False  # before the trials that count
+    language: str = ""  # that the subject reads, its code; empty: the protocol's own
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
 
 
@@ -119,6 +120,7 @@ def checked(
                 _number(form.area) if form.forces else None,
                 form.stroking_hand,
                 form.answering_hand,
+                form.language or None,
             ),
             phases=phases if len(phases) > 1 else None,
             body=body,
@@ -184,6 +186,18 @@ def offered(form: SessionForm) -> tuple[Phase, ...]:
         return phases_before(open_study(folder).protocol if in_study else protocol(form.protocol))
     except (StudyError, SettingsError, OSError):
         return ()
+
+
+def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the languages that the form's protocol has, its own first, and what of it is read in the form's."""
+    try:
+        in_study = form.study.strip() and is_study(place_of(form))
+        chosen = open_study(place_of(form)).protocol if in_study else protocol(form.protocol)
+        read = chosen.in_language(form.language) if form.language in chosen.languages else chosen
+    except (StudyError, SettingsError, OSError):
+        return (), ()
+    texts = [text for block in read.blocks for text in (block.instruction, block.question, *(block.scale_ends or ()))]
+    return chosen.languages, tuple(texts)
 
 
 def enrolment(form: SessionForm) -> Enrolment | None:

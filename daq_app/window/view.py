@@ -9,6 +9,7 @@ from daq_app.window.course_state import SessionState
 from daq_app.window.messages import Dismissed, Message
 from daq_app.window.sentences import sentence
 from daq_app.window.state import AppState
+from daq_app.window.subject_texts import Translate
 from daq_app.window.view_bench import BenchView
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_subject import SubjectView
@@ -49,8 +50,8 @@ class View:
     subject: SubjectView
 
 
-def derive_view(state: AppState) -> View:
-    """Return what is to be shown of a state."""
+def derive_view(state: AppState, translate: Translate = str) -> View:
+    """Return what is to be shown of a state; `translate` makes the subject's language of English."""
     session = state.session
     simulated = session.simulated if session else None
     if session is None and state.bench.info is not None and state.bench.info.simulated:
@@ -62,7 +63,7 @@ def derive_view(state: AppState) -> View:
         banner=_banner(state),
         course=None if session is None else view_course.course_view(session, state.bench, state.now),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
-        subject=view_subject.subject_view(session),
+        subject=view_subject.subject_view(session, translate),
     )
 
 

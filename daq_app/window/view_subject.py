@@ -1,10 +1,13 @@
 """What the subject sees: nothing that gives the stimulus away, save what the protocol says is to be shown."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from daq_app.window.course_state import SessionState
+from daq_app.window.subject_texts import SubjectText as Text
+from daq_app.window.subject_texts import Translate
 from sessions.plan.plan import Hand
+from sessions.plan.protocols.languages import ENGLISH
 from sessions.run import steps
 
 Kind = Literal["read", "line", "number", "choice"]
@@ -21,6 +24,7 @@ class SubjectView:
     ticks: int = 0  # on the line, between its ends
     key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
     hand: Hand = "right"  # that answers: where Next stands
+    language: str = ENGLISH
     force: bool = False  # how hard the finger presses is shown; never how hard it drags, which tells the surface
 
     @property
@@ -29,74 +33,84 @@ class SubjectView:
         return self.kind != "read"
 
 
-WAITING = ("Welcome", "The experimenter will begin in a moment.")
-HANDS_OFF = "Keep your fingers off the surface."  # what to do on it is told when it is time to do it
-THANKS = ("Thank you", "You can rest your hand now.")
-PAUSE = ("Pause", "The experimenter will go on in a moment.")
-
-
-def subject_view(session: SessionState | None) -> SubjectView:
-    """Return what is shown to the subject now."""
+def subject_view(session: SessionState | None, translate: Translate = str) -> SubjectView:
+    """Return what is shown to the subject now, in the language that `translate` makes of English."""
     if session is None:
-        return SubjectView("read", *WAITING)
-    hand = session.plan.answering_hand or "right"
-    match session.phase:
-        case "idle":
-            return SubjectView("read", *WAITING, hand=hand)
-        case "mounting" | "taring":
-            return SubjectView("read", "Please wait", _told(session, HANDS_OFF), hand=hand)
-        case "ready" | "stroking":
-            force = session.plan.forces and "forces" in session.plan.shown.subject
-            return SubjectView("read", _stroke(session), _told(session, _instruction(session)), hand=hand, force=force)
-        case "scoring":
-            return _question(session, hand)
-        case "settling":
-            return SubjectView("read", "Thank you", "Please lift your finger off the surface.", hand=hand)
-        case "resting":
-            return SubjectView("read", "Rest", "Rest your hand. The experimenter will go on with you.", hand=hand)
-        case "paused" | "resuming":
-            return SubjectView("read", *PAUSE, hand=hand)
-        case "closing" | "ended":
-            return SubjectView("read", *(PAUSE if session.resumable else THANKS), hand=hand)
+        return SubjectView("read", translate(Text.WELCOME), translate(Text.BEGINS))
+    return replace(_Page(session, translate).view(), language=session.plan.language)
 
 
-def _stroke(session: SessionState) -> str:
-    trial = session.of(session.trial)
-    allowed = 1 if trial is None else session.plan.strokes_allowed(trial.trial)
-    return "Stroke the surface once" if allowed == 1 else f"Stroke the surface up to {allowed} times"
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """What a session in hand shows."""
 
+    session: SessionState
+    say: Translate
 
-def _instruction(session: SessionState) -> str:
-    return session.block.instruction if session.block and "instruction" in session.plan.shown.subject else ""
+    def view(self) -> SubjectView:
+        session, shown = self.session, self.session.plan.shown.subject
+        match session.phase:
+            case "idle":
+                return self._read(self.say(Text.WELCOME), self.say(Text.BEGINS))
+            case "mounting" | "taring":
+                return self._read(self.say(Text.WAIT), self._told(self.say(Text.HANDS_OFF)))
+            case "ready" | "stroking":
+                force = session.plan.forces and "forces" in shown
+                instruction = session.block.instruction if session.block and "instruction" in shown else ""
+                return replace(self._read(self._stroke(), self._told(instruction)), force=force)
+            case "scoring":
+                return self._question()
+            case "settling":
+                return self._read(self.say(Text.THANKS), self.say(Text.LIFT))
+            case "resting":
+                return self._read(self.say(Text.REST), self.say(Text.RESTING))
+            case "paused" | "resuming":
+                return self._read(self.say(Text.PAUSE), self.say(Text.GOES_ON))
+            case "closing" | "ended" if session.resumable:
+                return self._read(self.say(Text.PAUSE), self.say(Text.GOES_ON))
+            case "closing" | "ended":
+                return self._read(self.say(Text.THANKS), self.say(Text.REST_HAND))
 
+    def _read(self, title: str, text: str = "") -> SubjectView:
+        return SubjectView("read", title, text, hand=self.session.plan.answering_hand or "right")
 
-def _told(session: SessionState, to_do: str) -> str:
-    """Return what to do with the finger, and what the protocol lets the subject know beside it."""
-    shown, trial = session.plan.shown.subject, session.of(session.trial)
-    parts: list[str] = []
-    if session.block is not None and session.block.phase != "main":
-        parts.append("This one is for practice." if session.block.phase == "practice" else "")
-    parts.append(to_do)
-    if trial is not None and "trial count" in shown:
-        parts.append(f"Surface {trial.trial.number} of {len(session.trials)}.")
-    if trial is not None and "code" in shown:
-        parts.append(f"Sample {trial.trial.stimulus.code}.")
-    return " ".join(part for part in parts if part)
+    def _stroke(self) -> str:
+        trial = self.session.of(self.session.trial)
+        allowed = 1 if trial is None else self.session.plan.strokes_allowed(trial.trial)
+        return self.say(Text.STROKE) if allowed == 1 else self.say(Text.STROKES).format(number=allowed)
 
+    def _told(self, to_do: str) -> str:
+        """Return what to do with the finger, and what the protocol lets the subject know beside it."""
+        session = self.session
+        shown, trial = session.plan.shown.subject, session.of(session.trial)
+        parts = [to_do]
+        if session.block is not None and session.block.phase == "practice":
+            parts.insert(0, self.say(Text.PRACTICE))
+        if trial is not None and "trial count" in shown:
+            parts.append(self.say(Text.COUNT).format(number=trial.trial.number, count=len(session.trials)))
+        if trial is not None and "code" in shown:
+            parts.append(self.say(Text.SAMPLE).format(code=trial.trial.stimulus.code))
+        return " ".join(part for part in parts if part)
 
-def _question(session: SessionState, hand: Hand) -> SubjectView:
-    trial = session.of(session.trial)
-    if trial is None:
-        return SubjectView("read", "Please wait", hand=hand)
-    key = (trial.trial.number, trial.takes)
-    usual = f"Judge the {trial.trial.stimulus.descriptor} of the surface"
-    match session.asked:
-        case steps.AskScore(_, ends, ticks, question):
-            return SubjectView("line", question or usual, "", ends, ticks, key, hand)
-        case steps.AskNumber(_, question):
-            text = "Give a number above 0, on your own scale."
-            return SubjectView("number", question or usual, text, key=key, hand=hand)
-        case steps.AskChoice(_, _, question):
-            return SubjectView("choice", question or "Which one?", "", key=key, hand=hand)
-        case _:
-            return SubjectView("read", "Please wait", hand=hand)
+    def _question(self) -> SubjectView:
+        trial, hand = self.session.of(self.session.trial), self.session.plan.answering_hand or "right"
+        if trial is None:
+            return self._read(self.say(Text.WAIT))
+        key = (trial.trial.number, trial.takes)
+        match self.session.asked:
+            case steps.AskScore(_, ends, ticks, question):
+                asked = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("line", asked, "", ends, ticks, key, hand)
+            case steps.AskNumber(_, question):
+                asked = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("number", asked, self.say(Text.NUMBER), key=key, hand=hand)
+            case steps.AskChoice(_, _, question):
+                return SubjectView("choice", question or self.say(Text.WHICH), "", key=key, hand=hand)
+            case _:
+                return self._read(self.say(Text.WAIT))
+
+    def _judge(self, descriptor: str) -> str:
+        """Return the usual question; a descriptor is a word of the protocol's own language."""
+        if self.session.plan.language == ENGLISH:
+            return f"Judge the {descriptor} of the surface"
+        return self.say(Text.JUDGE)

@@ -127,6 +127,7 @@ class SessionPlan:
     rests: Rests = Rests()
     shown: Shown = Shown()
     masking: str = ""  # of sounds; empty: none
+    language: str = "en"  # that the subject reads
     study: str | None = None  # name of the study the subject is enrolled in
     order_row: int | None = None  # of the study's design, from 1
     order_seed: int | None = None  # that orders were made from, where it is not `seed`

@@ -47,6 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
+    parser.add_argument(
+        "--language", metavar="XX", help="that the subject reads, such as de; the protocol must have it (its own)"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
     parser.add_argument(
         "--any-folder",
@@ -65,7 +68,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         options.subject,
         seed,
         forces=options.device is not None,
-        setting=VisitSetting(None, options.contact_area, options.stroking_hand, options.answering_hand),
+        setting=VisitSetting(
+            None, options.contact_area, options.stroking_hand, options.answering_hand, options.language
+        ),
         phases=options.phases,
         body=body,
         place=place,

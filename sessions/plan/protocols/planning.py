@@ -55,6 +55,7 @@ class VisitSetting:
     contact_area: float | None = None  # [mm2]
     stroking_hand: Hand | None = None  # None: nobody stated it
     answering_hand: Hand | None = None
+    language: str | None = None  # that the subject reads; None: the protocol's own
 
 
 def plan(
@@ -78,6 +79,7 @@ def plan(
     own, held = body or Body(), setting or VisitSetting()
     asked = protocol.phases if phases is None else phases
     try:
+        protocol = protocol if held.language is None else protocol.in_language(held.language)
         check_seed("seed", seed)
         check_phases(protocol, asked)
         check_body(own, protocol)
@@ -109,6 +111,7 @@ def plan(
         rests=Rests(protocol.rests.after_trials, protocol.rests.between_blocks, protocol.rests.duration),
         shown=protocol.shown,
         masking=protocol.masking,
+        language=protocol.language,
         study=None if place is None else place.study,
         order_row=row,
         order_seed=None if row is None else design_seed,

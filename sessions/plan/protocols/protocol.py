@@ -9,6 +9,14 @@ from typing import Literal
 
 from sessions.plan.orders import Item, drawn, opaque_codes
 from sessions.plan.plan import Frame, Phase, Shown
+from sessions.plan.protocols.languages import (
+    ENGLISH,
+    PRE_EVALUATION,
+    Translation,
+    check_language,
+    check_translations,
+    languages_of,
+)
 from sessions.toml_file import NotAllowed, SettingsError, load_toml
 
 FOLDER = Path(__file__).parent
@@ -165,6 +173,8 @@ class Protocol:
     shown: Shown = field(default_factory=Shown)
     pre_evaluation: PreEvaluation | None = None
     face: Face = field(default_factory=Face)
+    language: str = ENGLISH  # of the texts above
+    translations: tuple[Translation, ...] = ()  # of them, a table for each block and language
 
     def __post_init__(self) -> None:
         """Check ranges, that blocks and stimuli can be told apart, and that answers and orders can be had."""
@@ -178,6 +188,9 @@ class Protocol:
         check_phases(self, self.phases)
         if self.order.blocks == "counterbalanced" and len(self.blocks) < 2:
             raise NotAllowed("order.blocks", self.order.blocks, "counterbalancing takes at least two blocks")
+        check_language("language", self.language)
+        judged = self.pre_evaluation is not None
+        check_translations(self.translations, self.blocks, self.language, pre_evaluation=judged)
         names = [block.name for block in self.blocks]
         for i, (name, block) in enumerate(zip(names, self.blocks, strict=True)):
             if name in names[:i]:
@@ -190,6 +203,27 @@ class Protocol:
         """Return the code on the back of each stimulus; a stimulus of several blocks has one."""
         stimuli = dict.fromkeys((block.descriptor, index) for block in self.blocks for index in block.indices)
         return dict(zip(stimuli, opaque_codes(len(stimuli), self.label_seed), strict=True))
+
+    @property
+    def languages(self) -> tuple[str, ...]:
+        """Return the languages that subjects may read, the protocol's own first."""
+        return (self.language, *languages_of(self.translations))
+
+    def in_language(self, language: str) -> "Protocol":
+        """Return the protocol with its texts in a language. Raises NotAllowed where it has none."""
+        if language == self.language:
+            return self
+        texts = {one.block: one for one in self.translations if one.language == language}
+        if not texts:
+            raise NotAllowed("language", language, f"{self.name} has its texts in {', '.join(self.languages)}")
+        blocks = tuple(
+            replace(block, instruction=text.instruction, scale_ends=text.scale_ends, question=text.question)
+            for block in self.blocks
+            for text in [texts[block.name]]
+        )
+        judged = texts.get(PRE_EVALUATION)
+        before = self.pre_evaluation if judged is None else PreEvaluation(judged.instruction)
+        return replace(self, blocks=blocks, pre_evaluation=before, language=language, translations=())
 
     def _check_answers(self, key: str, block: BlockOutline) -> None:
         """Check that a block says what its answers need, and nothing that they do not have."""

@@ -1,0 +1,100 @@
+"""Write the file that a translator fills in: a protocol's texts as TOML tables, or the program's own as a .ts file.
+
+What is translated already is kept; what is not stands there in the language it is translated from. The tables go to the
+end of the protocol's file. A .ts file is edited with Qt Linguist or as text, and lrelease makes of it the .qm file that
+the window reads.
+"""
+
+import argparse
+from pathlib import Path
+from xml.etree import ElementTree
+
+from daq_app.console import Console, WrongValue
+from daq_app.window.subject_texts import SubjectText
+from sessions.atomic_file import write_whole
+from sessions.plan.protocols import protocol
+from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
+from sessions.plan.protocols.protocol import Protocol
+from sessions.recording import RecordingError
+from sessions.toml_file import NotAllowed, toml_text
+
+EXAMPLE = "daq-app translate sensotact-friction --language nl --out dutch.toml"
+SHIPPED = Path(__file__).parents[2] / "qt" / "translations"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare what is translated, into which language, and where it goes."""
+    parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in one, or a TOML file")
+    parser.add_argument("--program", action="store_true", help="the texts of the subject's page instead")
+    parser.add_argument(
+        "--language", required=True, metavar="XX", help="two or three small letters, as ISO 639 has them"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="a new file (the terminal)")
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Write or print the file."""
+    if (options.protocol is None) != options.program:
+        raise WrongValue("give a PROTOCOL, or --program; one of the two")
+    try:
+        check_language("--language", options.language)
+    except NotAllowed as wrong:
+        raise WrongValue(str(wrong)) from wrong
+    if options.program:
+        text, missing = program_texts(options.language)
+    else:
+        text, missing = protocol_texts(protocol(options.protocol), options.language)
+    if options.out is None:
+        console.say(text.rstrip())
+    else:
+        if options.out.exists():
+            raise WrongValue(f"--out {options.out} is there already: give a new file, or move that away")
+        try:
+            write_whole(options.out, text.encode())
+        except OSError as error:
+            raise RecordingError(f"{options.out} cannot be written ({error.strerror})") from error
+    console.result({"language": options.language, "missing": missing, "out": options.out and str(options.out)})
+    console.note(f"{missing} texts are yet to be translated" if missing else "every text is translated")
+    return 0
+
+
+def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
+    """Return the tables of a language, and how many blocks have none yet. Raises WrongValue for the protocol's own."""
+    if language == source.language:
+        raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
+    held = {one.block: one for one in source.translations if one.language == language}
+    asked = [
+        Translation(language, block.name, block.instruction, block.scale_ends, block.question)
+        for block in source.blocks
+    ]
+    if source.pre_evaluation is not None:
+        asked.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
+    lines: list[str] = []
+    for one in asked:
+        mark = "" if one.block in held else f"# to be translated from {source.language}\n"
+        table = toml_text(held.get(one.block, one)).replace('question = ""\n', "")
+        lines.append(f"[[translations]]\n{mark}{table}")
+    return "\n".join(lines), sum(one.block not in held for one in asked)
+
+
+def program_texts(language: str) -> tuple[str, int]:
+    """Return the .ts file of a language, and how many of its texts are not translated."""
+    shipped = SHIPPED / f"subject_{language}.ts"
+    held: dict[str, str] = {}
+    if language != ENGLISH and shipped.exists():
+        for message in ElementTree.parse(shipped).iter("message"):
+            held[message.findtext("source", "")] = message.findtext("translation", "")
+    root = ElementTree.Element("TS", version="2.1", language=language, sourcelanguage=ENGLISH)
+    context = ElementTree.SubElement(root, "context")
+    ElementTree.SubElement(context, "name").text = "subject"
+    for text in SubjectText:
+        message = ElementTree.SubElement(context, "message")
+        ElementTree.SubElement(message, "source").text = text
+        made = ElementTree.SubElement(message, "translation")
+        made.text = held.get(text, "")
+        if not made.text:
+            made.set("type", "unfinished")
+    ElementTree.indent(root, "    ")
+    body = ElementTree.tostring(root, encoding="unicode")
+    missing = sum(not held.get(text) for text in SubjectText)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE TS>\n{body}\n', missing

@@ -1,0 +1,43 @@
+"""The subject's languages: Qt's translation files for the program's own texts, reading direction, missing glyphs."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+
+from PySide6.QtCore import QLocale, Qt, QTranslator
+from PySide6.QtGui import QFont, QFontMetrics
+
+from daq_app.window.subject_texts import Translate
+from sessions.plan.protocols.languages import ENGLISH
+
+FOLDER = Path(__file__).parent / "translations"  # subject_XX.ts, what translators edit, and subject_XX.qm made of them
+CONTEXT = "subject"
+
+
+@lru_cache
+def translator(language: str) -> Translate:
+    """Return what makes a language of the English texts; a text without a translation stays English."""
+    found = QTranslator()
+    found.load(str(FOLDER / f"subject_{language}.qm"))  # an unknown language leaves it empty
+    return lambda text: found.translate(CONTEXT, text) or str(text)
+
+
+def direction(language: str) -> Qt.LayoutDirection:
+    """Return which way a language is read."""
+    return QLocale(language).textDirection()
+
+
+def name_of(language: str) -> str:
+    """Return what a language calls itself, with its code.
+
+    >>> name_of("de")
+    'Deutsch (de)'
+    """
+    own = "English" if language == ENGLISH else QLocale(language).nativeLanguageName()
+    return f"{own[:1].upper()}{own[1:]} ({language})" if own else language
+
+
+def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
+    """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
+    drawn = QFontMetrics(font)
+    return "".join(sorted(c for c in set("".join(texts)) if not c.isspace() and not drawn.inFontUcs4(ord(c))))

@@ -1,0 +1,90 @@
+"""What subjects read in other languages than the protocol's own: a table for each block and language."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from sessions.toml_file import NotAllowed
+
+PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
+ENGLISH = "en"
+
+
+@dataclass(frozen=True, slots=True)
+class Translation:
+    """The texts of one block in one language; it has those that the block has."""
+
+    language: str  # two or three small letters, as ISO 639 has them
+    block: str  # its name, or "pre-evaluation" for the instruction of that phase
+    instruction: str
+    scale_ends: tuple[str, str] | None = None
+    question: str = ""  # may stand where the protocol leaves it to the program
+
+    def __post_init__(self) -> None:
+        """Check the language, and that nothing is empty."""
+        check_language("language", self.language)
+        if not self.instruction.strip():
+            raise NotAllowed("instruction", self.instruction, "it must not be empty")
+        if self.scale_ends is not None and not all(end.strip() for end in self.scale_ends):
+            raise NotAllowed("scale_ends", list(self.scale_ends), "both ends of the scale must be named")
+
+
+class Texts(Protocol):
+    """What of a block is translated."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        ...
+
+    @property
+    def scale_ends(self) -> tuple[str, str] | None:
+        """The words at both ends of its line, where it has one."""
+        ...
+
+    @property
+    def question(self) -> str:
+        """Its question, "" where the program asks."""
+        ...
+
+
+def check_language(key: str, language: str) -> None:
+    """Raise NotAllowed unless a text is the code of a language."""
+    if not re.fullmatch(r"[a-z]{2,3}", language):
+        raise NotAllowed(key, language, 'it must be the code of a language, two or three small letters such as "de"')
+
+
+def check_translations(
+    translations: Sequence[Translation], blocks: Sequence[Texts], own: str, *, pre_evaluation: bool
+) -> None:
+    """Raise NotAllowed unless each language has every text of a protocol once, and none that it has not."""
+    names = [block.name for block in blocks] + ([PRE_EVALUATION] if pre_evaluation else [])
+    for number, one in enumerate(translations):
+        key = f"translations[{number}]"
+        if one.language == own:
+            raise NotAllowed(f"{key}.language", own, "it is the protocol's own: its texts stand in the blocks")
+        if one.block not in names:
+            raise NotAllowed(f"{key}.block", one.block, f"it must be one of {', '.join(names)}")
+        if any((one.language, one.block) == (other.language, other.block) for other in translations[:number]):
+            raise NotAllowed(f"{key}.block", one.block, f'"{one.language}" has its texts already')
+        block = next((block for block in blocks if block.name == one.block), None)
+        if (one.scale_ends is None) != (block is None or block.scale_ends is None):
+            what = "name both ends of its line" if one.scale_ends is None else "it has no line: leave its ends out"
+            raise NotAllowed(f"{key}.scale_ends", one.scale_ends and list(one.scale_ends), what)
+        if block is not None and block.question and not one.question.strip():
+            raise NotAllowed(f"{key}.question", one.question, f"translate the question of {one.block}")
+    for language, block in missing_texts(translations, names):
+        raise NotAllowed("translations", language, f'the texts of {block} are missing in "{language}"')
+
+
+def missing_texts(translations: Sequence[Translation], names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield language and block of each text that a language which has others lacks."""
+    for language in languages_of(translations):
+        held = {one.block for one in translations if one.language == language}
+        yield from ((language, name) for name in names if name not in held)
+
+
+def languages_of(translations: Sequence[Translation]) -> tuple[str, ...]:
+    """Return the languages, in the order first met."""
+    return tuple(dict.fromkeys(one.language for one in translations))

@@ -1,0 +1,112 @@
+"""The subject's page in five languages: whole, never clipped, mirrored where one reads from the right."""
+
+from xml.etree import ElementTree
+
+import pytest
+from PySide6.QtCore import QPointF, Qt, QTranslator
+from PySide6.QtGui import QFont
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QLabel
+
+from daq_app.qt import languages
+from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.tokens import LIGHT
+from daq_app.window.subject_texts import SubjectText
+from daq_app.window.view_subject import SubjectView
+from sessions.plan.protocols import protocol
+
+pytestmark = pytest.mark.qt
+OTHERS = ("de", "fr", "ja", "ar")
+
+
+@pytest.fixture
+def shown(application):
+    """Return a function that shows the subject's page at a size of type."""
+    made = []
+
+    def window(view, scale=1.0, size=(900, 560)):
+        page = SubjectWindow(LIGHT, scale, lambda: 0.0)
+        made.append(page)
+        page.resize(*size)
+        page.show()
+        page.show_view(view, None)
+        application.processEvents()
+        return page
+
+    yield window
+    for page in made:
+        page.hide()
+        page.deleteLater()
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_each_file_has_every_text_and_what_qt_reads_is_what_a_translator_wrote(language):
+    written = {
+        message.findtext("source"): message.findtext("translation")
+        for message in ElementTree.parse(languages.FOLDER / f"subject_{language}.ts").iter("message")
+    }
+    assert set(written) == set(SubjectText)
+    assert all(written.values())
+    read = QTranslator()
+    assert read.load(str(languages.FOLDER / f"subject_{language}.qm"))
+    for text, translation in written.items():
+        assert read.translate(languages.CONTEXT, text) == translation
+        names = [name for name in ("{number}", "{count}", "{code}") if name in text]
+        assert all(name in translation for name in names)
+
+
+def test_a_language_that_the_program_does_not_speak_leaves_its_own_texts_english():
+    assert languages.translator("nl")(SubjectText.NEXT) == "Next"
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("language", ["en", *OTHERS])
+def test_no_text_of_the_page_is_clipped_however_large_the_type(shown, language, scale):
+    words = languages.translator(language)
+    for name in ("sensotact-friction", "magnitude-estimation"):
+        block = protocol(name).in_language(language).blocks[1]
+        for view in (
+            SubjectView("read", words(SubjectText.STROKE), block.instruction, language=language),
+            SubjectView(
+                "line", block.question or "Judge it", "", block.scale_ends or ("a", "b"), 0, (1, 1), "right", language
+            ),
+        ):
+            page = shown(view, scale)
+            for part in page.findChildren(QLabel):
+                if part.isVisible() and part.text():
+                    assert part.height() >= part.heightForWidth(part.width()), part.text()
+
+
+def test_arabic_runs_from_the_right_and_the_line_and_its_keys_with_it(shown):
+    page = shown(SubjectView("line", "كم؟", "", ("غير لزج", "لزج"), 0, (1, 1), "right", "ar"))
+    line = page.line
+    assert page.layoutDirection() == Qt.LayoutDirection.RightToLeft
+    assert line.place_of(0.0).x() > line.place_of(100.0).x()
+    QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(25.0).toPoint())
+    assert line.answer.score == pytest.approx(25.0, abs=0.5)
+    low, high = (shown_end for shown_end in page._scale._ends)
+    assert low.geometry().center().x() > high.geometry().center().x()
+    before = line.answer.score
+    QTest.keyClick(line, Qt.Key.Key_Left)  # away from 0, which lies at the right
+    assert line.answer.score > before
+    assert page.next.text() == "التالي"
+
+
+def test_back_in_english_the_line_is_as_it_was(shown):
+    page = shown(SubjectView("line", "كم؟", "", ("a", "b"), 0, (1, 1), "right", "ar"))
+    page.show_view(SubjectView("line", "How?", "", ("a", "b"), 0, (2, 1)), None)
+    assert page.line.place_of(0.0).x() < page.line.place_of(100.0).x()
+    assert page.next.text() == "Next"
+
+
+def test_next_stays_at_the_answering_hand_in_every_language(shown):
+    for language in ("en", "ar"):
+        page = shown(SubjectView("line", "?", "", ("a", "b"), 0, (1, 1), "right", language))
+        page.line._take(page.line.answer.pressed(0.0, 50.0, "mouse").released())
+        assert page.next.mapTo(page, QPointF(0, 0)).x() > page.width() / 2
+
+
+@pytest.mark.usefixtures("application")
+def test_a_character_that_no_font_draws_is_named():
+    assert languages.missing_glyphs(["Hello, 5"], QFont()) == ""
+    assert languages.missing_glyphs(["a \U000f0000 b"], QFont()) == "\U000f0000"

@@ -1,0 +1,54 @@
+"""What a translator fills in: whole, kept where it was done, and taken back by the program."""
+
+from xml.etree import ElementTree
+
+import pytest
+
+from daq_app.cli.main import run
+from daq_app.window.subject_texts import SubjectText
+from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import VisitSetting
+from sessions.plan.protocols.protocol import FOLDER
+
+
+def test_tables_filled_in_at_the_end_of_a_protocol_are_its_new_language(tmp_path, capsys):
+    out, own = tmp_path / "nl.toml", tmp_path / "ours.toml"
+    assert run(["translate", "sensotact-friction", "--language", "nl", "--out", str(out)]) == 0
+    assert "3 texts" in capsys.readouterr().err
+    filled = out.read_text().replace("Put your index finger", "Leg uw wijsvinger")
+    own.write_text((FOLDER / "sensotact-friction.toml").read_text() + filled)
+    made = plan(protocol(own), "S01", 1, setting=VisitSetting(language="nl"))
+    assert made.blocks[0].instruction.startswith("Leg uw wijsvinger")
+
+
+def test_what_is_translated_stays(capsys):
+    assert run(["translate", "sensotact-friction", "--language", "de"]) == 0
+    told = capsys.readouterr()
+    assert "gar nicht klebrig" in told.out
+    assert "to be translated" not in told.out
+    assert "every text is translated" in told.err
+
+
+@pytest.mark.parametrize(("language", "left"), [("de", 0), ("nl", len(SubjectText))])
+def test_the_program_s_own_texts_come_as_a_file_for_linguist(tmp_path, language, left):
+    out = tmp_path / "texts.ts"
+    assert run(["translate", "--program", "--language", language, "--out", str(out)]) == 0
+    made = ElementTree.parse(out)
+    assert [message.findtext("source") for message in made.iter("message")] == list(SubjectText)
+    assert len([one for one in made.iter("translation") if one.get("type") == "unfinished"]) == left
+
+
+def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
+    there = tmp_path / "there.toml"
+    there.write_text("kept")
+    for wrong in (
+        ["--language", "de"],
+        ["sensotact-friction", "--program", "--language", "de"],
+        ["sensotact-friction", "--language", "Dutch"],
+        ["sensotact-friction", "--language", "en"],
+        ["nowhere", "--language", "de"],
+        ["sensotact-friction", "--language", "nl", "--out", str(there)],
+    ):
+        assert run(["translate", *wrong]) == 2
+        assert capsys.readouterr().err.startswith("daq-app: ")
+    assert there.read_text() == "kept"
