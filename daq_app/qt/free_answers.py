@@ -17,6 +17,8 @@ from sessions.run.steps import Event
 Which = Literal["first", "second"]
 NUMBER = QRegularExpression(r"\d{0,9}[.,]?\d{0,9}")  # what can be typed of one
 LARGE = 36  # type of the number [device-independent pixels]
+WORDS = 24  # type of the buttons
+WIDE, HIGH = 220, 96  # a button, at least
 
 
 class _Field(QWidget):
@@ -114,7 +116,9 @@ class ChoiceOfTwo(_Field):
         made = button(words, words, lambda: self._take(self.answer.changed(self.now(), which, "mouse")))
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        made.setMinimumSize(round(220 * scale), round(96 * scale))
+        # In a sheet of its own: the window's sets the height of every button.
+        size = f"min-width: {round(WIDE * scale)}px; min-height: {round(HIGH * scale)}px;"
+        made.setStyleSheet(f"font-size: {round(WORDS * scale)}px; {size}")
         return made
 
     def _take(self, answer: Choice) -> None:

@@ -19,7 +19,8 @@ from sessions.plan.plan import Hand
 LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transducer
 WIDEST = 1100  # row of the button
 GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
-TEXT_WIDTH = 900  # of a text that is still easily read
+TEXT_WIDTH = 900  # of a text that is still easily read, before the scale of the fonts
+SHRUNK = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)  # type of a message: the largest at which it is seen whole
 
 
 class SubjectWindow(QWidget):
@@ -38,6 +39,7 @@ class SubjectWindow(QWidget):
         self._view: SubjectView | None = None
         self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
+        self._type = scale
         self._title = _large(label(role="title", wrap=True), LARGER, scale, bold=True)
         self._text = _large(label(wrap=True), LARGE, scale)
         self.press = PressBar(tokens, scale)
@@ -56,7 +58,8 @@ class SubjectWindow(QWidget):
         self.ruler = RulerCheck(tokens, scale)
         self.ruler.done.connect(self._ruler_done)
         self._pages = QStackedWidget()
-        self._pages.addWidget(self._message_page())
+        self._message = self._message_page()
+        self._pages.addWidget(self._message)
         self._pages.addWidget(self._scale_page())
         self._pages.addWidget(self.ruler)
         layout = QVBoxLayout(self)
@@ -104,6 +107,7 @@ class SubjectWindow(QWidget):
         else:
             say(self._title, view.title)
             say(self._text, view.text)
+            self._fit_message()
         if not self.measuring:
             self._turn()
 
@@ -171,6 +175,11 @@ class SubjectWindow(QWidget):
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self.fit_screen()
 
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Keep a message whole."""
+        super().resizeEvent(event)
+        self._fit_message()
+
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """Only hide: an answer that is being given is not lost."""
         event.ignore()
@@ -182,11 +191,23 @@ class SubjectWindow(QWidget):
         layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
         layout.addStretch(1)
         for shown in (self._title, self._text, self.press):
-            shown.setMaximumWidth(TEXT_WIDTH)
+            shown.setMaximumWidth(round(TEXT_WIDTH * self._type))
             layout.addLayout(_centred(shown, 100))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
         return page
+
+    def _fit_message(self) -> None:
+        """Give a message its type, or as much smaller a one as lets it be seen whole."""
+        layout = self._message.layout()
+        assert layout is not None
+        for part in SHRUNK:
+            _large(self._title, LARGER, self._type * part, bold=True)
+            _large(self._text, LARGE, self._type * part)
+            layout.invalidate()
+            layout.activate()  # a page that is not shown has not yet heard of its new texts
+            if layout.totalHeightForWidth(self.width()) <= self.height():
+                return
 
     def _scale_page(self) -> QWidget:
         page = QWidget()
@@ -242,6 +263,7 @@ class SubjectWindow(QWidget):
         self._view = None
         say(self._title, "Thank you")
         say(self._text, "")
+        self._fit_message()
         self._pages.setCurrentIndex(0)
         self.answered.emit(given)
 
@@ -269,7 +291,7 @@ class _Scale(QWidget):
         line = self._line
         line.move((self.width() - line.width()) // 2, 0)
         ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
-        width = int(min(ends[1] - ends[0] - 2 * GRID, 2 * ends[0]))
+        width = int(min(abs(ends[1] - ends[0]) - 2 * GRID, 2 * min(ends)))
         tallest = 0
         for shown, at in zip(self._ends, ends, strict=True):
             tallest = max(tallest, shown.heightForWidth(width))
