@@ -15,8 +15,13 @@ from sessions.plan.plan import Hand
 from sessions.run.steps import Event
 
 Which = Literal["first", "second"]
-NUMBER = QRegularExpression(r"\d{0,9}[.,]?\d{0,9}")  # what can be typed of one
+POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
+NUMBER = QRegularExpression(
+    rf"\d{{0,9}}[{POINTS}]?\d{{0,9}}", QRegularExpression.PatternOption.UseUnicodePropertiesOption
+)  # what can be typed of one
 LARGE = 36  # type of the number [device-independent pixels]
+WORDS = 24  # type of the buttons
+WIDE, HIGH = 220, 96  # a button, at least
 
 
 class _Field(QWidget):
@@ -66,7 +71,7 @@ class NumberField(_Field):
 
     def _typed(self, text: str) -> None:
         try:
-            number = float(text.strip().replace(",", "."))
+            number = float(text.strip().translate(dict.fromkeys(map(ord, POINTS), ".")))
         except ValueError:
             number = 0.0
         value = number if number > 0.0 and isfinite(number) else None
@@ -121,7 +126,9 @@ class ChoiceOfTwo(_Field):
         made = button(words, words, lambda: self._take(self.answer.changed(self.now(), which, "mouse")))
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        made.setMinimumSize(round(220 * scale), round(96 * scale))
+        # In a sheet of its own: the window's sets the height of every button.
+        size = f"min-width: {round(WIDE * scale)}px; min-height: {round(HIGH * scale)}px;"
+        made.setStyleSheet(f"font-size: {round(WORDS * scale)}px; {size}")
         return made
 
     def _take(self, answer: Choice) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
+from unicodedata import category, normalize
 
 from PySide6.QtCore import QLocale, Qt, QTranslator
 from PySide6.QtGui import QFont, QFontMetrics
@@ -39,5 +40,5 @@ def name_of(language: str) -> str:
 
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
     """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
-    drawn = QFontMetrics(font)
-    return "".join(sorted(c for c in set("".join(texts)) if not c.isspace() and not drawn.inFontUcs4(ord(c))))
+    drawn, asked = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
+    return "".join(sorted(c for c in asked if not (c.isspace() or category(c) == "Cf" or drawn.inFontUcs4(ord(c)))))

@@ -1,7 +1,7 @@
 """How hard the subject's finger presses, where the protocol lets the subject see it."""
 
 import numpy as np
-from PySide6.QtCore import QRectF
+from PySide6.QtCore import QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 
 from daq_app.qt.painted import Painted
@@ -13,7 +13,7 @@ OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does no
 
 
 class PressBar(Painted):
-    """A bar from no force to `FULL`; no number, so that nobody aims at one."""
+    """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Start empty."""
@@ -41,6 +41,8 @@ class PressBar(Painted):
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         filled = QRectF(box)
         filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
+        if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
+            filled.moveRight(box.right())
         painter.fillRect(filled, QColor(self.tokens.act))
         painter.setPen(QPen(QColor(self.tokens.quiet), 2))
         painter.drawRect(box)

@@ -23,7 +23,7 @@ LARGE, LARGER = 24, 36  # type that is read from where a hand rests on a transdu
 SHRINKING = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)  # of it, until a page holds its texts
 WIDEST = 1100  # row of the button
 GIVING = (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space)
-TEXT_WIDTH = 900  # of a text that is still easily read
+TEXT_WIDTH = 900  # of a text that is still easily read, before the scale of the fonts
 
 
 class SubjectWindow(QWidget):
@@ -58,6 +58,7 @@ class SubjectWindow(QWidget):
         self.next = button("Next", "next: give this answer", self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(tokens, scale)
+        self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
         self.ruler.done.connect(self._ruler_done)
         self._pages = QStackedWidget()
         self._pages.addWidget(self._message_page())
@@ -116,6 +117,7 @@ class SubjectWindow(QWidget):
 
     def _fit_type(self) -> None:
         """Make the letters as large as they should be, or as small as lets all of the page be read."""
+        layout = self._answer_layout if self.scoring else self._message_layout
         for part in SHRINKING:
             for made, size in (
                 (self._title, LARGER),
@@ -125,19 +127,10 @@ class SubjectWindow(QWidget):
             ):
                 _set_type(made, size * part, self._type, bold=size == LARGER)
             self._scale.set_type(LARGE * part, self._type)
-            if self._needed() <= self.height():
+            layout.invalidate()
+            layout.activate()  # a page that is not shown has not yet heard of its new texts
+            if layout.totalHeightForWidth(self.width()) <= self.height():
                 return
-
-    def _needed(self) -> int:
-        """Return the height that the texts of the page need [px]."""
-        if self.scoring:
-            width, rest = self.width() - 4 * GRID, (self._question, self._hint)
-            way = max(self._scale.height() if self.asks == "line" else 0, self._ways.sizeHint().height())
-            held = way + self.next.minimumHeight() + 15 * GRID
-        else:
-            width, rest = min(self.width() - 14 * GRID, TEXT_WIDTH), (self._title, self._text)
-            held = 30 * GRID + (0 if self.press.isHidden() else self.press.sizeHint().height())
-        return held + sum(made.heightForWidth(width) for made in rest if made.text())
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Let the texts fit the room there is."""
@@ -223,11 +216,11 @@ class SubjectWindow(QWidget):
 
     def _message_page(self) -> QWidget:
         page = QWidget()
-        layout = QVBoxLayout(page)
+        self._message_layout = layout = QVBoxLayout(page)
         layout.setContentsMargins(6 * GRID, 6 * GRID, 6 * GRID, 6 * GRID)
         layout.addStretch(1)
         for shown in (self._title, self._text, self.press):
-            shown.setMaximumWidth(TEXT_WIDTH)
+            shown.setMaximumWidth(round(TEXT_WIDTH * self._type))
             layout.addLayout(_centred(shown, 100))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
@@ -235,9 +228,8 @@ class SubjectWindow(QWidget):
 
     def _scale_page(self) -> QWidget:
         page = QWidget()
-        layout = QVBoxLayout(page)
+        self._answer_layout = layout = QVBoxLayout(page)
         layout.setContentsMargins(2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
-        layout.setSpacing(GRID)
         self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         layout.addWidget(self._question)
         layout.addStretch(2)
@@ -289,6 +281,7 @@ class SubjectWindow(QWidget):
         self._view = None
         say(self._title, translator(self._language)(Text.THANKS))
         say(self._text, "")
+        self._fit_type()
         self._pages.setCurrentIndex(0)
         self.answered.emit(given)
 

@@ -31,3 +31,8 @@ class SubjectText(StrEnum):
     NEXT = "Next"
     FIRST = "The first"
     SECOND = "The second"
+
+
+def usual_question(descriptor: str) -> str:
+    """Return what is asked in English where a block has no question."""
+    return f"Judge the {descriptor} of the surface"

@@ -5,7 +5,7 @@ from typing import Literal
 
 from daq_app.window.course_state import SessionState
 from daq_app.window.subject_texts import SubjectText as Text
-from daq_app.window.subject_texts import Translate
+from daq_app.window.subject_texts import Translate, usual_question
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.languages import ENGLISH
 from sessions.run import steps
@@ -112,5 +112,5 @@ class _Page:
     def _judge(self, descriptor: str) -> str:
         """Return the usual question; a descriptor is a word of the protocol's own language."""
         if self.session.plan.language == ENGLISH:
-            return f"Judge the {descriptor} of the surface"
+            return usual_question(descriptor)
         return self.say(Text.JUDGE)

@@ -42,12 +42,13 @@ def test_without_translations_a_protocol_has_its_own_language_alone_and_refuses_
         ('language = "de"', "the texts of slipperiness are missing"),
         ('language = "en"', "the protocol's own"),
         ('language = "German"', "code of a language"),
-        ('language = "nl"\nquestion = "?"', "the texts of slipperiness are missing"),
+        ('language = "nl"', "the texts of slipperiness are missing"),
     ],
 )
 def test_a_translation_that_is_not_whole_is_refused_and_the_sentence_names_what_lacks(tmp_path, wrong, said):
     text = (FOLDER / f"{PAPER}.toml").read_text().split("# What subjects read")[0]
-    table = f'\n[[translations]]\n{wrong}\nblock = "stickiness"\ninstruction = "x"\nscale_ends = ["a", "b"]\n'
+    texts = 'instruction = "x"\nscale_ends = ["a", "b"]\nquestion = "?"'
+    table = f'\n[[translations]]\n{wrong}\nblock = "stickiness"\n{texts}\n'
     file = tmp_path / "own.toml"
     file.write_text(text + table)
     with pytest.raises(SettingsError, match=said):

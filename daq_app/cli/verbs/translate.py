@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from daq_app.console import Console, WrongValue
-from daq_app.window.subject_texts import SubjectText
+from daq_app.window.subject_texts import SubjectText, usual_question
 from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
@@ -64,8 +64,8 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
     held = {one.block: one for one in source.translations if one.language == language}
     asked = [
-        Translation(language, block.name, block.instruction, block.scale_ends, block.question)
-        for block in source.blocks
+        Translation(language, one.name, one.instruction, one.scale_ends, one.question or usual_question(one.descriptor))
+        for one in source.blocks
     ]
     if source.pre_evaluation is not None:
         asked.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))

@@ -53,7 +53,7 @@
     </message>
     <message>
         <source>Stroke the surface up to {number} times</source>
-        <translation>مرّر إصبعك على السطح حتى {number} مرات</translation>
+        <translation>مرّر إصبعك على السطح، والعدد الأقصى للمرات: {number}</translation>
     </message>
     <message>
         <source>This one is for practice.</source>
@@ -73,7 +73,7 @@
     </message>
     <message>
         <source>Give a number above 0, on your own scale.</source>
-        <translation>أعطِ رقمًا أكبر من 0 على مقياسك الخاص.</translation>
+        <translation>أعطِ عددًا أكبر من 0 على مقياسك الخاص.</translation>
     </message>
     <message>
         <source>Which one?</source>

@@ -29,7 +29,7 @@
     </message>
     <message>
         <source>Please lift your finger off the surface.</source>
-        <translation>Veuillez lever le doigt de la surface.</translation>
+        <translation>Veuillez retirer le doigt de la surface.</translation>
     </message>
     <message>
         <source>Rest</source>

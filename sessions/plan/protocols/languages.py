@@ -19,7 +19,7 @@ class Translation:
     block: str  # its name, or "pre-evaluation" for the instruction of that phase
     instruction: str
     scale_ends: tuple[str, str] | None = None
-    question: str = ""  # may stand where the protocol leaves it to the program
+    question: str = ""  # needed for every block: the program's own question is English
 
     def __post_init__(self) -> None:
         """Check the language, and that nothing is empty."""
@@ -41,11 +41,6 @@ class Texts(Protocol):
     @property
     def scale_ends(self) -> tuple[str, str] | None:
         """The words at both ends of its line, where it has one."""
-        ...
-
-    @property
-    def question(self) -> str:
-        """Its question, "" where the program asks."""
         ...
 
 
@@ -72,8 +67,8 @@ def check_translations(
         if (one.scale_ends is None) != (block is None or block.scale_ends is None):
             what = "name both ends of its line" if one.scale_ends is None else "it has no line: leave its ends out"
             raise NotAllowed(f"{key}.scale_ends", one.scale_ends and list(one.scale_ends), what)
-        if block is not None and block.question and not one.question.strip():
-            raise NotAllowed(f"{key}.question", one.question, f"translate the question of {one.block}")
+        if block is not None and not one.question.strip():
+            raise NotAllowed(f"{key}.question", one.question, f"say what is asked of {one.block} in this language")
     for language, block in missing_texts(translations, names):
         raise NotAllowed("translations", language, f'the texts of {block} are missing in "{language}"')
 

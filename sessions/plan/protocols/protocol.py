@@ -189,14 +189,14 @@ class Protocol:
         if self.order.blocks == "counterbalanced" and len(self.blocks) < 2:
             raise NotAllowed("order.blocks", self.order.blocks, "counterbalancing takes at least two blocks")
         check_language("language", self.language)
-        judged = self.pre_evaluation is not None
-        check_translations(self.translations, self.blocks, self.language, pre_evaluation=judged)
         names = [block.name for block in self.blocks]
         for i, (name, block) in enumerate(zip(names, self.blocks, strict=True)):
             if name in names[:i]:
                 raise NotAllowed(f"blocks[{i}].name", name, "no two blocks may have the same name")
             self._check_answers(f"blocks[{i}]", block)
             self._check_order(f"blocks[{i}]", block)
+        judged = self.pre_evaluation is not None
+        check_translations(self.translations, self.blocks, self.language, pre_evaluation=judged)
 
     @property
     def labels(self) -> Labels:

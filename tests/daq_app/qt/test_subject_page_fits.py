@@ -1,0 +1,107 @@
+"""What the subject reads is seen whole: long texts of several languages, both ways of reading, large type."""
+
+from itertools import pairwise
+
+import pytest
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QLabel
+
+from daq_app.qt import tokens
+from daq_app.qt.press_bar import FULL, PressBar
+from daq_app.qt.subject_window import LARGER, SubjectWindow
+from daq_app.window.view_subject import SubjectView
+from tests.daq_app.qt.test_legible import cut_off
+
+pytestmark = pytest.mark.qt
+
+GERMAN = "Ziehen Sie den Zeigefinger einmal über jede Oberfläche, zu sich heran, unter 45 Grad. " * 4
+JAPANESE = "人差し指で各表面を体に近づける向きに一回引き、どれくらい滑りやすいかを数で答えてください。" * 4
+ARABIC = "اسحب سبابتك مرة واحدة على كل سطح نحوك بزاوية 45 درجة، وأعطه رقمًا يعبّر عن مدى انزلاقه. " * 4
+RIGHT_TO_LEFT = Qt.LayoutDirection.RightToLeft
+LEFT_TO_RIGHT = Qt.LayoutDirection.LeftToRight
+READING = [(GERMAN, LEFT_TO_RIGHT), (JAPANESE, LEFT_TO_RIGHT), (ARABIC, RIGHT_TO_LEFT)]
+
+
+@pytest.fixture
+def page(application):
+    """Return a function that shows a view in a window for the subject, at a scale of the fonts."""
+    made = []
+
+    def shown(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
+        window = SubjectWindow(tokens.LIGHT, scale, lambda: 0.0)
+        made.append(window)
+        window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+        window.setLayoutDirection(direction)
+        window.resize(*size)
+        window.show()
+        window.show_view(view, "right")
+        for _ in range(3):
+            application.processEvents()
+        return window
+
+    yield shown
+    for window in made:
+        window.hide()
+        window.deleteLater()
+
+
+def box(widget):
+    window = widget.window()
+    return QRect(widget.mapTo(window, widget.rect().topLeft()), widget.size())
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize(("text", "direction"), READING, ids=["German", "Japanese", "Arabic"])
+def test_a_long_instruction_is_seen_whole_with_the_bar_beneath_it(page, text, direction, scale):
+    window = page(SubjectView("read", text[:40], text, force=True), scale, direction)
+    assert cut_off(window) == []
+    shown = [box(window._title), box(window._text), box(window.press)]
+    assert all(window.rect().contains(one) for one in shown)
+    assert not any(upper.intersects(lower) for upper, lower in pairwise(shown))
+
+
+def test_type_becomes_smaller_only_where_a_text_is_not_seen_whole(page):
+    short = page(SubjectView("read", "Please wait", "Keep your fingers off the surface."), 2.0)
+    assert short._title.font().pixelSize() == 2 * LARGER
+    short.show_view(SubjectView("read", "Please wait", 2 * GERMAN), "right")
+    assert short._title.font().pixelSize() < 2 * LARGER
+    short.show_view(SubjectView("read", "Please wait"), "right")
+    assert short._title.font().pixelSize() == 2 * LARGER
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+@pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
+def test_the_words_of_each_end_stand_beneath_it_and_are_seen_whole(page, direction, scale):
+    ends = ("pas du tout collante", "aussi collante que possible")
+    window = page(SubjectView("line", "À quel point ?", ends=ends, key=(1, 1)), scale, direction)
+    assert cut_off(window) == []
+    line = window.line
+    for position, words in zip((0.0, 100.0), ends, strict=True):
+        (shown,) = (one for one in window.findChildren(QLabel) if one.text() == words)
+        assert shown.width() > 0
+        end = line.mapTo(window, line.place_of(position).toPoint())
+        assert box(shown).center().x() == pytest.approx(end.x(), abs=2)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_whole(page, scale):
+    window = page(SubjectView("choice", "Which one?", key=(1, 1)), scale)
+    for made in (window.choice.first, window.choice.second):
+        assert made.width() >= made.sizeHint().width()
+        assert made.height() >= 96 * scale
+        assert made.fontMetrics().height() >= 20 * scale
+        assert made.fontMetrics().horizontalAdvance(made.text()) < made.width()
+
+
+@pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
+@pytest.mark.usefixtures("application")
+def test_the_bar_of_the_force_fills_from_where_reading_begins(direction):
+    bar = PressBar(tokens.LIGHT, 1.0)
+    bar.setLayoutDirection(direction)
+    bar.resize(400, 40)
+    bar._force = 0.25 * FULL
+    image, colour = bar.grab().toImage(), QColor(tokens.LIGHT.act)
+    filled = [x for x in range(image.width()) if image.pixelColor(x, image.height() // 2) == colour]
+    assert len(filled) == pytest.approx(100, abs=4)
+    assert (filled[-1] > 390) is (direction == RIGHT_TO_LEFT)
