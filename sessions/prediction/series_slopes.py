@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import Scene, SceneError
+from solver import Friction, Loading, Scene, SceneError, Solve
+from solver.quantities import NAMES
 from solver.response.rough_responses import rough_responses
 from solver.scene.published import SLIPPERINESS, STICKINESS, Surface
 from solver.scene.published import scene as published
@@ -18,6 +19,7 @@ from solver.scene.published import scene as published
 Array = NDArray[np.float64]
 
 SERIES: Mapping[str, tuple[Surface, ...]] = {"stickiness": STICKINESS, "slipperiness": SLIPPERINESS}
+SED = NAMES.index("sed")
 LEAST = 3  # surfaces with a settled state that a slope is taken of
 
 
@@ -56,6 +58,28 @@ def series_slopes(
         rows = [number for number, surface in enumerate(surfaces) if surface.descriptor == name]
         out[name] = tuple(_slopes(series, responses[rows, :, place]) for place in range(len(arcs)))
     return out
+
+
+def other_signs(finger: Scene) -> list[str]:
+    """Return a sentence for each series over which the SED goes another way on a finger than on the published one.
+
+    Both at the kinematics of `finger`, pressed to the published depths; [] for the published finger itself.
+    """
+    base = Scene(friction=Friction(0.0), loading=Loading(1.0), solve=Solve(finger.solve.kinematics))
+    own = replace(finger.finger, width=base.finger.width), finger.materials, finger.receptor
+    if own == (base.finger, base.materials, base.receptor):
+        return []
+    here, there = series_slopes(finger), series_slopes(base)
+    if isinstance(here, str) or isinstance(there, str):
+        return []
+    changes = {name: (float(here[name][0].change[SED]), float(there[name][0].change[SED])) for name in SERIES}
+    return [
+        f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
+        f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, pressed to the "
+        "published depth. What the scores say of the model hangs on the finger that is assumed.".replace("-", "−")
+        for name, (mine, published) in changes.items()
+        if mine * published < 0.0
+    ]
 
 
 def _scene(finger: Scene, surface: Surface, press: Press) -> Scene:

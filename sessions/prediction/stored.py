@@ -1,7 +1,7 @@
 """What the model says of each trial and of a session, and how that is told as plain data."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import msgspec
@@ -102,6 +102,12 @@ class SessionPrediction:
     area: AreaLaw = FIXED  # by which tau_max was told
     gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
     bootstrap_seed: int = 0  # of the intervals
+
+    @property
+    def finger(self) -> Scene:
+        """The finger that was asked, at the strain that was asked for; its friction and loading mean nothing."""
+        held = template(self.options)
+        return replace(held, solve=replace(held.solve, kinematics=self.options.kinematics))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from sessions.prediction import SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
+from sessions.prediction.series_slopes import other_signs
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
@@ -107,6 +108,7 @@ def findings(
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         modelled=modelled(prediction),
         left_out=left_out(prediction),
+        other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
         again=facts.again(recording, analysis),
         commands=session_commands(
             recording,

@@ -233,6 +233,7 @@ class Report:
     again: tuple[Fact, ...]  # everything needed to do it again ...
     commands: tuple[str, ...]  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
+    other_signs: tuple[str, ...] = ()  # where the SED goes another way on this finger than on the published one
     model: str = ""  # which model the SEDs are of, in a few words
     interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name

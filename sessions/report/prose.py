@@ -40,7 +40,7 @@ def summary(report: Report) -> tuple[str, ...]:
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     if any(p.sed is not None for p in report.predictions):
-        sentences += robustness(report)
+        sentences += [*robustness(report), *report.other_signs]
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
         sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")

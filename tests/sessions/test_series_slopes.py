@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sessions.prediction.series_slopes import SERIES, Press, series_slopes
+from sessions.prediction.series_slopes import SERIES, Press, other_signs, series_slopes
 from solver import Finger, Friction, Loading, Scene, Solve, solve_many
 from solver.quantities import NAMES
 from solver.scene.published import scene
@@ -55,3 +55,12 @@ def test_under_one_force_the_sed_falls_with_stickiness():
 
 def test_a_press_deeper_than_the_finger_is_a_sentence():
     assert "loading.indentation" in series_slopes(PUBLISHED, Press(depth=4.0))
+
+
+def test_a_finger_on_which_the_sed_goes_the_other_way_says_so_for_the_series_it_is():
+    # On a tip of 6 mm the sticky series keeps its sign, and the slippery one does not (the referee's +0.90 and +0.80).
+    (sentence,) = other_signs(replace(PUBLISHED, finger=Finger(tip_radius=6.0)))
+    assert "slipperiness" in sentence
+    assert len(other_signs(replace(PUBLISHED, finger=Finger(tip_radius=7.0)))) == 2
+    assert other_signs(PUBLISHED) == []
+    assert other_signs(replace(PUBLISHED, finger=Finger(width=12.0))) == []  # forces per mm know no width

@@ -27,6 +27,7 @@ from sessions.prediction import (
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
 from sessions.prediction.sed_interval import SedInterval
+from sessions.prediction.series_slopes import other_signs
 from sessions.prediction.variants import Alternative
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
@@ -138,6 +139,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if rows
         else "nothing to predict: no forces were recorded"
     )
+    for sentence in other_signs(prediction.finger):
+        console.note(sentence)
     _print_beside(prediction, console)
     if asked.intervals:
         _print_intervals(prediction, console)
