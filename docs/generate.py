@@ -6,6 +6,8 @@ import importlib
 import inspect
 from pathlib import Path
 
+import against_the_paper
+
 from daq_app.cli import main
 
 SCENE = "solver.scene.tables"
@@ -15,7 +17,12 @@ PROTOCOL = "sessions.plan.protocols.protocol"
 def write(folder: Path) -> None:
     """Write every generated page into `folder`."""
     folder.mkdir(parents=True, exist_ok=True)
-    pages = {"command-line": command_line(), "scene-keys": scene_keys(), "protocol-keys": protocol_keys()}
+    pages = {
+        "command-line": command_line(),
+        "scene-keys": scene_keys(),
+        "protocol-keys": protocol_keys(),
+        "against-the-paper": against_the_paper.page(),
+    }
     for name, text in pages.items():
         file = folder / f"{name}.md"
         if not file.exists() or file.read_text(encoding="utf-8") != text:

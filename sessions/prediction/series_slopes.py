@@ -75,7 +75,7 @@ def other_signs(finger: Scene) -> list[str]:
     changes = {name: (float(here[name][0].change[SED]), float(there[name][0].change[SED])) for name in SERIES}
     return [
         f"On this finger the SED goes the other way with µ than on the published one, over its surfaces of {name}: by "
-        f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, pressed to the "
+        f"{100 * mine:+.0f} % and {100 * published:+.0f} % of the mean from the least to the greatest µ, at the "
         "published depth. What the scores say of the model hangs on the finger that is assumed.".replace("-", "−")
         for name, (mine, published) in changes.items()
         if mine * published < 0.0

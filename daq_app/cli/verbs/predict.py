@@ -139,8 +139,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if rows
         else "nothing to predict: no forces were recorded"
     )
-    for sentence in other_signs(prediction.finger):
-        console.note(sentence)
     _print_beside(prediction, console)
     if asked.intervals:
         _print_intervals(prediction, console)
@@ -169,7 +167,9 @@ def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
 
 
 def _print_beside(prediction: SessionPrediction, console: Console) -> None:
-    """Print the SED of each trial in every variant it was predicted, and why it has none."""
+    """Print what another finger changes of signs, the SED of each trial in every variant, and why it has none."""
+    for sentence in other_signs(prediction.finger):
+        console.note(sentence)
     rows = [row for row in prediction.trials if row.alternatives]
     if not rows:
         return
