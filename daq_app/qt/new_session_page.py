@@ -153,7 +153,7 @@ class NewSessionPage(QFrame):
         if self.simulated.isChecked():
             words = (
                 "Nobody is needed: strokes and scores are simulated, and marked so. "
-                "For a sample of your own the nearest of the bench's ten surfaces stands in."
+                "A sample of your own has the friction that its protocol plants; without, the nearest of ten stands in."
             )
         elif bench.simulated and self.with_forces.isChecked():
             words = "A simulated hand strokes when asked; you mount, and you or a subject score."

@@ -59,6 +59,7 @@ class People:
 
     kind: Kind = "people"
     seed: int = 0  # of the simulated subject
+    planted: tuple[tuple[str, int, float], ...] = ()  # descriptor, index and friction of simulated surfaces [-]
 
 
 @dataclass(frozen=True, slots=True)

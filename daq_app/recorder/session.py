@@ -257,8 +257,8 @@ def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
         return None
     known = _knowing(prepared.plan, prepared.writer.folder)
     if people.kind == "simulated people":
-        return SimulatedPeople(people.seed, prepared.clock, connected, known)
-    return None if connected is None else SimulatedHand(people.seed, connected, known)
+        return SimulatedPeople(people.seed, prepared.clock, connected, known, people.planted)
+    return None if connected is None else SimulatedHand(people.seed, connected, known, people.planted)
 
 
 def _knowing(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:

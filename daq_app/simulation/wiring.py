@@ -1,6 +1,6 @@
 """Builds real or simulated parts. Whoever runs a session reaches the simulators through here alone."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -96,6 +96,7 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
         box.close()
 
 
+Planted = Sequence[tuple[str, int, float]]  # descriptor, index and friction of surfaces that a protocol plants [-]
 Known = Callable[[Trial], Trial]  # a trial with the index of its stimulus
 
 
@@ -107,8 +108,8 @@ def itself(trial: Trial) -> Trial:
 class SimulatedHand:
     """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
 
-    def __init__(self, subject_seed: int, bench: Connected, known: Known = itself) -> None:
-        """Let the subject of that seed stroke; `known` tells a blinded trial's stimulus.
+    def __init__(self, subject_seed: int, bench: Connected, known: Known = itself, planted: Planted = ()) -> None:
+        """Let the subject of that seed stroke; `known` tells a blinded stimulus, `planted` the friction of some.
 
         Raises SetupError where the bench is not simulated in this process.
         """
@@ -117,17 +118,17 @@ class SimulatedHand:
         self._subject = SimulatedSubject(subject_seed)
         self._bench = bench.bench
         self._now = bench.bench_now
-        self._known = known
+        self._known, self._planted = known, planted
         self._takes: dict[int, int] = {}  # by trial number
 
     def show(self, command: steps.Command) -> None:
         """Do what the command asks a hand for."""
         match command:
             case steps.AskMount(trial):
-                self._bench.mount(planted_surface(self._known(trial)))
+                self._bench.mount(self._surface(trial))
             case steps.AskStroke(trial):
                 self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
-                stroke = self._subject.stroke(planted_surface(self._known(trial)), self._takes[trial.number])
+                stroke = self._subject.stroke(self._surface(trial), self._takes[trial.number])
                 self._bench.begin_stroke(stroke, self._now())
             case _:
                 pass
@@ -136,6 +137,9 @@ class SimulatedHand:
         """Return nothing: what a hand does is felt by the transducer."""
         return ()
 
+    def _surface(self, trial: Trial) -> Surface:
+        return planted_surface(self._known(trial), self._planted)
+
 
 class SimulatedPeople(DueEvents):
     """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
@@ -143,12 +147,21 @@ class SimulatedPeople(DueEvents):
     With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
     """
 
-    def __init__(self, subject_seed: int, clock: Clock, bench: Connected | None = None, known: Known = itself) -> None:
-        """Let the subject of that seed stroke the bench, where there is one; `known` tells a blinded stimulus."""
+    def __init__(
+        self,
+        subject_seed: int,
+        clock: Clock,
+        bench: Connected | None = None,
+        known: Known = itself,
+        planted: Planted = (),
+    ) -> None:
+        """Let the subject of that seed stroke the bench, where there is one; for the others see `SimulatedHand`."""
         super().__init__(clock)
         self._subject = SimulatedSubject(subject_seed)
-        self._hand = None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known)
-        self._known = known
+        self._hand = (
+            None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known, planted)
+        )
+        self._known, self._planted = known, planted
         self._takes: dict[int, int] = {}  # by trial number
 
     def show(self, command: steps.Command) -> None:
@@ -181,7 +194,7 @@ class SimulatedPeople(DueEvents):
                 score = self._judged(trial)
                 return steps.Scored(score, ((at, score),), at, 0, None, INPUT)
             case steps.AskNumber(trial):
-                number = self._subject.number(planted_surface(self._known(trial)), self._takes[trial.number])
+                number = self._subject.number(self._surface(trial), self._takes[trial.number])
                 return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
             case steps.AskChoice(first, second):
                 more = self._judged(first) > self._judged(second)
@@ -192,17 +205,25 @@ class SimulatedPeople(DueEvents):
         return JUDGING if self._hand else 0.0
 
     def _judged(self, trial: Trial) -> float:
-        return self._subject.score(planted_surface(self._known(trial)), self._takes[trial.number])
+        return self._subject.score(self._surface(trial), self._takes[trial.number])
+
+    def _surface(self, trial: Trial) -> Surface:
+        return planted_surface(self._known(trial), self._planted)
 
 
-def planted_surface(trial: Trial) -> Surface:
+def planted_surface(trial: Trial, planted: Planted = ()) -> Surface:
     """Return the simulated surface of a trial, stroked as the trial asks.
 
     The simulated bench holds the ten surfaces of sensotact-friction. For any other stimulus the one with the nearest
-    index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed.
+    index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed. Where a
+    protocol has planted friction of its own, that surface is as slippery as it says, and pressed as hard.
     """
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
     alike = [surface for surface in surfaces if surface.descriptor == stimulus.descriptor]
     surface = min(alike or surfaces, key=lambda held: abs(held.index - stimulus.known_index))
-    return replace(surface, direction=trial.direction)
+    surface = replace(surface, direction=trial.direction)
+    for descriptor, index, mu in planted:
+        if (descriptor, index) == (stimulus.descriptor, stimulus.known_index):
+            return replace(surface, mu=mu, tau_max=surface.tau_max * mu / surface.mu, index=index)
+    return surface

@@ -136,7 +136,7 @@ def checked(
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
     what = planned.protocol if place is None else "forces" if planned.forces else "scores"
     folder = session_folder(form, what, now)
-    people = People(_kind(form, bench), seed)
+    people = People(_kind(form, bench), seed, chosen.planted_friction)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
     if form.study.strip():
         own.append(Setting("study", form.study.strip(), "", "set"))

@@ -309,3 +309,27 @@ def test_within_a_block_the_order_of_surfaces_is_the_same_wherever_the_block_com
 def test_one_block_alone_cannot_be_counterbalanced(tmp_path):
     with pytest.raises(SettingsError, match="at least two blocks"):
         counterbalanced(tmp_path, "magnitude-estimation", blocks=1)
+
+
+@pytest.mark.parametrize(("planted", "said"), [("[0.3]", "one number for each"), ("[0.3, 0.0]", "between 0.01 and 5")])
+def test_planted_friction_has_a_number_for_each_surface(tmp_path, planted, said):
+    file = tmp_path / "own.toml"
+    file.write_text(OWN.replace("INDICES", f"[3, 70]\nplanted_friction = {planted}"))
+    with pytest.raises(SettingsError, match=said):
+        protocol(file)
+
+
+OWN = """
+name = "own"
+title = "Cloths"
+label_seed = 1
+contact_angle = 45.0
+[[blocks]]
+name = "softness"
+descriptor = "softness"
+direction = "proximal to distal"
+indentation = 2.0
+indices = INDICES
+instruction = "Push your finger once away from you."
+scale_ends = ["not soft at all", "as soft as can be"]
+"""

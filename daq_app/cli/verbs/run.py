@@ -81,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if (own := own_sentence(planned)) is not None:
         console.note(own)
     simulated = options.simulate_subject
-    people = People() if simulated is None else People("simulated people", simulated)
+    people = People() if simulated is None else People("simulated people", simulated, chosen.planted_friction)
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = opened(recorder, options.device) if options.device else None

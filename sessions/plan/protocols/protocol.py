@@ -39,6 +39,7 @@ class BlockOutline:
     strokes_allowed: int = 1  # in a trial, before the answer
     repetitions: int = 1  # of each stimulus, or of each pair
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
+    planted_friction: tuple[float, ...] = ()  # µ of each of `indices` on the simulated bench, for rehearsals [-]
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -59,6 +60,14 @@ class BlockOutline:
             raise NotAllowed("repetitions", self.repetitions, "it must lie between 1 and 20")
         if not set(self.practice) <= set(self.indices):
             raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
+        self._check_planted()
+
+    def _check_planted(self) -> None:
+        if self.planted_friction and len(self.planted_friction) != len(self.indices):
+            count = f"one number for each of the {len(self.indices)} indices, or none at all"
+            raise NotAllowed("planted_friction", list(self.planted_friction), count)
+        if not all(0.01 <= mu <= 5.0 for mu in self.planted_friction):
+            raise NotAllowed("planted_friction", list(self.planted_friction), "each must lie between 0.01 and 5")
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,6 +212,16 @@ class Protocol:
         """Return the code on the back of each stimulus; a stimulus of several blocks has one."""
         stimuli = dict.fromkeys((block.descriptor, index) for block in self.blocks for index in block.indices)
         return dict(zip(stimuli, opaque_codes(len(stimuli), self.label_seed), strict=True))
+
+    @property
+    def planted_friction(self) -> tuple[tuple[str, int, float], ...]:
+        """Return descriptor, index and μ of every stimulus whose friction the simulated bench is told."""
+        return tuple(
+            (block.descriptor, index, mu)
+            for block in self.blocks
+            if block.planted_friction
+            for index, mu in zip(block.indices, block.planted_friction, strict=True)
+        )
 
     @property
     def languages(self) -> tuple[str, ...]:
