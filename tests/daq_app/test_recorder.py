@@ -147,7 +147,10 @@ def sockets_of(pid):
         return []
     inodes = set()
     for link in Path(f"/proc/{pid}/fd").iterdir():
-        target = str(link.readlink())
+        try:
+            target = str(link.readlink())
+        except FileNotFoundError:  # a file that was closed since the folder was listed
+            continue
         if target.startswith("socket:["):
             inodes.add(target[8:-1])
     found = []
