@@ -9,7 +9,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
-from solver.quantities import NAMES, QUANTITIES
+from solver.quantities import NAMES, QUANTITIES, SED
 from solver.scene import Scene
 
 FORCES_AND_PLACES = 7  # numbers with an estimate beside the quantities: `all_numbers` begins with them
@@ -57,6 +57,14 @@ class History:
     tangential_force: Array  # (m,) drag opposing the slide [N/mm]
     contact_width: Array  # (m,) [mm]
     slipping: Array  # (m,) part of the touching skin nodes that slip [-]
+    responses: Array  # (m, q) every quantity at the ending; where tissues relax the SED alone, nan for the others
+
+
+def sed_alone(sed: Array) -> Array:
+    """Return the responses (m, q) of a course of which the SED (m,) alone is known; nan for the others."""
+    out = np.full((len(sed), len(NAMES)), np.nan)
+    out[:, NAMES.index(SED.name)] = sed
+    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,6 +162,8 @@ class Prediction:
         plain["warnings"] = list(self.warnings)
         if self.history is not None:
             course = {f.name: getattr(self.history, f.name).tolist() for f in fields(self.history)}
+            columns = zip(NAMES, self.history.responses.T, strict=True)
+            course["responses"] = {name: _plain(values) for name, values in columns}
             plain["time"], plain["bone_x"], plain["bone_y"] = (course.pop(k) for k in ("time", "bone_x", "bone_y"))
             plain["history"] = course
         return plain

@@ -112,6 +112,10 @@ class FingerModel:
         responses = self.responses(displacement)
         return np.column_stack([responses[:, 0], rest, middle, responses])
 
+    def responses_of(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return every quantity at the reference ending of several states (c, q)."""
+        return self.responses(self._recovered(states, self.ending))
+
     def responses(self, displacement: Array) -> Array:
         """Return every quantity at the reference ending (c, q) for displacements (nodes, 2, c), even complex ones."""
         return self.ending.responses(self.geometry.mesh, self.body.elastic, displacement)[:, 0].T

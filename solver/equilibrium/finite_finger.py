@@ -86,6 +86,10 @@ class FiniteFinger:
         rest = s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s), middle
         return *self.numbers(s), *rest, *self.responses(s.u[:, :, None])[0]
 
+    def responses_of(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return every quantity at the reference ending of several states (c, q)."""
+        return np.concatenate([self.responses(state.u[:, :, None]) for state in states])
+
     def responses(self, displacement: Array) -> Array:
         """Return every quantity at the reference ending (c, q) for displacements (nodes, 2, c), even complex ones."""
         return self.ending.responses(self.newton.body, displacement)[:, 0].T

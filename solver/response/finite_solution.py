@@ -29,7 +29,7 @@ from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.prediction import FORCES_AND_PLACES, ROW, History, Prediction, Row, Skin, drag
+from solver.prediction import FORCES_AND_PLACES, ROW, History, Prediction, Row, Skin, drag, sed_alone
 from solver.progress import report_progress
 from solver.scene import Scene
 
@@ -222,4 +222,5 @@ def _history(scene: Scene, finger: FiniteFinger, way: Way, relaxing: RelaxingCou
         tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in states]),
         contact_width=np.array([finger.contact_width(shape) for shape in states]),
         slipping=np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in states]),
+        responses=finger.responses_of(states) if relaxing is None else sed_alone(sed[:, 0]),
     )

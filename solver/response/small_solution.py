@@ -37,7 +37,7 @@ from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag
+from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
@@ -338,4 +338,5 @@ def _history(scene: Scene, finger: FingerModel, way: Sequence[Instant], over_tim
         tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
         contact_width=np.array([finger.contact_width(s) for s in states]),
         slipping=slipping / np.maximum(touching, 1),
+        responses=finger.responses_of(states) if over_time is None else sed_alone(sed[:, 0]),
     )

@@ -10,7 +10,10 @@ from daq_app.console import Console, WrongValue, number, table
 from solver.quantities import QUANTITIES, Quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from solver import Prediction, Receptor, Scene
+    from solver.response.rates import Rates
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
@@ -80,7 +83,10 @@ def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
 
 def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
     row = {} if deep is None else _row(found, deep)
-    console.result({**found.to_dict(), **({} if deep is None else {"row_at": {"depth": deep.depth, **row}})})
+    changes = _rates(found)
+    told = {name: {part: _none(rate) for part, rate in one._asdict().items()} for name, one in changes.items()}
+    further = {"rates": told, "row_at": {"depth": deep.depth, **row} if deep is not None else None}
+    console.result({**found.to_dict(), **{name: value for name, value in further.items() if value}})
     console.say(title)
     rows = [
         ["SED at the ending", number(found.sed_ending * 1e3, 5), "kPa", _percent(found.error_estimate)],
@@ -104,6 +110,10 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
     responses = [_response(one, *found.responses[one.name]) for one in QUANTITIES]
     console.say(table(responses, head=["", "", "", "error, estimated"]).lstrip("\n"))
+    if changes:
+        console.say("\nMean rates at the ending in the press, from break-away to full slip, and in the slide:")
+        mean = [[one.label, *map(_rate, changes[one.name]), _unit(one)] for one in QUANTITIES]
+        console.say(table(mean, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
     if deep is not None:
         console.say(
             f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; MPa and shares):"
@@ -121,6 +131,25 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.say(table(shown, head=["", ""]).lstrip("\n"))
     for warning in found.warnings:
         console.note(f"note: {warning}")
+
+
+def _rates(found: "Prediction") -> "Mapping[str, Rates]":
+    """Return the rates of every quantity; none where no course was asked for."""
+    from solver.response.rates import rates
+
+    return {} if found.history is None else rates(found.history)
+
+
+def _none(value: float) -> float | None:
+    return value if value == value else None
+
+
+def _rate(value: float) -> str:
+    return number(_none(value), 4)
+
+
+def _unit(quantity: Quantity) -> str:
+    return "MPa/s" if quantity.unit == "MPa" else "1/s"
 
 
 def _row(found: "Prediction", receptor: "Receptor") -> dict[str, list[float | None]]:

@@ -1,0 +1,40 @@
+"""How fast every quantity at the ending changes in the three parts of a course: press, break-away and slide."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.prediction import History
+from solver.quantities import NAMES
+
+ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
+
+
+class Rates(NamedTuple):
+    """Mean rates of one quantity, in its unit per second; nan for a part that a course has not."""
+
+    press: float  # from first touch until the bone moves along the surface
+    break_away: float  # from then until all of the contact slips
+    slide: float  # from then to the end: 0 once nothing changes any more
+
+
+def rates(history: History) -> Mapping[str, Rates]:
+    """Return the mean rates of every quantity, by its name. They have no error estimate."""
+    time = np.concatenate([[0.0], history.time])  # undeformed at first touch
+    values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
+    moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
+    first = int(moved[0]) if len(moved) else len(history.time)  # the instant before it, counted from first touch
+    slid = np.flatnonzero((history.slipping >= ALL) & (np.arange(len(history.time)) >= first))
+    last = int(slid[0]) + 1 if len(slid) else len(history.time)
+    ends = [(0, first), (first, last), (last, len(history.time))]
+    parts = np.array([_mean(time, values, begin, end) for begin, end in ends])
+    return {name: Rates(*row) for name, row in zip(NAMES, parts.T.tolist(), strict=True)}
+
+
+def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
+    """Return the mean rates (q,) between two instants."""
+    step = float(time[end] - time[begin])
+    grown: Array = values[end] - values[begin]
+    return grown / (step if step > 0.0 else np.nan)

@@ -1,0 +1,59 @@
+"""Mean rates of the responses: closed forms on made-up courses, and how they scale with the speed of the slide."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
+from solver.prediction import History
+from solver.quantities import NAMES
+from solver.response.rates import rates
+
+
+def course(time, bone_x, slipping, response):
+    none = np.zeros(len(time))
+    values = np.outer(response, np.arange(1.0, len(NAMES) + 1.0))
+    return History(np.array(time), np.array(bone_x), *[none] * 6, np.array(slipping), values)
+
+
+def test_parts_end_where_the_bone_begins_to_move_and_where_all_slips():
+    # Pressed to 4 in 1 s, back to 1 in 0.5 s until all slips, then to 2 in 2 s.
+    time, moved = [0.5, 1.0, 1.25, 1.5, 3.5], [0.0, 0.0, 0.1, 0.2, 1.0]
+    found = rates(course(time, moved, [0.0, 0.0, 0.5, 1.0, 1.0], [2.0, 4.0, 2.0, 1.0, 2.0]))
+    for number, name in enumerate(NAMES, 1):
+        assert found[name] == pytest.approx((4.0 * number, -6.0 * number, 0.5 * number))
+
+
+def test_a_course_without_a_part_has_no_rate_there():
+    pressed = rates(course([0.5, 1.0], [0.0, 0.0], [0.0, 0.0], [1.0, 2.0]))["sed"]
+    assert pressed.press == 2.0
+    assert np.isnan(pressed[1:]).all()
+    stuck = rates(course([1.0, 2.0], [0.0, 0.3], [0.0, 0.4], [1.0, 2.0]))["sed"]
+    assert (stuck.press, stuck.break_away) == (1.0, 1.0)
+    assert np.isnan(stuck.slide)
+
+
+@pytest.mark.parametrize("kinematics", ["small", "finite"])
+def test_twice_as_fast_a_slide_breaks_away_twice_as_fast_and_its_end_is_the_prediction(kinematics):
+    scene = Scene(friction=Friction(0.3), loading=Loading(1.0, "-x", 10.0), solve=Solve(kinematics, "history"))
+    found = [solve(replace(scene, loading=replace(scene.loading, speed=speed))) for speed in (10.0, 20.0)]
+    slow, fast = (rates(one.history) for one in found)
+    for name in NAMES:
+        assert fast[name].press == pytest.approx(slow[name].press, rel=1e-9)
+        assert fast[name].break_away == pytest.approx(2.0 * slow[name].break_away, rel=1e-6)
+    ends = found[0].history.responses[-1]
+    assert ends == pytest.approx([found[0].responses[name].value for name in NAMES], rel=1e-6)
+
+
+def test_where_tissues_relax_the_sed_alone_has_a_course():
+    relaxing = Material(0.08, 0.48, prony=(Relaxation(0.3, 0.5),))
+    scene = Scene(
+        friction=Friction(0.3),
+        loading=Loading(0.8, "+x"),
+        materials=replace(Materials(), dermis=relaxing),
+        solve=Solve("small", "history"),
+    )
+    found = rates(solve(scene).history)
+    assert np.isfinite(found["sed"]).all()
+    assert np.isnan(found["pressure"]).all()
