@@ -9,6 +9,8 @@ from sessions.statistics.dependent_correlations import POWER
 from sessions.statistics.rivals import MODEL, RESPONSES, Rival
 
 _ALPHA = 0.05
+MANY_SURFACES = 10_000  # beyond which nobody asks how many
+MANY = 3  # responses of the model that are no longer named one by one
 _LINE = 44  # characters that a line of a picture's title has room for
 
 
@@ -51,8 +53,9 @@ def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
     if not alike:
         return []
     order, them = ("orders", "it") if len(alike) == 1 else ("order", "them")
-    names = _listed([rival.name for rival in alike])
-    each = [f"{_rounded(rival.needed)} for {rival.name}" for rival in alike if rival.needed is not None]
+    names = _named([rival.name for rival in alike])
+    needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
+    each = [f"{_rounded(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
     said = (
         f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the SED does, so no order of "
         f"scores can tell {them} apart from it; "
@@ -60,8 +63,8 @@ def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
     if not each:
         return [f"{said}at the r seen here, no number of surfaces would."]
     return [
-        f"{said}at the r seen here, Steiger's test would need about so many surfaces for {POWER:.0%} power: "
-        f"{_listed(each)}.".replace("%", "\N{NO-BREAK SPACE}%")
+        f"{said}at the r seen here, Steiger's test would need about {' to '.join(each)} surfaces for {POWER:.0%} "
+        "power.".replace("%", "\N{NO-BREAK SPACE}%")
     ]
 
 
@@ -75,12 +78,12 @@ def _verdict(name: str, compared: Sequence[Rival]) -> list[str]:
             sides[side if found.differs(_ALPHA) else "neither"].append(rival.name)
     if not compared:
         return [f"Of {name} the surfaces are too few, or r too near 1, to compare the SED with any rival."]
-    told = [f"{_listed(sides[side])} {side} closely than the SED" for side in ("more", "less") if sides[side]]
+    told = [f"{_named(sides[side])} {side} closely than the SED" for side in ("more", "less") if sides[side]]
     said = f"the scores follow {' and '.join(told)} (p < 0.05, not corrected)" if told else ""
     if sides["neither"]:
         said += (
             "; they" if said else "the scores"
-        ) + f" tell no difference between the SED and {_listed(sides['neither'])}"
+        ) + f" tell no difference between the SED and {_named(sides['neither'])}"
     return [f"On {name}, {said}."]
 
 
@@ -120,6 +123,20 @@ def _or_dash(text: str | None) -> Cell:
     return Cell(NONE if text is None else text)
 
 
+def _named(names: Sequence[str]) -> str:
+    """Return a list of rivals, the model's other responses by their number where they are many.
+
+    >>> _named(["pressure", "T"]), _named([*RESPONSES, "T"])
+    ('pressure and T', 'all 9 other responses of the model and T')
+    """
+    responses = [name for name in names if name in RESPONSES]
+    if len(responses) < MANY:
+        return _listed(names)
+    how = "all" if len(responses) == len(RESPONSES) else f"{len(responses)} of the"
+    rest = [name for name in names if name not in RESPONSES]
+    return _listed([f"{how} {len(RESPONSES)} other responses of the model", *rest])
+
+
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(part for part in (", ".join(names[:-1]), names[-1] if names else "") if part)
 
@@ -127,7 +144,7 @@ def _listed(names: Sequence[str]) -> str:
 def _rounded(n: int) -> str:
     """Return a count with two figures, for it rests on correlations that are themselves uncertain.
 
-    >>> _rounded(2347), _rounded(8)
-    ('2300', '8')
+    >>> _rounded(2347), _rounded(8), _rounded(2_600_000)
+    ('2300', '8', 'more than 10 000')
     """
-    return f"{float(f'{n:.2g}'):.0f}"
+    return f"more than {MANY_SURFACES // 1000} 000" if n > MANY_SURFACES else f"{float(f'{n:.2g}'):.0f}"
