@@ -216,7 +216,7 @@ def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_su
     said = " ".join(summary(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
     needed = cases_needed(*correlations_of(report.experiments[0]))
-    assert f"{float(f'{needed:.2g}'):.0f} for µ of the model" in said
+    assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in said
 
 
 def correlations_of(experiment):
