@@ -52,6 +52,7 @@ class Trial:
     compared_with: int | None = (
         None  # where one of two is chosen: number of the trial just before, whose answer is none
     )
+    standard: bool = False  # the surface that all others of its block are compared with
 
 
 @dataclass(frozen=True, slots=True)
