@@ -71,6 +71,11 @@ class Block:
     ticks: int = 0  # marks on the line between its ends
     indentation_origin: Origin = "set"
 
+    @property
+    def standard(self) -> Stimulus | None:
+        """Return the stimulus that all others are compared with; None where there is none."""
+        return next((trial.stimulus for trial in self.trials if trial.standard), None)
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:

@@ -1,6 +1,5 @@
 """From comparisons with a standard to psychometric functions, by the friction of the subject's own strokes."""
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -49,12 +48,3 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
             for session, standard, index, second in [key]
         ]
     )
-
-
-def weber(jnd: float) -> float:
-    """Return a difference of logarithms as a share of the standard's magnitude.
-
-    >>> round(weber(math.log(1.18)), 2)
-    0.18
-    """
-    return math.expm1(jnd)
