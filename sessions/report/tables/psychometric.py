@@ -33,7 +33,11 @@ def psychometric_table(found: Iterable[Judged]) -> Table | None:
 
 def compared_with_standard(report: Report) -> list[Judged]:
     """Return what the table of a session is made of: one subject's functions."""
-    return [(e.name, {"this session": e.psychometric}, (None, None)) for e in report.experiments if e.psychometric is not None]
+    return [
+        (e.name, {"this session": e.psychometric}, (None, None))
+        for e in report.experiments
+        if e.psychometric is not None
+    ]
 
 
 def compared_in_study(study: StudyFindings) -> list[Judged]:
@@ -71,6 +75,8 @@ def _of_one(title: str, one: Psychometric) -> str:
     jnd = "bounded on neither side"
     if one.jnd.high is None and one.jnd.low is not None:
         jnd = f"above {digits(_percent(one.jnd.low), 0)} % of it"
+    elif one.jnd.value == 0.0 and one.jnd.high is not None:
+        jnd = f"below {digits(_percent(one.jnd.high), 0)} % of it"
     elif one.jnd.low is not None and one.jnd.high is not None:
         jnd = f"{digits(_percent(one.jnd.value), 0)} % of it{_range((one.jnd.low, one.jnd.high), _percent, 0)}"
     ends = None if one.pse.low is None or one.pse.high is None else (one.pse.low, one.pse.high)
