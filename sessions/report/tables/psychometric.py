@@ -11,6 +11,7 @@ from sessions.statistics.pooling.findings import StudyFindings
 from sessions.statistics.scales.psychometric import Profile, Psychometric
 
 Means = tuple[Average | None, Average | None]  # of log PSE and of log JND over subjects
+LEAST_OF_A_MEAN = 2  # subjects
 Judged = tuple[str, Mapping[str, Psychometric], Means]  # what was judged, each subject's function, and means
 
 
@@ -106,9 +107,9 @@ def _mean_percent(log_difference: float) -> float:
 
 
 def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
-    """Yield the row of the means over subjects, where there are any."""
+    """Yield the row of the means, where there are two subjects."""
     pse, jnd = means
-    if pse is None or jnd is None:
+    if pse is None or jnd is None or pse.n < LEAST_OF_A_MEAN:
         return
     cells = [
         notes.estimate(
@@ -116,12 +117,12 @@ def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
             places(after),
             None,
             None if ends is None else (unit(ends[0]), unit(ends[1])),
-            "of one alone",
+            "it takes two subjects",
         )
         for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0))
         for ends in [_ends(mean)]
     ]
-    yield (Cell("geometric mean"), Cell(f"{jnd.n} subjects"), *cells, Cell(NONE), Cell(NONE), Cell(NONE))
+    yield (Cell("geometric mean"), Cell(f"of {pse.n} and {jnd.n}"), *cells, Cell(NONE), Cell(NONE), Cell(NONE))
 
 
 def _row(who: str, one: Psychometric, notes: Notes) -> Row:

@@ -14,11 +14,14 @@ from sessions.statistics.scales.stevens import Exponent, stevens_exponent
 
 
 def choices(trials: Sequence[tuple[Visit, TrialRow]]) -> list[Choice]:
-    """Return every choice between the surface of a trial and the one stroked just before it."""
+    """Return every choice between the surface of a trial and the one stroked just before it, without a standard.
+
+    Pairs with a standard have a psychometric function; by them alone most scales would have no bound.
+    """
     return [
         Choice(visit.subject, row.before, row.index, row.choice == "first")
         for visit, row in trials
-        if row.choice is not None and row.before is not None
+        if row.choice is not None and row.before is not None and row.standard is None
     ]
 
 
