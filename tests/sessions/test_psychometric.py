@@ -80,7 +80,7 @@ def observer(rng, ratios, each, planted, correlation=0.0):
     out = []
     for ratio in ratios:
         for side in (-1, 1):
-            p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf((ratio - pse + order * side) / spread)
+            p = lapse / 2.0 + (1.0 - lapse) * special.ndtr((ratio - pse + order * side) / spread)
             if correlation:
                 beta = (1.0 - correlation) / correlation
                 p = rng.beta(p * beta, (1.0 - p) * beta)

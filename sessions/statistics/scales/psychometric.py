@@ -103,6 +103,17 @@ class _Task:
         self.side = np.array([float(one.order) for one in levels])
         self.k = np.array([float(one.chosen) for one in levels])
         self.n = np.array([float(one.presented) for one in levels])
+        # Of every answer: level, whether the comparison was chosen, how many like it came before, and how many at all.
+        rows = [
+            (n, yes, before, place)
+            for n, one in enumerate(levels)
+            for place in range(one.presented)
+            for yes in [place < one.chosen]
+            for before in [place if yes else place - one.chosen]
+        ]
+        self.level = np.array([row[0] for row in rows])
+        self.yes = np.array([row[1] for row in rows])
+        self.before, self.place = (np.array([float(row[n]) for row in rows]) for n in (2, 3))
         self.spread = float(np.std(self.x))
         # Root of what the log likelihood falls by at an end. Answers of one level hang together, so levels are counted.
         self.drop = math.sqrt(float(stats.f.ppf(CONFIDENCE, 1, len(levels))) / 2.0)
@@ -214,15 +225,12 @@ class _Task:
         """
         p, slopes = self._chances(at)
         theta = float(at[_SCATTER])
-        step = np.arange(int(self.n.max()))[None, :]
-        yes, no, all_of = (
-            1.0 / (chance + theta * step) * (step < count[:, None])
-            for chance, count in ((p[:, None], self.k), (1.0 - p[:, None], self.n - self.k), (1.0, self.n))
-        )
-        logs = [np.where(part > 0.0, -np.log(np.where(part > 0.0, part, 1.0)), 0.0).sum() for part in (yes, no, all_of)]
-        by_p = (yes.sum(axis=1) - no.sum(axis=1)) @ slopes
-        by_theta = ((yes + no - all_of) * step).sum()
-        return float(logs[0] + logs[1] - logs[2]), np.append(by_p, by_theta)
+        parts = np.where(self.yes, p[self.level], 1.0 - p[self.level]) + theta * self.before
+        wholes = 1.0 + theta * self.place
+        pull = np.where(self.yes, 1.0, -1.0) / parts
+        by_p = np.bincount(self.level, pull, len(p)) @ slopes
+        by_theta = (self.before / parts).sum() - (self.place / wholes).sum()
+        return float(np.log(parts).sum() - np.log(wholes).sum()), np.append(by_p, by_theta)
 
 
 def _jnd(slope: Profile, steepest: float, reach: float) -> Profile:
