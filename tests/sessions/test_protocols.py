@@ -351,6 +351,7 @@ def test_constant_stimuli_meet_every_comparison_with_the_standard_as_often_first
     [
         ("standard = 50", "standard = 30", r"line 23: blocks\[0\].standard = 30 .*one of indices"),
         ("repetitions = 10             # of", "repetitions = 9 # of", r"blocks\[0\].repetitions = 9 .*even"),
+        ("indices = [0, 20, 50, 80, 100]", "indices = [0, 50, 100]", r"blocks\[0\].indices = .*3 others"),
         ('answer = "choice"', 'answer = "number"', r"blocks\[0\].standard = 50 .*only a choice"),
     ],
 )

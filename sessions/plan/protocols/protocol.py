@@ -21,6 +21,7 @@ from sessions.toml_file import NotAllowed, SettingsError, load_toml
 
 FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1
+LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equality and any just noticeable difference
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 
 
@@ -76,6 +77,9 @@ class BlockOutline:
             return
         if self.standard not in self.indices:
             raise NotAllowed("standard", self.standard, f"it must be one of indices {list(self.indices)}")
+        if len(self.indices) < 1 + LEAST_COMPARISONS:
+            few = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
+            raise NotAllowed("indices", list(self.indices), few)
         if self.repetitions % 2:
             even = "with a standard it must be even, so that each comparison comes first as often as second"
             raise NotAllowed("repetitions", self.repetitions, even)
