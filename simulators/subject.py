@@ -22,6 +22,10 @@ class SubjectSettings:
     drift: float = 0.0  # a judgement rises by so much with each trial of its block
     carry_over: float = 0.0  # and by this share of how far the index judged before lay above the middle [-]
     moisture: float = 0.0  # standard deviation between fingers of the logarithm of their friction [-]
+    # Of two strokes that differ by this in log µ the one of more friction is chosen in Φ(1) = 84 %. A JND of 18 % of µ,
+    # so that comparisons of the paper's surfaces are answered neither by chance nor all alike [-].
+    discrimination: float = 0.25
+    lapse: float = 0.04  # share of choices by friction that are made by chance [-]
 
 
 class SimulatedSubject:
@@ -84,6 +88,16 @@ class SimulatedSubject:
         """Return how many points a score rises with each unit of µ felt, over subjects of these settings."""
         sense = 1.0 if descriptor == "stickiness" else -1.0
         return sense * self.settings.gain * self.settings.friction_weight * 100.0 / (STICKIEST - SLIPPERIEST)
+
+    def more_friction(self, first: Surface, second: Surface, trial: int, take: int = 1) -> bool:
+        """Say whether the first has more friction in the judgement of this subject, who answers anew in every trial.
+
+        A cumulative-normal observer of log µ: right with Φ(difference / discrimination), and by chance in a lapse.
+        """
+        draw = np.random.default_rng([self.seed, 6, trial, take])
+        if draw.uniform() < self.settings.lapse:
+            return bool(draw.uniform() < 0.5)
+        return bool(np.log(first.mu / second.mu) > draw.normal(0.0, self.settings.discrimination))
 
     def number(self, surface: Surface, repetition: int = 1) -> float:
         """Return the number on the subject's own scale: judgements in equal ratios, above 0, of any size.

@@ -197,8 +197,15 @@ class SimulatedPeople(DueEvents):
                 number = self._subject.number(self._surface(trial), self._takes[trial.number])
                 return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
             case steps.AskChoice(first, second):
-                more = self._judged(first) > self._judged(second)
+                more = self._more(first, second)
                 return steps.PairedChoice("first" if more else "second", at, 0, None, INPUT)
+
+    def _more(self, first: Trial, second: Trial) -> bool:
+        """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""
+        if first.standard or second.standard:
+            take = self._takes[second.number]
+            return self._subject.more_friction(self._surface(first), self._surface(second), second.number, take)
+        return self._judged(first) > self._judged(second)
 
     @property
     def _judging(self) -> float:

@@ -164,6 +164,7 @@ def trials(recording: Recording) -> Table:
             column("repetition", "", "from 1", (r.trial.repetition for r in records)),
             column("phase", "", "main; or practice, pre-evaluation", (r.trial.phase for r in records)),
             column("compared_with", "", "trial with the first of two", (r.trial.compared_with for r in records)),
+            column("standard", "", "1 where the others are compared with it", (int(r.trial.standard) for r in records)),
             column("outcome", "", OUTCOMES, (r.outcome for r in records)),
             column("score", "", "the subject's answer, 0 to 100", (r.score for r in records)),
             column("free_number", "", "the subject's answer on a scale of its own", (r.number for r in records)),

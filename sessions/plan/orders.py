@@ -69,6 +69,20 @@ def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item
     return tuple(found[str(key)] for key in shuffled(tuple(found), seed, name))
 
 
+def pairs_with(
+    standard: Item, items: Sequence[Item], seed: int, name: str, repetition: int
+) -> tuple[tuple[Item, Item], ...]:
+    """Return each item once with the standard, in an order by chance; over two repetitions it is first once.
+
+    Repetitions count from 1. The rule: of two repetitions, 2 k - 1 and 2 k, the first has those items first that
+    `shuffled` puts into the first half for "name/first/k", and the second has the others first. Pairs come in the order
+    `shuffled` gives for `name` in repetition 1, and for "name#repetition" after it.
+    """
+    leading = shuffled(items, seed, f"{name}/first/{(repetition + 1) // 2}")[: len(items) // 2]
+    order = shuffled(items, seed, name if repetition == 1 else f"{name}#{repetition}")
+    return tuple((item, standard) if (item in leading) == (repetition % 2 == 1) else (standard, item) for item in order)
+
+
 def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
     """Return `count` different labels of a letter and two digits, which tell nothing about what they stand on.
 

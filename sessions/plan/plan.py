@@ -52,6 +52,7 @@ class Trial:
     compared_with: int | None = (
         None  # where one of two is chosen: number of the trial just before, whose answer is none
     )
+    standard: bool = False  # the surface that all others of its block are compared with
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +70,11 @@ class Block:
     strokes_allowed: int = 1  # in a trial; every further one is recorded and flagged
     ticks: int = 0  # marks on the line between its ends
     indentation_origin: Origin = "set"
+
+    @property
+    def standard(self) -> Stimulus | None:
+        """Return the stimulus that all others are compared with; None where there is none."""
+        return next((trial.stimulus for trial in self.trials if trial.standard), None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from sessions.report.contents import (
     TextFile,
     Trace,
 )
-from sessions.report.experiments import experiments, quantities
+from sessions.report.experiments import experiments, quantities, with_psychometric
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Seds
@@ -85,6 +85,7 @@ def findings(
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
+    judged = experiments(recording.plan, tables, quantities(predicted, found), more.paths, analysis.settings.area)
     return Report(
         title=_title(recording),
         session=recording.folder.name,
@@ -96,9 +97,7 @@ def findings(
         excluded=facts.excluded(recording, analysis, found, tables),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
-        experiments=experiments(
-            recording.plan, tables, quantities(predicted, found), more.paths, analysis.settings.area
-        ),
+        experiments=with_psychometric(judged, recording, analysis),
         course=course(recording),
         strokes=found,
         predictions=predicted,

@@ -9,6 +9,7 @@ from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.rivals import Rival
+from sessions.statistics.scales.psychometric import Psychometric
 from sessions.statistics.scores import MeanScore, Relation
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class Experiment:
     index_relation: Relation | None  # SED [MPa] against index
     rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
     paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
+    psychometric: Psychometric | None = None  # of comparisons with a standard, where the block has one
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,14 +2,19 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from sessions.plan.plan import Block, SessionPlan
+from sessions.recording.reader import Recording
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Seds, path_findings
 from sessions.statistics.rivals import FIELDS, GIVEN, MODEL, NAMES, RESPONSES, rivals_of_means
+from sessions.statistics.scales.constant_stimuli import comparison, function_of
+from sessions.statistics.scales.psychometric import Psychometric
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
+from sessions.strokes import Analysis
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.friction import rule_for
 
@@ -29,6 +34,32 @@ def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[Strok
                 if value is not None:
                     given[name][one.experiment, one.index].append(value)
     return {name: {key: float(np.mean(all_of)) for key, all_of in values.items()} for name, values in given.items()}
+
+
+def with_psychometric(found: Sequence[Experiment], recording: Recording, analysis: Analysis) -> tuple[Experiment, ...]:
+    """Return the experiments, those of blocks with a standard with the subject's psychometric function."""
+    blocks = {block.name: block for block in recording.plan.blocks if block.standard is not None}
+    return tuple(
+        replace(one, psychometric=_psychometric(blocks[one.name], recording, analysis)) if one.name in blocks else one
+        for one in found
+    )
+
+
+def _psychometric(block: Block, recording: Recording, analysis: Analysis) -> Psychometric:
+    index = {trial.number: trial.stimulus.known_index for trial in block.trials}
+    standard = next(index[trial.number] for trial in block.trials if trial.standard)
+    friction: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for one in analysis.friction:
+        if one.trial in index and one.mu is not None and one.mu > 0.0:
+            friction["", index[one.trial]].append(one.mu)
+    answers = [
+        comparison("", standard, (index[first], index[record.trial.number]), record.choice)
+        for record in recording.trials
+        if record.choice is not None and record.trial.number in index
+        for first in [record.trial.compared_with]
+        if first is not None
+    ]
+    return function_of(answers, friction)
 
 
 def experiments(

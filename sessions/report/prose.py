@@ -3,6 +3,7 @@
 from sessions.report import Experiment, Report
 from sessions.report.robustness import robustness
 from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.tables.psychometric import compared_with_standard, psychometric_sentences
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.wording import correlation, digits, ends_of, plural, spread_share
 from sessions.statistics.scores import Relation
@@ -32,6 +33,8 @@ def summary(report: Report) -> tuple[str, ...]:
         )
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
+    for judged in compared_with_standard(report):
+        sentences += psychometric_sentences(judged)
     for experiment in report.experiments:
         seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
         if seds:

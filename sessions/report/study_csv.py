@@ -29,6 +29,7 @@ _MEANING: Mapping[str, tuple[str, str]] = {
     "score": ("", "answer on the line, 0 to 100"),
     "estimate": ("", "number on the subject's own scale, where numbers were asked for"),
     "choice": ("", "the subject's answer where two were compared: first or second"),
+    "standard": ("", "index of the surface that all others of the block are compared with; empty where there is none"),
     "rule": ("", "which mu the model got: maximum, or mean over the steady window"),
     "mu": ("", "coefficient of friction that the model got"),
     "mu_low": ("", "lower end of its 95 % bootstrap interval"),

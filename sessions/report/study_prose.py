@@ -5,12 +5,14 @@ import shlex
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 from sessions.prediction.model_facts import UNKNOWNS
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
 from sessions.report.tables.multiverse import paths_sentence
+from sessions.report.tables.psychometric import compared_in_study, psychometric_sentences
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import scale_sentences
 from sessions.report.wording import correlation, digits, plural, significant
@@ -32,6 +34,7 @@ def summary(study: StudyFindings) -> list[str]:
         said += rivals_sentences(f"{one.descriptor}, within subjects", one.rivals)
         said += scale_sentences(one)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    said += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
     if study.friction is not None:
         f = study.friction
         said.append(

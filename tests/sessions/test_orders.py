@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sessions.plan.orders import drawn, opaque_codes, pairs, shuffled, williams
+from sessions.plan.orders import drawn, opaque_codes, pairs, pairs_with, shuffled, williams
 
 STIMULI = (0, 20, 50, 80, 100)
 
@@ -117,3 +117,12 @@ def test_every_two_are_compared_once_and_each_is_first_as_often_as_second(seed, 
 
 def test_the_order_of_pairs_changes_with_the_seed():
     assert len({pairs(STIMULI, seed, "b") for seed in range(50)}) > 45
+
+
+@given(seed=st.integers(0, 2**31 - 1), count=st.integers(1, 9))
+def test_in_two_repetitions_each_item_meets_the_standard_once_before_it_and_once_after(seed, count):
+    odd, even = (pairs_with("S", range(count), seed, "b", repetition) for repetition in (5, 6))
+    assert all("S" in pair for pair in (*odd, *even))
+    assert sorted((a, b) for a, b in odd if b == "S") == sorted((b, a) for a, b in even if a == "S")
+    assert len(odd) == len(even) == len(set(odd) | set(even)) / 2 == count
+    assert sum(b == "S" for _, b in odd) == count // 2

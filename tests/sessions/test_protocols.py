@@ -333,3 +333,32 @@ indices = INDICES
 instruction = "Push your finger once away from you."
 scale_ends = ["not soft at all", "as soft as can be"]
 """
+
+
+def test_constant_stimuli_meet_every_comparison_with_the_standard_as_often_first_as_second():
+    for block, standard in zip(plan(protocol("constant-stimuli"), "S01", 1).blocks, (50, 55), strict=True):
+        met = Counter(zip(indices(block)[::2], indices(block)[1::2], strict=True))
+        others = set(indices(block)) - {standard}
+        assert met == {pair: 5 for other in others for pair in ((standard, other), (other, standard))}
+        assert {trial.stimulus.index for trial in block.trials if trial.standard} == {standard}
+        rounds = [tuple(indices(block)[8 * n : 8 * n + 8]) for n in range(10)]
+        assert all(set(one) - {standard} == others for one in rounds)
+        assert len(set(rounds)) > 8
+
+
+@pytest.mark.parametrize(
+    ("was", "written", "named"),
+    [
+        ("standard = 50", "standard = 30", r"line 23: blocks\[0\].standard = 30 .*one of indices"),
+        ("repetitions = 10             # of", "repetitions = 9 # of", r"blocks\[0\].repetitions = 9 .*even"),
+        ("indices = [0, 20, 50, 80, 100]", "indices = [0, 50, 100]", r"blocks\[0\].indices = .*3 others"),
+        ('answer = "choice"', 'answer = "number"', r"blocks\[0\].standard = 50 .*only a choice"),
+    ],
+)
+def test_a_standard_that_cannot_be_is_refused(tmp_path, was, written, named):
+    text = (FOLDER / "constant-stimuli.toml").read_text()
+    assert was in text
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(text.replace(was, written))
+    with pytest.raises(SettingsError, match=named):
+        protocol(wrong)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sessions.report.tables.scales import scale_sentences, scales_table
-from sessions.statistics.pooling.answers import choices, exponent
+from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent
 from sessions.statistics.scales.paired import MODELS, Choice, consistence, paired_scale
 
 
@@ -50,12 +50,22 @@ def test_without_a_finite_scale_the_rows_have_the_reason():
 
 def row(subject, **values):
     visit = SimpleNamespace(subject=subject)
-    return visit, SimpleNamespace(**{"choice": None, "before": None, "estimate": None, "mu": None, **values})
+    return visit, SimpleNamespace(
+        **{"choice": None, "before": None, "standard": None, "estimate": None, "mu": None, **values}
+    )
 
 
 def test_a_choice_is_between_the_surface_of_its_trial_and_the_one_before():
     trials = [row("P1", index=20), row("P1", index=80, before=20, choice="first"), row("P1", index=50, choice="second")]
     assert choices(trials) == [Choice("P1", 20, 80, True)]
+
+
+def test_a_choice_against_a_standard_is_of_no_scale_but_of_a_psychometric_function():
+    trials = [row("P1", index=20), row("P1", index=80, before=20, choice="first", standard=80)]
+    assert choices(trials) == []
+    assert list(
+        constant_stimuli([(SimpleNamespace(subject="P1", session="a"), one) for _, one in trials]).functions
+    ) == ["P1"]
 
 
 def test_estimates_without_friction_have_no_exponent_and_say_why():

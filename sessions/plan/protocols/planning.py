@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
-from sessions.plan.orders import drawn, pairs, shuffled, williams
+from sessions.plan.orders import Item, drawn, pairs, pairs_with, shuffled, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
     PROXIMAL_TO_DISTAL,
@@ -211,13 +211,23 @@ class _Blocks:
             name = outline.name if repetition == 1 else f"{outline.name}#{repetition}"
             if self.protocol.scale.answer == "choice":
                 by_code = self._by_code(outline)
-                drawn_pairs = pairs(tuple(by_code), self.seed, name)
+                drawn_pairs = self._pairs(outline, tuple(by_code), repetition, name)
                 made.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
             elif self.row is not None:
                 made.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
                 made.append(self._shuffled(outline, name, [order[0] for order in made]))
         return made
+
+    def _pairs(
+        self, outline: BlockOutline, codes: Sequence[str], repetition: int, name: str
+    ) -> tuple[tuple[Item, Item], ...]:
+        """Return the pairs of one repetition: every two, or each with the standard where there is one."""
+        if outline.standard is None:
+            return pairs(codes, self.seed, name)
+        standard = self.labels[outline.descriptor, outline.standard]
+        others = [code for code in codes if code != standard]
+        return pairs_with(standard, others, self.seed, outline.name, repetition)
 
     def _shuffled(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
         """Return an order by chance that meets the protocol's constraints. Codes are drawn: an order tells no index."""
@@ -263,6 +273,7 @@ class _Blocks:
                     phase=phase,
                     answer="none" if answer == "choice" and not second else answer,
                     compared_with=trials[-1].number if second else None,
+                    standard=index == outline.standard,
                 )
             )
         return Block(

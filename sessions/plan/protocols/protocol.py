@@ -21,6 +21,7 @@ from sessions.toml_file import NotAllowed, SettingsError, load_toml
 
 FOLDER = Path(__file__).parent
 LARGEST_SEED = 2**31 - 1
+LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equality and any just noticeable difference
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 
 
@@ -40,6 +41,7 @@ class BlockOutline:
     repetitions: int = 1  # of each stimulus, or of each pair
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
     planted_friction: tuple[float, ...] = ()  # µ of each of `indices` on the simulated bench, for rehearsals [-]
+    standard: int | None = None  # of `indices`: every pair is of it and another; None: every two are compared
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -61,6 +63,7 @@ class BlockOutline:
         if not set(self.practice) <= set(self.indices):
             raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
         self._check_planted()
+        self._check_standard()
 
     def _check_planted(self) -> None:
         if self.planted_friction and len(self.planted_friction) != len(self.indices):
@@ -68,6 +71,18 @@ class BlockOutline:
             raise NotAllowed("planted_friction", list(self.planted_friction), count)
         if not all(0.01 <= mu <= 5.0 for mu in self.planted_friction):
             raise NotAllowed("planted_friction", list(self.planted_friction), "each must lie between 0.01 and 5")
+
+    def _check_standard(self) -> None:
+        if self.standard is None:
+            return
+        if self.standard not in self.indices:
+            raise NotAllowed("standard", self.standard, f"it must be one of indices {list(self.indices)}")
+        if len(self.indices) < 1 + LEAST_COMPARISONS:
+            few = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
+            raise NotAllowed("indices", list(self.indices), few)
+        if self.repetitions % 2:
+            even = "with a standard it must be even, so that each comparison comes first as often as second"
+            raise NotAllowed("repetitions", self.repetitions, even)
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,6 +272,8 @@ class Protocol:
             raise NotAllowed(f"{key}.question", block.question, f"say what the subject is asked for a {answer}")
         if answer == "choice" and len(block.indices) < 2:
             raise NotAllowed(f"{key}.indices", list(block.indices), "a choice takes at least two")
+        if answer != "choice" and block.standard is not None:
+            raise NotAllowed(f"{key}.standard", block.standard, "only a choice of two compares with a standard")
         if answer == "choice" and block.practice and len(block.practice) < 2:
             raise NotAllowed(f"{key}.practice", list(block.practice), "a choice takes at least two")
 

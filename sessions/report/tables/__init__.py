@@ -11,6 +11,7 @@ from sessions.report.tables.predictions import (
     force_table,
     prediction_table,
 )
+from sessions.report.tables.psychometric import compared_with_standard, psychometric_table
 from sessions.report.tables.rivals import rivals_table
 from sessions.report.tables.scores import answer_tables, relation_table, score_table
 from sessions.report.tables.strokes import course_table, planted_table, stroke_table
@@ -22,7 +23,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
     compared = ((e.name, e.rivals) for e in report.experiments)
     sections = {
-        "scores": (score_table(report), *answer_tables(report)),
+        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
         "strokes": (stroke_table(report), course_table(report)),
         "predictions": (
             prediction_table(report),

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from sessions.report.predictions import model_in_short
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
+from sessions.report.tables.psychometric import compared_in_study, psychometric_table
 from sessions.report.tables.rivals import rivals_table
 from sessions.report.tables.scales import scales_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
@@ -30,6 +31,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
             _agreement(study),
             _estimates(study),
             scales_table(study.descriptors),
+            psychometric_table(compared_in_study(study)),
         ),
         "surfaces": (_surfaces(study), _forces(study)),
         "relation": (_relation(study), _rivals(study), models_table(study)),

@@ -1,19 +1,55 @@
 """What the trials of a study answer otherwise than on a line: choices between two, and magnitude estimates."""
 
-from collections.abc import Sequence
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+from sessions.statistics.pooling.averages import Average, average
 from sessions.statistics.pooling.visit import TrialRow, Visit
+from sessions.statistics.scales.constant_stimuli import Comparison, comparison, function_of
 from sessions.statistics.scales.paired import Choice
+from sessions.statistics.scales.psychometric import Psychometric
 from sessions.statistics.scales.stevens import Exponent, stevens_exponent
 
 
 def choices(trials: Sequence[tuple[Visit, TrialRow]]) -> list[Choice]:
-    """Return every choice between the surface of a trial and the one stroked just before it."""
+    """Return every choice between the surface of a trial and the one stroked just before it, without a standard.
+
+    Pairs with a standard have a psychometric function; by them alone most scales would have no bound.
+    """
     return [
         Choice(visit.subject, row.before, row.index, row.choice == "first")
         for visit, row in trials
-        if row.choice is not None and row.before is not None
+        if row.choice is not None and row.before is not None and row.standard is None
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantStimuli:
+    """What comparisons with a standard say."""
+
+    functions: Mapping[str, Psychometric]  # of each subject
+    pse: Average | None  # of its logarithm, over subjects who have one
+    jnd: Average | None  # of its logarithm, over subjects whose JND is above 0
+
+
+def constant_stimuli(trials: Sequence[tuple[Visit, TrialRow]]) -> ConstantStimuli | None:
+    """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
+    answers: defaultdict[str, list[Comparison]] = defaultdict(list)
+    friction: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for visit, row in trials:
+        if row.standard is not None and row.mu is not None and row.mu > 0.0:
+            friction[visit.session, row.index].append(row.mu)
+        if row.standard is not None and row.choice is not None and row.before is not None:
+            pair = row.before, row.index
+            answers[visit.subject].append(comparison(visit.session, row.standard, pair, row.choice))
+    if not answers:
+        return None
+    functions = {subject: function_of(given, friction) for subject, given in sorted(answers.items())}
+    pse = [one.pse.value for one in functions.values() if one.pse is not None]
+    jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
+    return ConstantStimuli(functions, average(pse), average(jnd))
 
 
 def exponent(trials: Sequence[tuple[Visit, TrialRow]]) -> Exponent | None:

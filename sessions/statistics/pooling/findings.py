@@ -6,6 +6,7 @@ from typing import Any
 
 from sessions.statistics.mixed_model import MixedModel
 from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.pooling.answers import ConstantStimuli
 from sessions.statistics.pooling.averages import Average, Estimates
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.visit import Visit, VisitOptions
@@ -91,6 +92,7 @@ class DescriptorFindings:
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
     paths: tuple[PathFinding, ...]  # () where they were not asked for
+    constant_stimuli: ConstantStimuli | None = None  # None where nobody compared with a standard
 
 
 @dataclass(frozen=True, slots=True)

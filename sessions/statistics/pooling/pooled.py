@@ -10,7 +10,7 @@ import numpy as np
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
 from sessions.statistics.multiverse import PathTrial, path_findings
-from sessions.statistics.pooling.answers import choices, exponent
+from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent
 from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
 from sessions.statistics.pooling.exclusions import Exclusion, decided
 from sessions.statistics.pooling.findings import (
@@ -152,6 +152,7 @@ def _descriptor(
             options.area,
             within=True,
         ),
+        constant_stimuli=constant_stimuli(trials),
     )
 
 

@@ -23,7 +23,7 @@ from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, ana
 from sessions.strokes.bootstrap import drawn_from
 from sessions.strokes.contact_area import FIXED, AreaLaw
 
-FORM = 10  # raised when a row holds something else: what was stored before is then computed anew
+FORM = 11  # raised when a row holds something else: what was stored before is then computed anew
 
 
 NO_INTERVAL = "intervals of the SED were not asked for"
@@ -58,6 +58,7 @@ class TrialRow:
     score: float | None
     estimate: float | None = None  # on a scale of the subject's own
     choice: str | None = None  # of the two compared: first or second
+    standard: int | None = None  # index that all others of the block are compared with
     rule: str = ""  # which mu the model got
     mu: float | None = None
     mu_low: float | None = None  # 95 % bootstrap interval of mu, as of all that was measured: `BootstrapSettings.kind`
@@ -185,6 +186,7 @@ def _row(
         score=record.score,
         estimate=record.number,
         choice=record.choice,
+        standard=None if block.standard is None else block.standard.known_index,
     )
     told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
     flaws = tuple(str(name) for name in told)

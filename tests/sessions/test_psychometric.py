@@ -1,0 +1,157 @@
+"""Psychometric functions: against R's probit, psignifit, another maximiser, and planted observers."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import optimize, special, stats
+
+from sessions.statistics.scales.psychometric import QUARTILE, Level, psychometric
+
+# Brightness of a light by one of 35 units (Gegenfurtner 1992, Behav. Res. Methods 24, 560): level, presented, brighter.
+BRIGHTNESS = ((10, 49, 2), (20, 48, 3), (30, 48, 13), (40, 50, 31), (50, 47, 38), (60, 49, 48))
+SCATTERED = ((-0.6, 1), (-0.4, 4), (-0.2, 3), (-0.1, 10), (0.1, 12), (0.2, 10), (0.4, 19), (0.6, 18))  # of 20 each
+
+
+def brightness():
+    return [Level(float(at), brighter, presented) for at, presented, brighter in BRIGHTNESS]
+
+
+def scattered():
+    return [Level(at, chosen, 20) for at, chosen in SCATTERED]
+
+
+def test_without_lapses_the_function_is_the_probit_that_r_prints():
+    # R: glm(cbind(Yes, Trial - Yes) ~ Intensity, binomial(link = "probit")) prints -2.874139, 0.077472, deviance 2.8119
+    found = psychometric(brightness(), lapse=0.0)
+    assert found.pse.value == pytest.approx(2.874139 / 0.077472, abs=3e-4)
+    assert found.jnd.value == pytest.approx(0.6744898 / 0.077472, abs=1e-4)
+    assert found.deviance == pytest.approx(2.8119, abs=5e-5)
+    assert (found.freedom, found.lapse.value, found.correlation.value, found.answers) == (4, 0.0, 0.0, 291)
+
+
+@pytest.mark.parametrize(
+    ("levels", "pse", "jnd", "lapse", "correlation"),
+    [  # psignifit 4.3: experiment_type="equal asymptote", sigmoid="norm", flat priors, its MAP in these terms
+        (brightness(), 37.40263, 7.58846, 0.041513, 0.0),
+        (scattered(), 0.025836, 0.249896, 0.040744, 0.005152),
+    ],
+)
+def test_with_lapses_and_scatter_the_function_is_the_one_that_psignifit_finds(levels, pse, jnd, lapse, correlation):
+    found = psychometric(levels)
+    assert found.pse.value == pytest.approx(pse, rel=5e-4)
+    assert found.jnd.value == pytest.approx(jnd, rel=5e-4)
+    assert found.lapse.value == pytest.approx(lapse, rel=2e-3)
+    assert found.correlation.value == pytest.approx(correlation, abs=2e-5)
+
+
+def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelihood_greatest():
+    def lost(at, levels):
+        pse, slope, lapse, correlation = at
+        if not (0.0 <= lapse <= 0.5 and 0.0 < correlation < 0.5):
+            return 1e9
+        beta = (1.0 - correlation) / correlation
+        total = 0.0
+        for one in levels:
+            p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (one.log_ratio - pse))
+            total -= stats.betabinom.logpmf(one.chosen, one.presented, p * beta, (1.0 - p) * beta)
+        return total
+
+    found = psychometric(scattered())
+    best = optimize.minimize(
+        lost, [0.0, 3.0, 0.05, 0.01], (scattered(),), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-11}
+    )
+    assert [
+        found.pse.value, QUARTILE / found.jnd.value, found.lapse.value, found.correlation.value
+    ] == pytest.approx(best.x, rel=1e-4)  # fmt: skip
+    coefficient = sum(math.log(math.comb(one.presented, one.chosen)) for one in scattered())
+    assert found.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
+    # An end of the interval: with the PSE held there, the greatest log likelihood is half of F's quantile less.
+    held = optimize.minimize(
+        lambda at: lost([found.pse.high, *at], scattered()), best.x[1:], method="Nelder-Mead",
+        options={"xatol": 1e-7, "fatol": 1e-10},
+    )  # fmt: skip
+    assert held.fun - best.fun == pytest.approx(stats.f.ppf(0.95, 1, 8) / 2.0, abs=5e-3)
+
+
+def observer(rng, ratios, each, planted, correlation=0.0):
+    """Return the answers of an observer to `each` presentations of every ratio in either order."""
+    pse, spread, lapse, order = planted
+    out = []
+    for ratio in ratios:
+        for side in (-1, 1):
+            p = lapse / 2.0 + (1.0 - lapse) * special.ndtr((ratio - pse + order * side) / spread)
+            if correlation:
+                beta = (1.0 - correlation) / correlation
+                p = rng.beta(p * beta, (1.0 - p) * beta)
+            out.append(Level(ratio, int(rng.binomial(each, p)), each, side))
+    return out
+
+
+SIX = (-0.45, -0.3, -0.15, 0.15, 0.3, 0.45)
+STICKY = tuple(math.log(mu / 0.48) for mu in (0.28, 0.44, 0.64, 0.67))  # of the paper's surfaces by index 50
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ratios", "lapse", "correlation"), [(SIX, 0.04, 0.0), (SIX, 0.0, 0.0), (STICKY, 0.04, 0.0), (SIX, 0.04, 0.05)]
+)
+def test_intervals_hold_planted_observers_in_90_to_98_of_a_hundred(ratios, lapse, correlation):
+    planted, held, counted = (0.05, 0.25, lapse, 0.04), np.zeros(4), 0
+    for study in range(200):
+        found = psychometric(observer(np.random.default_rng([5, study]), ratios, 10, planted, correlation))
+        if found.reason:
+            continue
+        counted += 1
+        truth = (planted[0], planted[1] * QUARTILE, planted[2], planted[3])
+        ends = (found.pse, found.jnd, found.lapse, found.order)
+        held += [
+            (one.low is None or one.low <= true) and (one.high is None or true <= one.high)
+            for one, true in zip(ends, truth, strict=True)
+        ]
+    assert counted >= 198
+    assert 0.90 <= held.sum() / (4 * counted) <= 0.98
+
+
+def test_an_observer_who_says_the_opposite_has_the_same_pse_and_jnd():
+    levels = observer(np.random.default_rng(1), SIX, 40, (0.05, 0.25, 0.02, 0.0))
+    there = psychometric(levels)
+    back = psychometric([Level(one.log_ratio, one.presented - one.chosen, one.presented, one.order) for one in levels])
+    assert (there.rises, back.rises) == (True, False)
+    for name in ("pse", "jnd", "lapse"):
+        assert getattr(back, name).value == pytest.approx(getattr(there, name).value, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("levels", "reason"),
+    [
+        ([], "takes 3 comparisons"),
+        ([Level(-0.2, 2, 10), Level(0.2, 8, 10)], "takes 3 comparisons"),
+        ([Level(x, 5, 10) for x in SIX], "hardly go with friction"),
+        ([Level(x, 10, 10) for x in SIX], "hardly go with friction"),
+    ],
+)
+def test_answers_that_fix_no_function_say_why(levels, reason):
+    found = psychometric(levels)
+    assert found.pse is None
+    assert reason in found.reason
+
+
+def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on_both_sides():
+    found = psychometric([Level(x, 10 * (x > 0.0), 10) for x in SIX])
+    assert (found.jnd.value, found.jnd.low) == (0.0, 0.0)
+
+    # Ten answers all right, as likely as may be: a beta law of uniform shape, Γ(p + 10) / (Γ(p) 10!) at p = Φ(slope x)
+    def loss(slope):
+        p = stats.norm.cdf(slope * np.array(SIX[3:]))
+        return -2.0 * np.sum(special.gammaln(p + 10) - special.gammaln(p) - special.gammaln(11))
+
+    slope = optimize.brentq(lambda at: loss(at) - stats.f.ppf(0.95, 1, 6) / 2.0, 1.0, 50.0)
+    assert found.jnd.high == pytest.approx(QUARTILE / slope, rel=0.01)
+    assert -0.3 < found.pse.low < -0.14 < 0.14 < found.pse.high < 0.3
+
+
+def test_a_jnd_that_the_answers_do_not_bound_has_no_upper_end():
+    found = psychometric([Level(-0.3, 3, 10), Level(-0.1, 4, 10), Level(0.1, 6, 10), Level(0.3, 7, 10)], lapse=0.0)
+    assert found.jnd.high is None
+    assert found.jnd.low > 0.0
