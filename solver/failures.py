@@ -88,9 +88,9 @@ def followed_to(depth: float, travel: float, reason: object) -> NotConverged:
     """
     lifted = f"where the drag holds the bone {-depth:.4g} mm above first touch"
     there = f"{depth:.4g} mm of indentation" if depth >= 0.0 else lifted
-    slid = f" and {abs(travel):.4g} mm of sliding" if travel else ""
+    slip = f" and {abs(travel):.4g} mm of sliding" if travel else ""
     return NotConverged(
-        f"the course was followed to {there}{slid}, and in the smallest steps no further: {reason}; ask for less "
+        f"the course was followed to {there}{slip}, and in the smallest steps no further: {reason}; ask for less "
         "friction, drag or depth."
     )
 

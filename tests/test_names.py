@@ -13,7 +13,7 @@ GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 ROWS = [line.split("|") for line in GLOSSARY.splitlines() if line.startswith("|")]
 NOT_THIS = sorted({name for row in ROWS for name in re.findall(r"`(\w+)`", row[3])})
 # The solver still has these; elsewhere they are not used.
-ONLY_IN_SOLVER = {"Pull", "evidence", "slid"}
+ONLY_IN_SOLVER = {"evidence"}
 
 
 def identifiers(file: Path) -> Iterator[str]:

@@ -11,7 +11,7 @@ from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from sessions.strokes import Analysis
 from solver import Finger, Prediction, Scene, SolveFailure, solve_many
 from solver.equilibrium.expected_depth import matching_depths
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 
 
@@ -20,7 +20,7 @@ class Way:
     """How the model came to its answer for one trial, for pictures of it."""
 
     scene: Scene
-    finger: FingerModel
+    finger: LinearFinger
     march: tuple[Instant, ...] | None  # None where it has none that can be drawn
 
 
@@ -64,7 +64,7 @@ def predict(
         return _filled(prepared[solved[at]], found[2 * at], found[2 * at + 1], depths[at])
 
     def seen(
-        number: int, answer: Prediction | SolveFailure, finger: FingerModel, march: tuple[Instant, ...] | None
+        number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
     ) -> None:
         found[number] = answer
         at, back = divmod(number, 2)

@@ -12,7 +12,7 @@ from solver._kernels.arguments import (
     ContactStates,
     ContactSystem,
     ForceControl,
-    LoadState,
+    LoadArguments,
     Skin,
     SkinPosition,
     StateChanges,
@@ -28,11 +28,11 @@ UNSETTLED, SINGULAR = 0, -1  # what `solve_active_set` returns in place of the n
 
 @compiled
 def contradictions(
-    states: ContactStates, above: Array, slid: Array, length: Array, load: LoadState, changes: StateChanges
+    states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments, changes: StateChanges
 ) -> int:
     """Fill the `changes` of state and sense that a solution calls for; return how many nodes contradict it.
 
-    `above` (k,) are heights over the surface, `slid` (k,) is how far each node went along +x relative to the surface
+    `above` (k,) are heights over the surface, `slip` (k,) is how far each node went along +x relative to the surface
     since the last step, `length` (k,) as in `bounded_length`. Where the load has a sense every touching node slips, the
     friction force pointing there; else nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
     of a node that comes to touch: its own drag may lift it off by more than it is pressed.
@@ -74,8 +74,8 @@ def contradictions(
                 if abs(reaction[i, 0]) > most + slack:
                     way = 1 if reaction[i, 0] > 0.0 else -1
                     now, bad = SHEAR_LIMITED if bound < coulomb else SLIP, abs(reaction[i, 0]) - most
-            elif slid[i] * sense[i] > small and most > 0.0:
-                now, bad = STICK, slid[i] * sense[i] * by_height
+            elif slip[i] * sense[i] > small and most > 0.0:
+                now, bad = STICK, slip[i] * sense[i] * by_height
             else:
                 now, bad = slips, reaction[i, 1]
         if now != was or (now >= SLIP and way != sense[i]):
@@ -87,11 +87,11 @@ def contradictions(
 
 
 @compiled
-def update_contact_states(states: ContactStates, above: Array, slid: Array, length: Array, load: LoadState) -> int:
+def update_contact_states(states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments) -> int:
     """Change `states` in place where the solution contradicts them; return how many were changed."""
     size = above.shape[0]
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
-    changed = contradictions(states, above, slid, length, load, changes)
+    changed = contradictions(states, above, slip, length, load, changes)
     for i in range(size):
         states.state[i], states.sense[i] = changes.state[i], changes.sense[i]
     return changed
@@ -102,7 +102,7 @@ def solve_active_set(
     body: CondensedArrays,
     skin: Skin,
     states: ContactStates,
-    load: LoadState,
+    load: LoadArguments,
     position: SkinPosition,
     control: ForceControl,
     rounds: int,
@@ -121,7 +121,7 @@ def solve_active_set(
     length, free, matrix, right, steps, motion = system
     mu, tau, kind = load.mu, load.tau, control.kind
     size, by_forces = state.shape[0], compliance.shape[0] > 0
-    slid = np.empty(size)
+    slip = np.empty(size)
     sums = np.zeros((2, 2 * size))  # how the force of the surface along x and y follows steps, or forces
     loads, answer, untouched = np.zeros(2), steps, np.zeros(2 * size)
     if by_forces:
@@ -200,9 +200,9 @@ def solve_active_set(
             break
         for i in range(size):
             ahead[i], reached[i] = x[i] + steps[2 * i, 0], above[i] + steps[2 * i + 1, 0] - motion[0]
-            slid[i] = 0.0 if loose else ahead[i] - anchor[i] - motion[1]
+            slip[i] = 0.0 if loose else ahead[i] - anchor[i] - motion[1]
         bounded_length(ahead, skin, state, mu, length)
-        if contradictions(states, reached, slid, length, load, changes) == 0:
+        if contradictions(states, reached, slip, length, load, changes) == 0:
             return turn + 1
         worst = 0
         for i in range(size):
@@ -215,7 +215,7 @@ def solve_active_set(
                 entered[i] += 1  # a node that comes to touch again and again slips every other time
                 if entered[i] % 2 == 0:
                     if wanted[i] == STICK:
-                        turned[i] = -1 if slid[i] > 0.0 else 1
+                        turned[i] = -1 if slip[i] > 0.0 else 1
                     wanted[i] = SLIP
             state[i], sense[i] = wanted[i], turned[i]
         before = False
@@ -237,7 +237,7 @@ def assemble_force_system(
     body: CondensedArrays,
     skin: Skin,
     states: ContactStates,
-    load: LoadState,
+    load: LoadArguments,
     position: SkinPosition,
     untouched: Array,
     system: ContactSystem,
@@ -340,13 +340,13 @@ def balance(sums: Array, loads: Array, answer: Array, control: ForceControl, by_
 
 
 @compiled
-def meet(states: ContactStates, position: SkinPosition, load: LoadState, skin: Skin, length: Array) -> int:
+def meet(states: ContactStates, position: SkinPosition, load: LoadArguments, skin: Skin, length: Array) -> int:
     """Change `states` where the forces on the skin, or its position, contradict them; return how many were changed.
 
     The anchors are positions that nodes have slid from. Filled: `length` (k,), of skin on which a bound acts.
     """
     bounded_length(position.x, skin, states.state, load.mu, length)
-    slid = np.empty(length.shape[0])
+    slip = np.empty(length.shape[0])
     for i in range(length.shape[0]):
-        slid[i] = position.x[i] - position.anchor[i]
-    return update_contact_states(states, position.above, slid, length, load)
+        slip[i] = position.x[i] - position.anchor[i]
+    return update_contact_states(states, position.above, slip, length, load)

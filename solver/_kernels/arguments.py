@@ -145,7 +145,7 @@ class ForceControl(NamedTuple):
     stride: float  # largest change of depth or travel [mm]
 
 
-class LoadState(NamedTuple):
+class LoadArguments(NamedTuple):
     """What the surface does."""
 
     depth: float  # how far it has risen [mm]

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadState, Skin, SkinPosition
+from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver.arrays import Array, Narrow
 
@@ -69,7 +69,7 @@ def assemble_contact_system(
     body: CondensedArrays,
     skin: Skin,
     states: ContactStates,
-    load: LoadState,
+    load: LoadArguments,
     position: SkinPosition,
     system: ContactSystem,
 ) -> int:

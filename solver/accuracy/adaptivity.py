@@ -10,7 +10,7 @@ from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.loads import forces_of, sliding_pull
+from solver.equilibrium.loads import forces_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
@@ -93,7 +93,7 @@ def coarse_solution(
     except SolveFailure:
         pass
     if beyond and scene.normal_force is None and scene.loading.direction != 0:
-        refuse_far_beyond(scene, sliding_pull(scene), stop)
+        refuse_far_beyond(scene, sliding_load(scene), stop)
     sizing = replace(sizing, fineness=fineness)
     try:
         return _plain(scene, sizing, stop, make)
@@ -167,7 +167,7 @@ def solution_on(
     try:
         return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
     except NotConverged:
-        if not steep(sliding_pull(scene)):
+        if not steep(sliding_load(scene)):
             raise
     begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, make)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
@@ -203,6 +203,6 @@ def on_nested(
             shape = nearby(finger, scene, begun.shape, stop) or settled(finger, scene, stop, begun.shape)
     except SolveFailure:
         return None, steps
-    given = None if relaxes(scene) else forces_of(scene, shape.pull)
+    given = None if relaxes(scene) else forces_of(scene, shape.load)
     (values,), (changes,) = edge_changes(finger.newton, [(shape, given)], finger.numbers_and_row)
     return nested_numbers(values, changes, steps), steps

@@ -4,11 +4,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from solver import _kernels as kernels
 from solver.arrays import Array
+from solver.body.receptor import Patches
 from solver.contact.law import FrictionLaw
-from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.load_path import Instant
-from solver.equilibrium.newton import EquilibriumState
+from solver.equilibrium.finger import Finger
+from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.failures import NotConverged
 from solver.scene import Scene
 
@@ -20,40 +21,50 @@ MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many
 
 
 def audits(
-    model: FingerModel, law: FrictionLaw, contact: EquilibriumState, depth: float, displacement: Array
+    finger: Finger[Patches], state: EquilibriumState, displacement: Array, overstress: Array | None = None
 ) -> dict[str, float]:
-    """Return the checks of one state of contact; `displacement` (nodes, 2) relative to the bone [mm].
+    """Return the checks of one state. Perfect is 0, save for `smallest_det_F`.
+
+    `displacement` (nodes, 2) is relative to the bone [mm]; `overstress` (nodes, 2) are the forces of terms that relax,
+    where there are any [N/mm].
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
     `inner_forces`: largest unbalanced force on a node that is not held, the surface's own on skin that touches
     included, by the contact force.
-    `work_balance`: work of the contact forces against the elements' stored energy (Clapeyron), relative.
+    `work_balance`: were the displacement to grow by a part of itself, by how much the stored energy would grow against
+    the work of the contact forces, relative. At small strain that is Clapeyron's theorem. It balances the state, not a
+    way there: a state found directly has none.
     `penetration`: of any skin node, by the indentation. `tension`: largest pull on a touching point, by the largest
-    push. `cone_violation`: |t| beyond min(mu p, tau_max), by the largest push. `smallest_det_F`: of the displacements.
+    push. `cone_violation`: |t| beyond min(mu p, tau_max), the bound on the deformed length, by the largest push.
     """
-    mesh, body = model.geometry.mesh, model.body
-    inner = body.reactions(displacement[:, :, None])[:, :, 0]
-    total = max(float(contact.normal.sum()), np.finfo(float).tiny)
-    bone = inner[mesh.held].sum(axis=0)
-    forces = np.stack([contact.tangential, contact.normal], axis=1)
+    mesh, condensed = finger.geometry.mesh, finger.newton.condensed
+    inner, grown = finger.inner_forces(displacement), finger.energy_growth(displacement)
+    if overstress is not None:
+        inner = inner + overstress
+        grown += float(np.sum(overstress * displacement))
+    total = max(float(state.force[1]), np.finfo(float).tiny)
+    bone = inner[mesh.held].sum(axis=0) + state.force
     left = inner.copy()
-    left[mesh.skin] -= forces
+    left[mesh.skin] -= state.reaction
     left[mesh.held] = 0.0
-    work = 0.5 * float(np.sum(forces * displacement[mesh.skin]))
-    stored = 0.5 * float(np.sum(inner * displacement))
-    whole = model.geometry.whole
-    height = mesh.nodes[whole, 1] + displacement[whole, 1] - depth
-    push = max(float(contact.normal.max(initial=0.0)), np.finfo(float).tiny)
-    beyond = np.abs(contact.tangential) - law.limit(contact.normal, body.condensed.fixed_length)
+    work = float(np.sum(state.reaction * displacement[mesh.skin]))
+    whole = finger.geometry.whole
+    height = mesh.nodes[whole, 1] + displacement[whole, 1] - state.load.depth
+    push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
+    length = np.empty(len(state.state))
+    x = np.ascontiguousarray(state.place(condensed)[:, 0])
+    kernels.bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
+    # Open skin may hang over, its length along the surface negative: no limit of it is meant.
+    limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
     return {
-        "equilibrium_x": abs(float(bone[0] + contact.tangential.sum())) / total,
-        "equilibrium_y": abs(float(bone[1] + contact.normal.sum())) / total,
+        "equilibrium_x": abs(float(bone[0])) / total,
+        "equilibrium_y": abs(float(bone[1])) / total,
         "inner_forces": float(np.abs(left).max()) / total,
-        "work_balance": abs(work - stored) / max(stored, np.finfo(float).tiny),
-        "penetration": max(-float(height.min()), 0.0) / depth,
-        "tension": max(-float(contact.normal.min(initial=0.0)), 0.0) / push,
-        "cone_violation": max(float(beyond.max(initial=0.0)), 0.0) / push,
-        "smallest_det_F": float(np.prod(model.stretches(displacement), axis=0).min()),
+        "work_balance": abs(work - grown) / max(abs(grown), np.finfo(float).tiny),
+        "penetration": max(-float(height.min()), 0.0) / state.load.depth,
+        "tension": max(-float(state.normal.min(initial=0.0)), 0.0) / push,
+        "cone_violation": max(float((np.abs(state.tangential) - limit).max(initial=0.0)), 0.0) / push,
+        "smallest_det_F": finger.smallest_det(displacement),
     }
 
 
@@ -111,29 +122,35 @@ def inside_out(checks: Mapping[str, float]) -> str:
     )
 
 
-def course_audits(model: FingerModel, way: Sequence[Instant]) -> dict[str, float]:
-    """Return the checks of a whole march, relative to the bone's work.
+def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxing: bool = False) -> dict[str, float]:
+    """Return the checks of a whole march, from rest on, relative to the bone's work.
 
-    `course_work_balance`: bone work less stored energy less dissipation. `course_step_work`: the part of it that points
-    did on their way to the surface within a step, which vanishes with the step. `course_least_dissipation`: the least
-    work that friction took in a step (never negative).
+    The bone's work and friction's take the mean of the forces at both ends of a step.
+    `course_work_balance`: work of the forces on the skin less the stored energy. At small strain the mean is exact; at
+    finite strain the curve of the elements' forces within a step is taken by Simpson's rule.
+    `course_step_work`: bone work less stored energy less what friction took. It vanishes as the square of the step, or
+    in proportion to it where points come down on the surface within a step.
+    `course_least_dissipation`: the least work that friction took in a step (never negative).
+
+    Where tissues relax they take work too, and no force within a step is known without its past. There is
+    `course_viscous_work` in place of the first two, bone work less friction less what is stored at the end. It is
+    positive but for the error of the steps.
     """
-    normal = np.array([i.state.normal for i in way])
-    tangential = np.array([i.state.tangential for i in way])
-    depth = np.array([i.depth for i in way])
-    travel = np.array([i.travel for i in way])
-    u = np.array([i.state.u for i in way])
-    gap = u[:, :, 1] - depth[:, None]  # but for what does not change
-    shift = u[:, :, 0] + travel[:, None]
-    stored = 0.5 * float(np.sum(way[-1].state.reaction * model.relaxed(way[-1].state).u))
-    mean_n, mean_t = (normal[1:] + normal[:-1]) / 2.0, (tangential[1:] + tangential[:-1]) / 2.0
-    bone = float(np.sum(mean_n.sum(axis=1) * np.diff(depth)) - np.sum(mean_t.sum(axis=1) * np.diff(travel)))
-    lost = -float(np.sum(mean_t * np.diff(shift, axis=0)))
-    closing = -float(np.sum(mean_n * np.diff(gap, axis=0)))
-    friction = -np.sum(tangential[1:] * np.diff(shift, axis=0), axis=1)
+    reaction = np.array([state.reaction for state in states])  # (m, k, 2)
+    skin = np.array([state.place(newton.condensed) for state in states])
+    load = np.array([[state.load.travel, state.load.depth] for state in states])
+    mean, moved = (reaction[1:] + reaction[:-1]) / 2.0, np.diff(skin, axis=0)
+    slip = moved - np.diff(load, axis=0)[:, None]  # relative to the surface; along y towards it, negative
+    bone = float(np.sum(mean.sum(axis=1) * np.diff(load, axis=0)))
+    lost = -float(np.sum(mean[..., 0] * slip[..., 0]))
+    friction = -np.sum(reaction[1:, :, 0] * slip[..., 0], axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
+    stored = newton.stored(states[-1])
+    least = {"course_least_dissipation": float(friction.min()) / scale}
+    if relaxing:
+        return {"course_viscous_work": (bone - lost - stored) / scale} | least
+    elastic = newton.elastic_work(states, float(np.sum(mean * moved)))
     return {
-        "course_work_balance": abs(bone - stored - lost - closing) / scale,
-        "course_step_work": abs(closing) / scale,
-        "course_least_dissipation": float(friction.min()) / scale,
-    }
+        "course_work_balance": abs(elastic - stored) / scale,
+        "course_step_work": abs(bone - stored - lost) / scale,
+    } | least

@@ -77,7 +77,7 @@ def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | No
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     pairs = [pair for edge in edges for pair in ((edge, edge + 1), (edge + 1, edge))]
-    found = newton.linearise(state, state.pull, x, 0, given)
+    found = newton.linearise(state, state.load, x, 0, given)
     return [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
 
 
@@ -91,11 +91,11 @@ def _moved(
     states, senses = state.state.copy(), state.sense.copy()
     states[node], senses[node] = states[other], senses[other]
     begin = replace(state, state=states, sense=senses)
-    if not newton.relinearise(begin, state.pull, x, 0, given):
+    if not newton.relinearise(begin, state.load, x, 0, given):
         return None
     deeper, along = newton.system.motion.tolist() if given is not None else (0.0, 0.0)
-    pull = state.pull._replace(depth=state.pull.depth + deeper, travel=state.pull.travel + along)
-    return newton.moved(begin, pull, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
+    return newton.moved(begin, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
 
 
 def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: Steps | None) -> Errors:

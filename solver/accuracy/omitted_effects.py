@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from solver._kernels import STICK
 from solver.arrays import Array
+from solver.body.receptor import Patches
 from solver.constitutive.hyperelastic import HUMAN_SKIN
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.finger import Finger
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState
 from solver.scene import Material, Scene
 
@@ -45,56 +46,32 @@ def _held(scene: Scene) -> str:
     return said + (f"; a nail plate of {finger.nail_length:g} mm is fixed to it" if finger.nail_length else "; no nail")
 
 
-def model(scene: Scene, finger: FingerModel, contact: EquilibriumState, displacement: Array) -> dict[str, Any]:
-    """Return what was modelled and what was left out, as plain data.
+def model(
+    scene: Scene, finger: Finger[Patches], state: EquilibriumState, displacement: Array, width: float
+) -> dict[str, Any]:
+    """Return what was modelled and what was left out, as plain data; `width` is that of the contact [mm].
 
     Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
     out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
     """
-    force = finger.body.reactions(displacement[:, :, None])[finger.geometry.mesh.held, :, 0].sum(axis=0)
-    length = float(finger.body.condensed.fixed_length[contact.touching].sum())
-    touching = int(contact.touching.sum())
-    sticking = int((contact.state == STICK).sum()) / touching if touching else 0.0
-    slide = _elastic_slide(finger, displacement)
-    width = finger.contact_width(contact)
+    slide = float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
+    small = {"finite strain": _finite_strain(finger, displacement)} if isinstance(finger, LinearFinger) else {}
+    modes, skin, tractions = ("pressure", "skin", "tractions") if small else ("ln J", "deformed skin", "true tractions")
     return {
-        "kinematics": "small strain, plane strain",
+        "kinematics": f"{scene.solve.kinematics} strain, plane strain",
         "material": _laws(scene),
-        "element": "Q2/P-1: nine nodes, three pressure modes condensed in the element",
-        "contact": "unilateral, Coulomb with |t| <= min(mu p, tau_max), open, stick, slip or cap at every skin node",
+        "element": f"Q2/P-1: nine nodes, three modes of {modes} condensed in the element",
+        "contact": f"unilateral on the {skin}, Coulomb with |t| <= min(mu p, tau_max) on {tractions}, each node of the "
+        "skin open, in stick, in slip or in slip at the bound",
         "course": _course(scene),
         "bone": _held(scene),
         "width": "forces are per mm of width",
-        "left_out": {
-            "finite strain": _finite_strain(finger, displacement),
-            "bone compliance": _bone(scene, force),
-            "inertia": _inertia(scene, float(contact.normal.sum()), length),
+        "left_out": small
+        | {
+            "bone compliance": _bone(scene, state.force),
+            "inertia": _inertia(scene, float(state.force[1]), width),
             "viscosity": _viscosity(scene, slide),
-            "history": _history(scene, sticking, slide),
-            "the third dimension": _width(scene, width),
-        },
-    }
-
-
-def finite_model(scene: Scene, *, force: Array, width: float, sticking: float, slide: float) -> dict[str, Any]:
-    """Return what `model` does for a result at finite strain.
-
-    `force` (2,) of the surface on the skin [N/mm], contact `width` [mm], part of the touching points that stick, and
-    `slide`, the largest sideways displacement of the skin [mm].
-    """
-    return {
-        "kinematics": "finite strain, plane strain",
-        "material": _laws(scene),
-        "element": "Q2/P-1: nine nodes, three modes of ln J condensed in the element",
-        "contact": "unilateral on the deformed skin, Coulomb with |t| <= min(mu p, tau_max) on true tractions",
-        "course": _course(scene),
-        "bone": _held(scene),
-        "width": "forces are per mm of width",
-        "left_out": {
-            "bone compliance": _bone(scene, force),
-            "inertia": _inertia(scene, float(force[1]), width),
-            "viscosity": _viscosity(scene, slide),
-            "history": _history(scene, sticking, slide),
+            "history": _history(scene, state.sticking, slide),
             "the third dimension": _width(scene, width),
         },
     }
@@ -146,10 +123,10 @@ def _course(scene: Scene) -> str:
     return "settled sliding, solved directly"
 
 
-def _finite_strain(finger: FingerModel, displacement: Array) -> dict[str, Any]:
+def _finite_strain(finger: LinearFinger, displacement: Array) -> dict[str, Any]:
     small, large = finger.stretches(displacement)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
-    probes, weights = finger.ending.probes, finger.ending.weights
+    probes, weights = finger.ending.endings.probes, finger.ending.endings.weights
     gradient = probes.displacement_gradient(mesh, displacement)
     f = gradient + np.eye(2)
     det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
@@ -222,11 +199,6 @@ def _held_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
     """Return the stress above its relaxed value, relative, after a press of 1 s and a slide `lasting` so long [s]."""
     after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
     return float(after) / (1.0 - sum(g for _, g in terms))
-
-
-def _elastic_slide(finger: FingerModel, displacement: Array) -> float:
-    """Return the largest sideways displacement of the skin that may touch [mm]."""
-    return float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
 
 
 def _history(scene: Scene, sticking: float, slide: float) -> dict[str, Any]:

@@ -16,9 +16,9 @@ import numpy as np
 from solver.accuracy.omitted_effects import RELAXATION, warnings
 from solver.body.tissues import relaxing_laws
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import PRESSING_TIME, Aim
-from solver.equilibrium.loads import pull_of
+from solver.equilibrium.loads import load_of
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
@@ -119,17 +119,19 @@ def _small(scene: Scene, aims: list[Aim]) -> tuple[float, float]:
     finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
     body = copy(body)  # each course has a past of its own
     body.rest()
-    way = RelaxingWay(body, pull_of(scene), scene.loading_per_mm, finger.ending, finger.point, aims[0].time)
+    way = RelaxingWay(
+        body, load_of(scene), scene.loading_per_mm, finger.ending.endings, finger.point.endings, aims[0].time
+    )
     for aim in aims:
         way.go(aim)
     return way.sed[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))
 
 
 @lru_cache(maxsize=1)
-def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: float) -> tuple[FingerModel, RelaxingBody]:
+def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: float) -> tuple[LinearFinger, RelaxingBody]:
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
     scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
-    made = FingerModel.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
+    made = LinearFinger.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
     body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return made, body
@@ -144,5 +146,5 @@ def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[fl
     from solver.equilibrium.finite_relaxation import RelaxingCourse
 
     finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))
-    at_last = finger.sed_ending(roughly(finger, scene, stop))
+    at_last = finger.sed_ending(roughly(finger, scene, stop).u)
     return RelaxingCourse(scene, finger, stop, aims).sed[-1][0], at_last

@@ -6,8 +6,8 @@ import numpy as np
 
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.continuation.small_states import end, nearest
-from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.loads import forces_of, pull_of
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.loads import forces_of, load_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import HALF, Steps
 from solver.failures import SolveFailure
@@ -15,7 +15,7 @@ from solver.prediction import COUNT, NestedNumbers
 from solver.scene import Scene
 
 
-def steps_asked(scene: Scene, finger: FingerModel) -> Steps:
+def steps_asked(scene: Scene, finger: LinearFinger) -> Steps:
     """Return the load steps that a scene asks for whose end depends on its way, judged on a mesh."""
     try:
         whole, half = finger.all_numbers([end(scene, finger, times) for times in (1.0, HALF)])
@@ -24,17 +24,17 @@ def steps_asked(scene: Scene, finger: FingerModel) -> Steps:
     return Steps.of(whole, half, scene.solve.tolerance)
 
 
-def times_on_way(scene: Scene, finger: FingerModel) -> int:
+def times_on_way(scene: Scene, finger: LinearFinger) -> int:
     """Return how many times the usual load steps a history takes whose end does not depend on them.
 
     Those that a tolerance asks for at the end of its press, judged on a mesh.
     """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or pull_of(scene).frictionless:
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or load_of(scene).frictionless:
         return 1
     return steps_asked(scene.pressed_only(), finger).times
 
 
-def on_nested(mesh: FingerModel, asked: Sequence[tuple[Scene, Steps | None]]) -> list[NestedNumbers | None]:
+def on_nested(mesh: LinearFinger, asked: Sequence[tuple[Scene, Steps | None]]) -> list[NestedNumbers | None]:
     """Return the numbers of scenes on the nested `mesh`, None where one has no state there.
 
     Each comes with the load steps that it takes where its state depends on its way. Numbers of all are made at once.
@@ -45,13 +45,13 @@ def on_nested(mesh: FingerModel, asked: Sequence[tuple[Scene, Steps | None]]) ->
     known = [state for state in states if state is not None]
     if not known:
         return out
-    forced = [(state, forces_of(asked[n][0], state.pull)) for n, state in zip(held, known, strict=True)]
+    forced = [(state, forces_of(asked[n][0], state.load)) for n, state in zip(held, known, strict=True)]
     for number, values, changes in zip(held, *edge_changes(mesh.newton, forced, mesh.numbers_and_row), strict=True):
         out[number] = nested_numbers(values, changes, asked[number][1])
     return out
 
 
-def _state(scene: Scene, mesh: FingerModel, steps: Steps | None) -> EquilibriumState | None:
+def _state(scene: Scene, mesh: LinearFinger, steps: Steps | None) -> EquilibriumState | None:
     try:
         return nearest(scene, mesh) if steps is None else end(scene, mesh)
     except SolveFailure:

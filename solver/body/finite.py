@@ -14,7 +14,7 @@ from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law, log1p
 from solver.element import Q2P1
 from solver.linalg.multifrontal import Elimination, symbolic_factorization
-from solver.mesh import Mesh
+from solver.mesh import Mesh, distinct
 from solver.quantities import QUANTITIES, LocalState
 
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
@@ -103,6 +103,12 @@ class FiniteBody:
     def place(self, u: Array) -> Array:
         """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
         return self.mesh.nodes[self.skin] + u[self.skin]
+
+    def nodal(self, local: Array) -> Array:
+        """Return the forces (nodes, 2) on nodes that forces (e, 18) on those of the elements add up to."""
+        out = np.zeros(self.mesh.nodes.shape)
+        np.add.at(out, self.nodes, local.reshape(-1, 9, 2))
+        return out
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
@@ -207,9 +213,10 @@ class CondensedFinite:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FiniteProbes:
-    """Places inside elements where the strain energy is wanted, p of them, averaged with weights over r patches."""
+class FinitePatches:
+    """Endings of a body at finite strain: p places inside elements, averaged with weights over r patches."""
 
+    body: FiniteBody
     element: Narrow  # (p,)
     grad_x: Array  # (p, 9)
     grad_y: Array  # (p, 9)
@@ -220,44 +227,52 @@ class FiniteProbes:
     tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
 
     @staticmethod
-    def of(body: FiniteBody, endings: Endings) -> "FiniteProbes":
+    def of(body: FiniteBody, endings: Endings) -> "FinitePatches":
         """Carry the probes of `endings` over to `body`, element by element."""
         probes = endings.probes
         order = np.argsort(probes.element, kind="stable")
         element = probes.element[order]
         modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
         gradient = probes.gradient[order]
-        areas = np.bincount(endings.patch, endings.weights, endings.count)
-        return FiniteProbes(
+        return FinitePatches(
+            body,
             element.astype(np.int32),
             np.ascontiguousarray(gradient[..., 0]),
             np.ascontiguousarray(gradient[..., 1]),
             modes,
             endings.weights[order],
             endings.patch[order],
-            np.where(areas > 0.0, areas, np.nan),
+            endings.areas,
             endings.tangent[order],
         )
 
-    def energy(self, body: FiniteBody, displacement: Array) -> Array:
-        """Return the SED (p,) [MPa] for displacements (nodes, 2), ln J being each element's best fit of it."""
+    def nodes(self) -> Indices:
+        """Do as `Patches` says."""
+        return distinct(self.body.mesh.elements[distinct(self.element)])
+
+    def energy(self, displacement: Array) -> Array:
+        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...), ln J being each element's best fit of it."""
+        if displacement.ndim > 2:
+            every = [self.energy(np.ascontiguousarray(one)) for one in np.moveaxis(displacement, -1, 0)]
+            return np.stack(every, axis=-1)
         out = np.empty(len(self.element))
         probes = ProbeArrays(self.element, self.grad_x, self.grad_y, self.modes)
-        kernels.energies(displacement, body.elements, probes, out)
+        kernels.energies(displacement, self.body.elements, probes, out)
         return out
 
-    def average(self, body: FiniteBody, displacement: Array) -> Array:
-        """Return the SED averaged over each patch (r,) [MPa]; nan where there is no patch."""
-        return np.bincount(self.patch, self.energy(body, displacement) * self.weights, len(self.areas)) / self.areas
+    def average(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        return patch_means(self.energy(displacement), self.weights, self.patch, self.areas)
 
-    def responses(self, body: FiniteBody, displacement: Array) -> Array:
-        """Return every quantity averaged over each patch (q, r, ...) for displacements (nodes, 2, ...)."""
-        state = self._state(body, displacement)
+    def responses(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        state = self._state(displacement)
         values = (quantity.finite(state) for quantity in QUANTITIES)
         return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
 
-    def _state(self, body: FiniteBody, displacement: Array) -> LocalState:
+    def _state(self, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
+        body = self.body
         wide = (slice(None), *([None] * (displacement.ndim - 2)))
         held, place = np.unique(self.element, return_inverse=True)
         local = displacement[body.nodes[held]]  # (e, 9, 2, ...)

@@ -1,6 +1,7 @@
 """The endings as patches of tissue: where their responses are probed, and with which weights they are averaged."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -26,22 +27,52 @@ class Endings:
     count: int
     tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
 
-    def average(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
-        """Return the SED averaged over each patch (r, c) [MPa] for displacements (nodes, 2, c); nan where no patch."""
-        return self._means(self.probes.energy(mesh, elastic, displacement))
+    @property
+    def areas(self) -> Array:
+        """Area of each patch (r,) [mm2]; nan where there is no patch."""
+        area = np.bincount(self.patch, self.weights, self.count)
+        return np.where(area > 0.0, area, np.nan)
 
-    def responses(self, mesh: Mesh, elastic: Elastic, displacement: Array) -> Array:
-        """Return every quantity averaged over each patch (q, r, c) for displacements (nodes, 2, c)."""
-        state = self.probes.state(mesh, elastic, displacement, self.tangent)
+
+class Patches(Protocol):
+    """Endings of one body, r of them."""
+
+    def nodes(self) -> Indices:
+        """Return the numbers of the nodes whose displacements count."""
+        ...
+
+    def average(self, displacement: Array) -> Array:
+        """Return the SED averaged over each (r, ...) [MPa] for displacements (nodes, 2, ...); nan where no patch."""
+        ...
+
+    def responses(self, displacement: Array) -> Array:
+        """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearPatches:
+    """Endings of an elastic body at small strain."""
+
+    mesh: Mesh
+    elastic: Elastic
+    endings: Endings
+
+    def nodes(self) -> Indices:
+        """Do as `Patches` says."""
+        return distinct(self.mesh.elements[distinct(self.endings.probes.element)])
+
+    def average(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        return self._means(self.endings.probes.energy(self.mesh, self.elastic, displacement))
+
+    def responses(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        state = self.endings.probes.state(self.mesh, self.elastic, displacement, self.endings.tangent)
         return np.stack([self._means(quantity.small(state)) for quantity in QUANTITIES])
 
     def _means(self, values: Array) -> Array:
-        area = np.bincount(self.patch, self.weights, self.count)
-        return patch_means(values, self.weights, self.patch, np.where(area > 0.0, area, np.nan))
-
-    def nodes(self, mesh: Mesh) -> Indices:
-        """Return the numbers of the nodes that the probes need."""
-        return distinct(mesh.elements[distinct(self.probes.element)])
+        return patch_means(values, self.endings.weights, self.endings.patch, self.endings.areas)
 
 
 def patch_means(values: Array, weights: Array, patch: Indices, areas: Array) -> Array:

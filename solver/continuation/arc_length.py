@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.contact.skin_compression import SkinCompression
-from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, Newton, Pull
+from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import Cancelled, NotConverged
 from solver.progress import report_progress
 
@@ -96,7 +96,7 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
     for part in HOP:
         value = min((1.0 + part) * branch.value, target)
         try:
-            there = finger.newton.settle(last, with_value(last.pull, by, value), TOLERANCE)
+            there = finger.newton.settle(last, with_value(last.load, by, value), TOLERANCE)
         except NotConverged:
             continue
         near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
@@ -122,7 +122,7 @@ def follow(
     It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
     (`folding.folds_at`). Raises Cancelled where `stop` says so.
     """
-    way = [_Point(start, finger.skin_compression(start), value_of(start.pull, by))]
+    way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
     if way[0].value >= target * (1.0 - 1e-12):
         return Branch((start,), way[0].value, limited=False)
     best = 0  # of them, by value
@@ -185,19 +185,19 @@ def _further(
         if found is not None:
             compression = finger.skin_compression(found)
             if compression.least >= last.compression.least - APART and not jumped_branch(finger, last.shape, found):
-                return _Point(found, compression, value_of(found.pull, by)), length
+                return _Point(found, compression, value_of(found.load, by)), length
         length /= 2.0
     return None
 
 
-def value_of(pull: Pull, by: int) -> float:
+def value_of(load: LoadState, by: int) -> float:
     """Return the coefficient of friction or the depth [mm]."""
-    return pull.mu if by == BY_FRICTION else pull.depth
+    return load.mu if by == BY_FRICTION else load.depth
 
 
-def with_value(pull: Pull, by: int, value: float) -> Pull:
-    """Return `pull` with another coefficient of friction or depth [mm]."""
-    return pull._replace(mu=value) if by == BY_FRICTION else pull._replace(depth=value)
+def with_value(load: LoadState, by: int, value: float) -> LoadState:
+    """Return `load` with another coefficient of friction or depth [mm]."""
+    return load._replace(mu=value) if by == BY_FRICTION else load._replace(depth=value)
 
 
 def jumped_branch(finger: Followed, before: EquilibriumState, after: EquilibriumState) -> bool:
@@ -208,7 +208,7 @@ def jumped_branch(finger: Followed, before: EquilibriumState, after: Equilibrium
 
 def _tangent(newton: Newton, shape: EquilibriumState, by: int) -> tuple[Array, float]:
     """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
-    newton.linearise(shape, shape.pull, newton.skin_x)
+    newton.linearise(shape, shape.load, newton.skin_x)
     direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
     size = np.sqrt(direction @ direction + 1.0)
     return direction / size, 1.0 / size
@@ -219,15 +219,15 @@ def _next(
 ) -> EquilibriumState | None:
     """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
     root = np.sqrt(len(newton.steps))
-    value = value_of(start.pull, by)
+    value = value_of(start.load, by)
     to_target = rate * length >= target - value
-    shape, pull = start, start.pull
+    shape, load = start, start.load
     gone = np.zeros(len(newton.steps))
     for _ in range(12):
-        if not newton.linearise(shape, pull, newton.skin_x):
+        if not newton.linearise(shape, load, newton.skin_x):
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
-        now = value_of(pull, by)
+        now = value_of(load, by)
         if to_target:
             change = target - now
         else:
@@ -236,13 +236,13 @@ def _next(
                 return None
             change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
         step = to + change * along
-        pull = with_value(pull, by, now + change)
-        shape, largest, changed = newton.moved(shape, pull, step * root, newton.skin_x)
+        load = with_value(load, by, now + change)
+        shape, largest, changed = newton.moved(shape, load, step * root, newton.skin_x)
         gone = gone + step
         if not largest < 10.0:
             return None
         if largest < TOLERANCE and not changed:
-            way = np.sqrt(gone @ gone + (value_of(pull, by) - value) ** 2)
-            straight = direction @ gone + rate * (value_of(pull, by) - value)
+            way = np.sqrt(gone @ gone + (value_of(load, by) - value) ** 2)
+            straight = direction @ gone + rate * (value_of(load, by) - value)
             return shape if straight > TURN * way else None
     return None

@@ -14,8 +14,8 @@ from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_path import Aim, Way, press_and_drag
-from solver.equilibrium.loads import pull_of, sliding_pull
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, Newton, Pull
+from solver.equilibrium.loads import load_of, sliding_load
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
 from solver.scene import Scene
@@ -43,14 +43,14 @@ def settled(
 ) -> EquilibriumState:
     """Return the settled state of a scene, sought first from `start`, a proven state nearby.
 
-    Where it depends on its way, that has so many `times` the usual load steps; such a state has a pull without sense.
-    Raises NoSteadyState, NotConverged, Cancelled.
+    Where it depends on its way, that has so many `times` the usual load steps, and a load state without sense. Raises
+    NoSteadyState, NotConverged, Cancelled.
     """
     if scene.normal_force is not None:
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times).last
-    return steady(finger, sliding_pull(scene), start=start, stop=stop)
+    return steady(finger, sliding_load(scene), start=start, stop=stop)
 
 
 def nearby(
@@ -63,11 +63,11 @@ def nearby(
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            shape = newton.settle(start, sliding_pull(scene), limit=FEW)
+            shape = newton.settle(start, sliding_load(scene), limit=FEW)
         else:
-            near = replace(start, pull=sliding_pull(scene)._replace(depth=start.pull.depth, travel=start.pull.travel))
+            near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
             found = balanced(newton, near, Given(force, None), limit=FEW)
-            shape = newton.settle(found, found.pull, limit=FEW)
+            shape = newton.settle(found, found.load, limit=FEW)
         return shape if stands(finger, shape, stop) else None
     except NotConverged:
         return None
@@ -81,14 +81,14 @@ def roughly(
     It is sought first from `near`, the settled state of a surface that slides the same way.
     """
     if near is not None:
-        alike = near.pull.sense == -(scene.loading.direction or 1)
+        alike = near.load.sense == -(scene.loading.direction or 1)
         near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled(finger, scene, stop, near)
-    pull = sliding_pull(scene)
+    load = sliding_load(scene)
     for begin in dict.fromkeys((near, None)):
         try:
-            return sliding.settled(finger.newton, pull, begin, LEADING, stop)
+            return sliding.settled(finger.newton, load, begin, LEADING, stop)
         except NotConverged:
             if begin is None:
                 raise
@@ -107,7 +107,7 @@ def _settled_under(
     direction, drag = scene.loading.direction, scene.tangential_force
     if direction == 0 and scene.friction.mu > 0.0:
         return course(scene, finger, stop, times).last
-    if start is not None and start.pull.sense == 0:  # the end of a course, and no slide to start from
+    if start is not None and start.load.sense == 0:  # the end of a course, and no slide to start from
         start = None
         try:
             return course(scene, finger, stop, times).last
@@ -148,47 +148,47 @@ def _sliding_under(
 ) -> EquilibriumState:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
-    pull = sliding_pull(scene)
-    capped = steep(pull)
+    load = sliding_load(scene)
+    capped = steep(load)
     if start is not None:
-        near = replace(start, pull=pull._replace(depth=start.pull.depth, travel=start.pull.travel))
+        near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
             found = _at_force(newton, near, force, stop) if capped else balanced(newton, near, Given(force, None))
-            return steady(finger, found.pull, start=found, stop=stop)
+            return steady(finger, found.load, start=found, stop=stop)
     if capped:
         with suppress(NotConverged):
-            *_, bare = _grown(newton, pull._replace(mu=0.0), force, stop)
-            begin = all_at_the_bound(newton, pull._replace(depth=bare.pull.depth), LEADING, stop)
+            *_, bare = _grown(newton, load._replace(mu=0.0), force, stop)
+            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), LEADING, stop)
             found = _at_force(newton, begin, force, stop)
-            return steady(finger, found.pull, start=found, stop=stop)
+            return steady(finger, found.load, start=found, stop=stop)
     shape: EquilibriumState | None = None
     try:
-        for reached in _grown(newton, pull, force, stop):
+        for reached in _grown(newton, load, force, stop):
             shape = reached
     except NotConverged:
         if shape is None:
             raise
         return _deeper(finger, shape, force, stop)
     assert shape is not None
-    return steady(finger, shape.pull, start=shape, stop=stop)
+    return steady(finger, shape.load, start=shape, stop=stop)
 
 
-def _grown(newton: Newton, pull: Pull, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
-    """Yield slides with the friction of `pull` as the normal force grows to `force`. Raises NotConverged."""
-    begin = finite_forced.untouched(newton, pull.mu, pull.tau)
-    begin = replace(begin, pull=begin.pull._replace(sense=pull.sense))
+def _grown(newton: Newton, load: LoadState, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
+    """Yield slides with the friction of `load` as the normal force grows to `force`. Raises NotConverged."""
+    begin = finite_forced.untouched(newton, load.mu, load.tau)
+    begin = replace(begin, load=begin.load._replace(sense=load.sense))
     grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
     return finite_forced.march(newton, begin, Given(0.0, None), grows, stop)
 
 
 def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
-    shape, depth = start, start.pull.depth
+    shape, depth = start, start.load.depth
     for _ in range(SEARCHES):
-        shape = sliding.settled(newton, shape.pull._replace(depth=depth), shape, stop=stop)
+        shape = sliding.settled(newton, shape.load._replace(depth=depth), shape, stop=stop)
         if abs(shape.force[1] / force - 1.0) < MET:
             return shape
-        if not newton.linearise(shape, shape.pull, newton.skin_x):
+        if not newton.linearise(shape, shape.load, newton.skin_x):
             break
         stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:
@@ -203,11 +203,11 @@ def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: C
     How deep sliding goes, and how hard it presses there, is told by `limit_point`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
-    proof = reach.of_depth(finger.scene, shape.pull._replace(depth=BEYOND * shape.pull.depth), stop)
+    proof = reach.of_depth(finger.scene, shape.load._replace(depth=BEYOND * shape.load.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
         shape = _risen_to(finger, shape, proof, force, stop)
     found = _at_force(finger.newton, shape, force, stop)
-    return steady(finger, found.pull, start=found, stop=stop)
+    return steady(finger, found.load, start=found, stop=stop)
 
 
 def _risen_to(
@@ -222,16 +222,16 @@ def _risen_to(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            shape = steady(finger, shape.pull._replace(depth=(1.0 + APART) * depth), start=shape, stop=stop)
+            shape = steady(finger, shape.load._replace(depth=(1.0 + APART) * depth), start=shape, stop=stop)
         except NoSteadyState as failure:
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
-        depth, most = shape.pull.depth, float(shape.force[1])
+        depth, most = shape.load.depth, float(shape.force[1])
     return shape
 
 
 def depends_on_way(scene: Scene, shape: EquilibriumState) -> bool:
     """Return whether a state is the end of a course and not a settled slide, found directly."""
-    return shape.pull.sense == 0 and scene.friction.mu > 0.0
+    return shape.load.sense == 0 and scene.friction.mu > 0.0
 
 
 def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> Way:
@@ -243,7 +243,7 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
         settled(finger, leg, stop)
     loading, count = scene.loading_per_mm, round(PRESSES * times)
     good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
-    way = Way(finger.newton, pull_of(scene), loading, good, stop)
+    way = Way(finger.newton, load_of(scene), loading, good, stop)
     press_and_drag(way, loading, lambda part: report_progress("pressing and dragging step by step", part), count, count)
     if not loading.dragged:
         for direction in loading.directions:
@@ -253,13 +253,13 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
 
 def _settle(way: Way, finger: FiniteFinger, speed: float, times: float) -> None:
     """Slide until the response does not change any more. Raises NotConverged where it still does."""
-    depth, friction = way.last.pull.depth, way.last.pull.mu
-    sed, step = finger.sed_ending(way.last), STRIDE / times * depth
+    depth, friction = way.last.load.depth, way.last.load.mu
+    sed, step = finger.sed_ending(way.last.u), STRIDE / times * depth
     longest = int(LONGEST / STRIDE * times)
     for number in range(longest):
         report_progress("sliding until nothing changes", number / longest)
         way.go(Aim(way.aim.time + step / abs(speed), way.aim.press, way.aim.along + float(np.sign(speed)) * step))
-        before, sed = sed, finger.sed_ending(way.last)
+        before, sed = sed, finger.sed_ending(way.last.u)
         if not (way.last.state == STICK).any() and abs(sed - before) * times <= SETTLED * sed:
             return
     raise NotConverged(

@@ -15,7 +15,7 @@ from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Pull
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState
 from solver.failures import NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Finger, Materials, Receptor, Scene
@@ -52,27 +52,27 @@ class _Question:
     finger: Finger
     materials: Materials
     receptor: Receptor
-    pull: Pull
+    load: LoadState
     by: int
     target: float
     scene: Scene = field(compare=False)
     stop: Callable[[], bool] = field(compare=False)
 
 
-def of_friction(scene: Scene, pull: Pull, target: float, stop: Callable[[], bool] = lambda: False) -> Reach:
-    """Return how far sliding at the depth and bound of `pull` goes from mu = 0 towards `target`.
+def of_friction(scene: Scene, load: LoadState, target: float, stop: Callable[[], bool] = lambda: False) -> Reach:
+    """Return how far sliding at the depth and bound of `load` goes from mu = 0 towards `target`.
 
     Raises NotConverged where not even the frictionless state is found, Cancelled where `stop` says so.
     """
-    return _reach(_asked(scene, pull._replace(mu=0.0), BY_FRICTION, target, stop))
+    return _reach(_asked(scene, load._replace(mu=0.0), BY_FRICTION, target, stop))
 
 
-def of_depth(scene: Scene, pull: Pull, stop: Callable[[], bool] = lambda: False) -> Reach:
-    """Return how far sliding at the friction of `pull` goes from a small depth towards that of `pull`.
+def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: False) -> Reach:
+    """Return how far sliding at the friction of `load` goes from a small depth towards that of `load`.
 
     Raises NotConverged where there is none even at a hundredth of it, Cancelled where `stop` says so.
     """
-    return _reach(_asked(scene, pull, BY_DEPTH, pull.depth, stop))
+    return _reach(_asked(scene, load, BY_DEPTH, load.depth, stop))
 
 
 def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = SOUND) -> bool:
@@ -86,15 +86,15 @@ def folded(finger: FiniteFinger, shape: EquilibriumState) -> bool:
     return finger.skin_compression(shape).kink > CREASE or finger.crosses(shape)
 
 
-def _asked(scene: Scene, pull: Pull, by: int, target: float, stop: Callable[[], bool]) -> _Question:
-    return _Question(scene.finger, scene.materials, scene.receptor, pull._replace(travel=0.0), by, target, scene, stop)
+def _asked(scene: Scene, load: LoadState, by: int, target: float, stop: Callable[[], bool]) -> _Question:
+    return _Question(scene.finger, scene.materials, scene.receptor, load._replace(travel=0.0), by, target, scene, stop)
 
 
 @lru_cache(maxsize=32)
 def _reach(asked: _Question) -> Reach:
     """Answer, and keep what was answered: all meshes of a scene ask the same."""
     folds = folds_at(finite_laws(asked.materials)[EPIDERMIS])
-    sizing = Sizing(FINENESS, asked.pull.depth, margin=MARGIN)
+    sizing = Sizing(FINENESS, asked.load.depth, margin=MARGIN)
     rough = FiniteFinger.of(asked.scene, sizing)
     branch = _followed(rough, _start(rough, asked), asked, folds)
     if not branch.limited and sound(rough, branch.last, PLAIN):
@@ -110,7 +110,7 @@ def _finely(
 ) -> tuple[FiniteFinger, Branch, float]:
     """Follow the branch on a mesh that is fine where the last of these `states` is squeezed most; return that place."""
     place = _squeezed(finger, states[-1])
-    fine = FiniteFinger.of(asked.scene, Sizing(FINENESS, asked.pull.depth, margin=MARGIN, fold=place))
+    fine = FiniteFinger.of(asked.scene, Sizing(FINENESS, asked.load.depth, margin=MARGIN, fold=place))
     return fine, _followed(fine, _begun(fine, finger, states, asked), asked, folds), place
 
 
@@ -120,13 +120,13 @@ def _followed(finger: FiniteFinger, start: EquilibriumState, asked: _Question, f
     branch = continue_branch(finger, start, asked.by, target, folds, asked.stop)
     if branch.limited or target == asked.target:
         return branch
-    last = settled(finger.newton, branch.last.pull._replace(mu=asked.target), branch.last, TOLERANCE, asked.stop)
+    last = settled(finger.newton, branch.last.load._replace(mu=asked.target), branch.last, TOLERANCE, asked.stop)
     return Branch((*branch.states, last), asked.target, limited=False)
 
 
 def _told(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
     least = finger.skin_compression(branch.last).least
-    return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers(branch.last))
+    return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers([branch.last])[0])
 
 
 def _squeezed(finger: FiniteFinger, shape: EquilibriumState) -> float:
@@ -138,16 +138,16 @@ def _squeezed(finger: FiniteFinger, shape: EquilibriumState) -> float:
 def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
     """Return the state at which the branch begins. Raises NotConverged."""
     if asked.by == BY_FRICTION:
-        return settled(finger.newton, asked.pull, None, TOLERANCE, asked.stop)
+        return settled(finger.newton, asked.load, None, TOLERANCE, asked.stop)
     for part in STARTS:
         try:
-            start = settled(finger.newton, asked.pull._replace(depth=part * asked.target), None, TOLERANCE, asked.stop)
+            start = settled(finger.newton, asked.load._replace(depth=part * asked.target), None, TOLERANCE, asked.stop)
         except NotConverged:
             continue
         if sound(finger, start):
             return start
     raise NotConverged(
-        f"no sliding state was found at mu = {asked.pull.mu:.3g} even at {STARTS[-1] * asked.target:.3g} mm: ask for "
+        f"no sliding state was found at mu = {asked.load.mu:.3g} even at {STARTS[-1] * asked.target:.3g} mm: ask for "
         "less friction"
     )
 
@@ -163,7 +163,7 @@ def _begun(
         if rough.skin_compression(state).lowest < SMOOTH:
             continue
         try:
-            shape = settled(fine.newton, state.pull, fine.transfer(state, rough), TOLERANCE, asked.stop)
+            shape = settled(fine.newton, state.load, fine.transfer(state, rough), TOLERANCE, asked.stop)
         except NotConverged:
             continue
         if sound(fine, shape) or state is states[0]:

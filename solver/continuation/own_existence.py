@@ -12,7 +12,7 @@ from solver.contact.skin_compression import SkinCompression
 from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, FiniteNewton, LoadState
 from solver.failures import NoSteadyState, NotConverged
 
 CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
@@ -20,12 +20,12 @@ CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends th
 
 def steady(
     newton: FiniteNewton,
-    pull: Pull,
+    load: LoadState,
     skin: Law,
     start: EquilibriumState | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> EquilibriumState:
-    """Return the settled sliding state under `pull`, followed on this mesh from the one without friction.
+    """Return the settled sliding state under `load`, followed on this mesh from the one without friction.
 
     That is sought from undeformed, or from `start`. `skin` is the law of what may fold. Raises NoSteadyState where the
     branch ends before, at a limit point or where the skin folds, with the largest friction as this mesh has it;
@@ -33,14 +33,14 @@ def steady(
     says so.
     """
     body = _OwnBody(newton)
-    bare = settled(newton, pull._replace(mu=0.0), start, stop=stop)
-    branch = continue_branch(body, bare, BY_FRICTION, min(pull.mu, LARGEST_MU), folds_at(skin), stop)
-    where = f"at {pull.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
+    bare = settled(newton, load._replace(mu=0.0), start, stop=stop)
+    branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin), stop)
+    where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.limited and (branch.lost or body.spoilt(branch.last)):
-        raise NotConverged(f"{where} and lost there; whether there is any at mu = {pull.mu:.3g} is not known")
+        raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
-    found = settled(newton, pull, branch.last, stop=stop)
+    found = settled(newton, load, branch.last, stop=stop)
     if jumped_branch(body, branch.last, found):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return found

@@ -2,20 +2,19 @@
 
 from contextlib import suppress
 
-import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver._kernels import STICK
 from solver.continuation.small_states import followed_under, settled
 from solver.continuation.wedging import continue_branch, limits
-from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.scene import Scene
 
 
-def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: bool) -> EquilibriumState | None:
+def direct(scene: Scene, finger: LinearFinger, times: float = 1.0, *, widest: bool) -> EquilibriumState | None:
     """Return the settled state; None where contact must be looked for on more of the skin than this, not the `widest`.
 
     Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
@@ -37,7 +36,7 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:
-        reached, limit = continue_branch(finger.newton, sliding_pull(scene))
+        reached, limit = continue_branch(finger.newton, sliding_load(scene))
     else:
         reached, limit = followed_under(scene, finger)
     if reached is None:
@@ -45,9 +44,9 @@ def direct(scene: Scene, finger: FingerModel, times: float = 1.0, *, widest: boo
     return reached
 
 
-def _folded(finger: FingerModel, state: EquilibriumState) -> bool:
+def _folded(finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
-    return bool(np.prod(finger.stretches(finger.displacement(state)), axis=0).min() <= 0.0)
+    return finger.smallest_det(finger.displacement(state)) <= 0.0
 
 
 def _pressed(scene: Scene) -> str:
@@ -68,7 +67,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
         )
     limit_force = limit_depth = None
     with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
-        limit_force, limit_depth = limits(scene, sliding_pull(scene))
+        limit_force, limit_depth = limits(scene, sliding_load(scene))
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"

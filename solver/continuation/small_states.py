@@ -10,11 +10,11 @@ from solver.arrays import Array
 from solver.body.tissues import relaxing_laws
 from solver.continuation.wedging import continue_branch
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, Progress, march
-from solver.equilibrium.loads import forces_of, pull_of, sliding_pull
+from solver.equilibrium.loads import forces_of, load_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
@@ -24,25 +24,25 @@ ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that
 NUDGE = 1e-4  # of a given force, to see whether the finger gives way
 
 
-def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> EquilibriumState:
+def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
     """Return the settled state, without its history where it has none left, else in `times` the usual load steps.
 
     Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where a given drag is more than
     friction carries.
     """
-    pull, loading, newton = sliding_pull(scene), scene.loading_per_mm, finger.newton
-    if loading.direction == 0 and not pull.frictionless:
-        return march(newton, pull_of(scene), loading, times=times)[-1].state
+    load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
+    if loading.direction == 0 and not load.frictionless:
+        return march(newton, load_of(scene), loading, times=times)[-1].state
     if loading.normal_force is None:
-        return full_slip(newton, pull)
+        return full_slip(newton, load)
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        found = slide_under(newton, pull, loading.normal_force, deepest)
+        found = slide_under(newton, load, loading.normal_force, deepest)
     except ContactLost:
         if loading.tangential_force is None:
             raise
         # the drag may be met where sliding would wedge
-        return march(newton, pull_of(scene), loading, times=times)[-1].state
+        return march(newton, load_of(scene), loading, times=times)[-1].state
     if loading.tangential_force is None:
         return found
     most = abs(float(found.force[0]))
@@ -50,77 +50,77 @@ def settled(scene: Scene, finger: FingerModel, times: float = 1.0) -> Equilibriu
         raise beyond_friction(loading.tangential_force, most, loading.normal_force)
     if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
         return found
-    return march(newton, pull_of(scene), loading, times=times)[-1].state
+    return march(newton, load_of(scene), loading, times=times)[-1].state
 
 
-def followed_under(scene: Scene, finger: FingerModel) -> tuple[EquilibriumState | None, float]:
+def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
     """Return full slip under the normal force of a scene, continued from mu = 0 as `wedging.continue_branch` does.
 
     Raises NoSteadyState where that force presses the finger to its bone.
     """
-    pull, force = sliding_pull(scene), scene.normal_force or 0.0
+    load, force = sliding_load(scene), scene.normal_force or 0.0
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        first = slide_under(finger.newton, pull._replace(mu=0.0), force, deepest)
+        first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
     except ContactLost:
         return None, 0.0
-    reached, limit = continue_branch(finger.newton, pull, force, first)
+    reached, limit = continue_branch(finger.newton, load, force, first)
     if limit == 0.0:
-        in_tissue(scene, finger, first.pull.depth)
+        in_tissue(scene, finger, first.load.depth)
     return reached, limit
 
 
-def gives_way(scene: Scene, finger: FingerModel, state: EquilibriumState) -> bool:
+def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether a settled slide under a given force would be less deep under a little more force."""
     force = scene.normal_force
     if force is None or scene.loading.direction == 0 or (state.state == STICK).any():
         return False
     try:
-        beside = slide_beside(finger.newton, sliding_pull(scene), state.state, (1.0 + NUDGE) * force)
+        beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + NUDGE) * force)
     except ContactLost:
         return False
-    return beside.pull.depth < state.pull.depth
+    return beside.load.depth < state.load.depth
 
 
-def in_tissue(scene: Scene, finger: FingerModel, depth: float) -> None:
+def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
     """Raise SolveFailure where a given force has led to a `depth` [mm] that means nothing, as beyond the bone."""
     room, most = scene.finger.pulp_thickness(), None
     if depth >= room:
         with suppress(ContactLost):
-            most = float(full_slip(finger.newton, sliding_pull(scene)._replace(depth=room)).force[1])
+            most = float(full_slip(finger.newton, sliding_load(scene)._replace(depth=room)).force[1])
     within_reach(scene, depth, most)
 
 
 def depends_on_way(scene: Scene, state: EquilibriumState) -> bool:
     """Return whether a state is the end of a course and not a settled slide."""
-    pressed = scene.loading.direction == 0 and not pull_of(scene).frictionless
+    pressed = scene.loading.direction == 0 and not load_of(scene).frictionless
     return pressed or bool((state.state == STICK).any())
 
 
 def marched(
-    scene: Scene, finger: FingerModel, progress: Progress | None = None, times: float = 1.0
+    scene: Scene, finger: LinearFinger, progress: Progress | None = None, times: float = 1.0
 ) -> tuple[tuple[Instant, ...], Array | None]:
     """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
-    pull, loading = pull_of(scene), scene.loading_per_mm
+    load, loading = load_of(scene), scene.loading_per_mm
     if not scene.materials.relax:
-        return march(finger.newton, pull, loading, progress, times), None
+        return march(finger.newton, load, loading, progress, times), None
     laws = relaxing_laws(scene.materials)
     body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
     first = PRESSING_TIME / round(PRESSING_STEPS * times)
-    way = RelaxingWay(body, pull, loading, finger.ending, finger.point, first)
+    way = RelaxingWay(body, load, loading, finger.ending.endings, finger.point.endings, first)
     march_relaxing(way, loading, scene.materials.longest_creep, progress, times)
     return tuple(way.instants), np.array(way.sed)
 
 
-def end(scene: Scene, finger: FingerModel, times: float = 1.0) -> EquilibriumState:
+def end(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
     """Return the end of a course that it depends on. Raises NotConverged."""
     if scene.materials.relax and scene.solve.course == "history":
         return marched(scene, finger, times=times)[0][-1].state
-    return march(finger.newton, pull_of(scene), scene.loading_per_mm, times=times)[-1].state
+    return march(finger.newton, load_of(scene), scene.loading_per_mm, times=times)[-1].state
 
 
 def refined(
-    scene: Scene, finger: FingerModel, state: EquilibriumState, displacement: Array
+    scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array
 ) -> tuple[EquilibriumState, Array]:
     """Return a state and its displacement (nodes, 2) once more, with less round-off: balanced, the skin on the surface.
 
@@ -131,14 +131,14 @@ def refined(
     newton = Newton(about)
     try:
         again = newton.solved(
-            replace(state, u=np.zeros_like(state.u)), state.pull, newton.skin_x, forces_of(scene, state.pull)
+            replace(state, u=np.zeros_like(state.u)), state.load, newton.skin_x, forces_of(scene, state.load)
         )
     except ContactLost:
         return state, displacement
     return replace(again, u=state.u + again.u, iterations=state.iterations), recover(again.u)
 
 
-def nearest(scene: Scene, finger: FingerModel) -> EquilibriumState:
+def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
 
     Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled`.
@@ -152,7 +152,7 @@ def nearest(scene: Scene, finger: FingerModel) -> EquilibriumState:
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
-        reached, _ = continue_branch(finger.newton, sliding_pull(scene))
+        reached, _ = continue_branch(finger.newton, sliding_load(scene))
         if reached is None:
             raise
         return reached
@@ -160,5 +160,5 @@ def nearest(scene: Scene, finger: FingerModel) -> EquilibriumState:
 
 def shift_of(scene: Scene, state: EquilibriumState) -> float | None:
     """Return how far the bone was shifted along +x [mm] by a given drag; None where it slides or is only pressed."""
-    held = scene.loading.dragged and state.pull.sense == 0 and not state.pull.frictionless
-    return 0.0 - state.pull.travel if held else None
+    held = scene.loading.dragged and state.load.sense == 0 and not state.load.frictionless
+    return 0.0 - state.load.travel if held else None

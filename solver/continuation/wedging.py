@@ -12,7 +12,7 @@ from math import log2, sqrt
 from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
-from solver.equilibrium.newton import EquilibriumState, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Scene
@@ -27,33 +27,33 @@ CLOSE = 0.005  # relative step of mu below which a limit is taken as found
 
 
 def continue_branch(
-    newton: Newton, pull: Pull, force: float | None = None, first: EquilibriumState | None = None
+    newton: Newton, load: LoadState, force: float | None = None, first: EquilibriumState | None = None
 ) -> tuple[EquilibriumState | None, float]:
-    """Return the settled sliding state under `pull` reached by following it from mu = 0, and the largest mu with one.
+    """Return the settled sliding state under `load` reached by following it from mu = 0, and the largest mu with one.
 
-    The state is None where that mu falls short of the pull's. Under a normal `force`, `first` is the state at mu = 0;
-    the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
+    The state is None where that mu falls short of the one of `load`. Under a normal `force`, `first` is the state at
+    mu = 0; the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
     """
-    reached, step, unknown = 0.0, pull.mu, False
+    reached, step, unknown = 0.0, load.mu, False
     try:
-        state = settled(newton, pull._replace(mu=0.0)) if first is None else first
+        state = settled(newton, load._replace(mu=0.0)) if first is None else first
     except ContactLost:
         return None, 0.0
-    while reached < pull.mu and step > CLOSE * max(reached, min(0.01, pull.mu)):
-        aim = min(reached + step, pull.mu)
+    while reached < load.mu and step > CLOSE * max(reached, min(0.01, load.mu)):
+        aim = min(reached + step, load.mu)
         try:
-            found = slide_beside(newton, pull._replace(mu=aim), state.state, force, PATIENCE)
+            found = slide_beside(newton, load._replace(mu=aim), state.state, force, PATIENCE)
         except ContactLost:
             step /= 2.0
             continue
         if found.touching[0] or found.touching[-1]:  # the skin that may touch ends: what lies beyond is not known
             step, unknown = step / 2.0, first is not None
             continue
-        if first is not None and not found.pull.depth > 0.0:  # pressed by a surface that it does not reach
+        if first is not None and not found.load.depth > 0.0:  # pressed by a surface that it does not reach
             step /= 2.0
             continue
         state, reached, step = found, aim, 2.0 * step
-    if reached == pull.mu:
+    if reached == load.mu:
         return state, reached
     return None, 0.0 if unknown else reached
 
@@ -80,28 +80,28 @@ class Bodies:
         return Newton(LinearBody.of(mesh, settled_moduli(scene.materials), checked=True).condensed)
 
 
-def limits(scene: Scene, pull: Pull) -> tuple[float | None, float | None]:
-    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `pull`, each to 3 %.
+def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
+    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `load`, each to 3 %.
 
     Below those of the scene; the force is None where the scene gives none, and either where it is not known.
     """
     bodies = Bodies(scene)
     if scene.normal_force is None:
-        return None, _deepest(bodies, pull, scene.loading.depth)
-    found = _strongest(bodies, scene, scene.normal_force, pull)
+        return None, _deepest(bodies, load, scene.loading.depth)
+    found = _strongest(bodies, scene, scene.normal_force, load)
     if found is None:
         return None, None
-    return found[0], _deepest(bodies, pull, BEYOND * found[1], found[1])
+    return found[0], _deepest(bodies, load, BEYOND * found[1], found[1])
 
 
-def _deepest(bodies: Bodies, pull: Pull, high: float, low: float | None = None) -> float | None:
+def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = None) -> float | None:
     """Return the largest indentation [mm] below `high`, and above `low` where that is known, with settled sliding.
 
     None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
     """
 
     def slides(depth: float) -> bool:
-        return continue_branch(bodies.at(depth), pull._replace(depth=depth))[0] is not None
+        return continue_branch(bodies.at(depth), load._replace(depth=depth))[0] is not None
 
     least = LEAST * high
     while low is None:
@@ -110,29 +110,29 @@ def _deepest(bodies: Bodies, pull: Pull, high: float, low: float | None = None) 
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     found = _largest(slides, low, high)
     finer = bodies.made_for(found, FINER * FINENESS)
-    ends = [continue_branch(finer, pull._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
+    ends = [continue_branch(finer, load._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
 
 
-def _strongest(bodies: Bodies, scene: Scene, force: float, pull: Pull) -> tuple[float | None, float] | None:
+def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
     """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
 
     The force is None where a finer mesh puts it elsewhere; all is None where there is no sliding.
     """
     depths, bone = [0.0], scene.finger.pulp_thickness()
-    bare = pull._replace(mu=0.0)
+    bare = load._replace(mu=0.0)
 
     def reached(newton: Newton, force: float) -> EquilibriumState | None:
-        return continue_branch(newton, pull, force, slide_under(newton, bare, force, bone))[0]
+        return continue_branch(newton, load, force, slide_under(newton, bare, force, bone))[0]
 
     def rubless(force: float) -> float:
-        return slide_under(bodies.at(bone / 2.0), bare, force, bone).pull.depth
+        return slide_under(bodies.at(bone / 2.0), bare, force, bone).load.depth
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
             found = reached(bodies.at(rubless(force)), force)
             if found is not None:
-                depths.append(found.pull.depth)
+                depths.append(found.load.depth)
             return found is not None
         return False
 

@@ -11,7 +11,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.validation import check_loads
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
 from solver.failures import NotConverged
 
 
@@ -19,24 +19,24 @@ def loaded(
     newton: FiniteNewton,
     loads: Array | None = None,
     prescribed: Array | None = None,
-    pull: Pull | None = None,
+    load: LoadState | None = None,
     start: EquilibriumState | None = None,
     steps: int = 4,
 ) -> EquilibriumState:
     """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], what is held displaced by `prescribed` [mm].
 
     `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
-    the first guess), in `steps` equal parts; one that fails is halved. `pull` (its default: no contact depth, no
+    the first guess), in `steps` equal parts; one that fails is halved. `load` (its default: no contact depth, no
     friction) stays the same meanwhile. The loads stay on `newton` for what follows. Raises BodyError for arrays of
-    another shape, ValueError for a load on the centre of an element and for a pull that is none, NotConverged where no
-    equilibrium is found.
+    another shape, ValueError for a load on the centre of an element and for a load state that is none, NotConverged
+    where no equilibrium is found.
     """
     body = newton.body
     check_loads(body.mesh, loads, prescribed)
     loads, prescribed = (None if given is None else np.asarray(given, np.float64) for given in (loads, prescribed))
     shape = EquilibriumState.undeformed(body) if start is None else start
-    pull = (shape.pull if pull is None else pull).checked()
-    shape = replace(shape, pull=pull)
+    load = (shape.load if load is None else load).checked()
+    shape = replace(shape, load=load)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(newton, loads)
     driven = body.mesh.driven
     held_at = shape.u[driven]
@@ -48,7 +48,7 @@ def loaded(
         newton.finite.load[:] = before + part * (vector - before)
         u = shape.u.copy()
         u[driven] = held_at + part * moved
-        shape = newton.settle(replace(shape, u=u), pull)
+        shape = newton.settle(replace(shape, u=u), load)
 
     def refusal(done: float, _part: float, reason: NotConverged) -> NotConverged:
         return NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}")

@@ -6,9 +6,9 @@ from functools import lru_cache
 
 from numpy.linalg import LinAlgError
 
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import slide_under
-from solver.equilibrium.loads import sliding_pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.grid import MeshError
@@ -32,7 +32,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
     finger = _finger(_bare(scenes[0], deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
-    return tuple(None if found is None else found.pull.depth for found in pressed)
+    return tuple(None if found is None else found.load.depth for found in pressed)
 
 
 def expected_depth(scene: Scene) -> float:
@@ -56,7 +56,7 @@ def expected_depth(scene: Scene) -> float:
         return deepest
     # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
     highest = float(finger.body.condensed.rest[found.touching, 1].max())
-    return max(found.pull.depth, COVERED * highest, SHALLOW)
+    return max(found.load.depth, COVERED * highest, SHALLOW)
 
 
 def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
@@ -91,16 +91,16 @@ def _bare(scene: Scene, deepest: float) -> Scene:
 
 
 @lru_cache(maxsize=1)
-def _finger(bare: Scene) -> FingerModel:
+def _finger(bare: Scene) -> LinearFinger:
     """Return the finger on a rough mesh: surfaces of one finger follow each other and share it. Raises MeshError."""
-    return FingerModel.of(bare, Sizing(FINENESS, bare.loading.depth))
+    return LinearFinger.of(bare, Sizing(FINENESS, bare.loading.depth))
 
 
-def _pressed(finger: FingerModel, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
+def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
     """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
     try:
-        found = slide_under(finger.newton, sliding_pull(scene), normal_force, deepest)
+        found = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:
         return None
     inside = not (found.touching[0] or found.touching[-1])
-    return found if inside and found.pull.depth <= deepest else None
+    return found if inside and found.load.depth <= deepest else None

@@ -1,4 +1,4 @@
-"""The finger at finite strain on one mesh, ready for any surface."""
+"""The finger at finite strain on one mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,28 +10,25 @@ from numpy.linalg import LinAlgError
 
 from solver import _kernels as kernels
 from solver._kernels import OPEN
-from solver.arrays import Array
-from solver.body.finite import FiniteBody, FiniteProbes
-from solver.body.receptor import endings, middle
+from solver.arrays import Array, Indices
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.finite_measures import deformation, element_forces, energy_slope
+from solver.body.receptor import Endings
 from solver.body.tissues import finite_laws
-from solver.contact.edges import width
 from solver.contact.skin_compression import SkinCompression
+from solver.equilibrium.finger import Finger
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
-from solver.prediction import ROW
 from solver.scene import Scene, SceneError
 
 
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
-class FiniteFinger:
-    """A finger on one mesh, ready for any surface."""
+class FiniteFinger(Finger[FinitePatches]):
+    """A finger at finite strain on one mesh."""
 
-    scene: Scene  # whose finger it is; its friction and load may be those of another surface
-    geometry: FingerMesh
     newton: FiniteNewton
-    ending: FiniteProbes  # the reference ending alone
 
     @staticmethod
     def of(scene: Scene, sizing: Sizing, beside: "FiniteFinger | None" = None) -> "FiniteFinger":
@@ -48,56 +45,57 @@ class FiniteFinger:
     def on(scene: Scene, geometry: FingerMesh, beside: "FiniteFinger | None" = None) -> "FiniteFinger":
         """Do the same on a mesh of the finger that was made before."""
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
-        at_touch = FiniteProbes.of(body, endings(geometry, body, scene.receptor, np.zeros(1)))
-        newton = FiniteNewton(body, None if beside is None else beside.newton)
-        return FiniteFinger(scene, geometry, newton, at_touch)
+        return FiniteFinger(scene, geometry, FiniteNewton(body, None if beside is None else beside.newton))
 
-    @cached_property
-    def point(self) -> FiniteProbes:
-        """The middle of the reference ending."""
-        body = self.newton.body
-        return FiniteProbes.of(body, middle(self.geometry, body, self.scene.receptor))
+    @property
+    def body(self) -> FiniteBody:
+        """Its body."""
+        return self.newton.body
 
-    @cached_property
-    def row(self) -> FiniteProbes:
-        """The row of receptors."""
-        body = self.newton.body
-        return FiniteProbes.of(body, endings(self.geometry, body, self.scene.receptor, ROW))
+    @property
+    def elements(self) -> FiniteBody:
+        """The elements of its body."""
+        return self.newton.body
 
-    def sed_ending(self, shape: EquilibriumState) -> float:
-        """Return the SED averaged over the reference ending [MPa]."""
-        return float(self.ending.average(self.newton.body, shape.u)[0])
+    @property
+    def dofs(self) -> int:
+        """Number of unknown displacements."""
+        return self.body.dofs
 
-    def seds(self, shape: EquilibriumState) -> tuple[float, float]:
-        """Return the SED averaged over the reference ending and that in its middle [MPa]."""
-        return self.sed_ending(shape), float(self.point.average(self.newton.body, shape.u)[0])
+    def patches(self, placed: Endings) -> FinitePatches:
+        """Do as `Finger` says."""
+        return FinitePatches.of(self.newton.body, placed)
 
-    def numbers(self, shape: EquilibriumState) -> Array:
-        """Return SED of the ending, normal and tangential force along +x (3,)."""
-        along, up = shape.force
-        return np.array([self.sed_ending(shape), up, along])
+    def displacements(self, states: Sequence[EquilibriumState], only: Indices | None = None) -> Array:  # noqa: ARG002
+        """Do as `Finger` says; all nodes are there anyway."""
+        return np.stack([state.u for state in states], axis=2)
 
-    def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return the numbers of each state (c, COUNT) whose errors are estimated, as `FingerModel` has them."""
-        return np.array([self._all_numbers(state) for state in states])
+    def displacement(self, state: EquilibriumState) -> Array:
+        """Do as `Finger` says."""
+        return state.u
 
-    def _all_numbers(self, s: EquilibriumState) -> tuple[float, ...]:
-        middle = self.point.average(self.newton.body, s.u)[0]
-        rest = s.pull.depth, 0.0 - s.pull.travel, self.contact_width(s), middle
-        return *self.numbers(s), *rest, *self.responses(s.u[:, :, None])[0]
+    def following(self, skin: Array) -> Array:
+        """Do as `Finger` says, the centres of elements with their other nodes."""
+        body, inside = self.body, self.newton.finite.inside
+        unknowns = np.stack([inside.back_substitute(one, still=True) for one in skin.T.copy()], axis=1)
+        out = np.zeros((*body.mesh.nodes.shape, unknowns.shape[1]))
+        outer = np.where((body.unknown >= 0)[..., None], unknowns[body.unknown], 0.0)  # (e, 8, 2, c)
+        out[body.nodes[:, :8]] = outer
+        recovery = self.newton.finite.system.recovery_matrix[:, :, :16]
+        out[body.nodes[:, 8]] = -recovery @ outer.reshape(len(outer), 16, -1)
+        return out
 
-    def responses_of(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return every quantity at the reference ending of several states (c, q)."""
-        return np.concatenate([self.responses(state.u[:, :, None]) for state in states])
+    def inner_forces(self, displacement: Array) -> Array:
+        """Do as `Finger` says."""
+        return self.body.nodal(element_forces(self.body, displacement))
 
-    def responses(self, displacement: Array) -> Array:
-        """Return every quantity at the reference ending (c, q) for displacements (nodes, 2, c), even complex ones."""
-        return self.ending.responses(self.newton.body, displacement)[:, 0].T
+    def energy_growth(self, displacement: Array) -> float:
+        """Do as `Finger` says, from the energy alone."""
+        return energy_slope(self.body, displacement, displacement)
 
-    def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
-        row = [self.row.average(self.newton.body, state.u) for state in states]
-        return np.hstack([self.all_numbers(states), row])
+    def smallest_det(self, displacement: Array) -> float:
+        """Do as `Finger` says, of the quadrature points."""
+        return float(np.linalg.det(deformation(self.body, displacement)).min())
 
     def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `shape`, found on `other`, as a start on this mesh."""
@@ -137,7 +135,3 @@ class FiniteFinger:
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
-
-    def contact_width(self, shape: EquilibriumState) -> float:
-        """Return how long the contact is along the surface [mm]."""
-        return width(self.places.skin, shape.place(self.newton.body)[:, 0], shape.reaction[:, 1], shape.touching)

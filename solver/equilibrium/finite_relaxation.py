@@ -12,7 +12,7 @@ import numpy as np
 from solver import _kernels as kernels
 from solver._kernels import STICK
 from solver.arrays import Array, Indices
-from solver.body.finite import CondensedFinite, FiniteBody, FiniteProbes
+from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.finite_measures import deformation
 from solver.body.tissues import relaxing_laws
 from solver.body.validation import check_moduli, check_terms
@@ -22,7 +22,7 @@ from solver.constitutive.overstress import Past
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.load_path import DRAGGING_STEPS, LONG, PRESSING_STEPS, Aim, Way, press_and_drag
 from solver.equilibrium.load_stepping import never
-from solver.equilibrium.loads import pull_of
+from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import NotConverged
@@ -89,9 +89,9 @@ class RelaxingNewton(FiniteNewton):
         gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
 
-    def excess_energy(self) -> float:
-        """Return the energy [N mm per mm] that the terms hold at the last instant remembered."""
-        return float(self.relaxing.past.energy() @ self.body.weight.ravel())
+    def stored(self, state: EquilibriumState) -> float:
+        """Return the energy stored at a state, with what the terms hold at the last instant remembered."""
+        return super().stored(state) + float(self.relaxing.past.energy() @ self.body.weight.ravel())
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
@@ -107,7 +107,7 @@ def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
 class _Watched:
     """The energy of one patch of probes, with what its tissue still holds of the past."""
 
-    def __init__(self, probes: FiniteProbes, body: FiniteBody, laws: Sequence[Prony]) -> None:
+    def __init__(self, probes: FinitePatches, body: FiniteBody, laws: Sequence[Prony]) -> None:
         self._probes, self._body = probes, body
         self._past = Past.at_rest(*_terms(laws, body.mesh.region[probes.element]))
 
@@ -117,7 +117,7 @@ class _Watched:
         local = shape.u[body.nodes[probes.element]]
         gradient = np.stack([probes.grad_x, probes.grad_y], axis=-1)
         self._past = self._past.after(np.eye(2) + np.einsum("pia,piA->paA", local, gradient), step)
-        energy = probes.energy(body, shape.u) + self._past.energy()
+        energy = probes.energy(shape.u) + self._past.energy()
         return float(energy @ probes.weights / probes.weights.sum())
 
 
@@ -136,7 +136,7 @@ class RelaxingCourse(Way):
         laws, loading = relaxing_laws(scene.materials), scene.loading_per_mm
         self.relaxing = RelaxingNewton(finger.newton.body, laws)
         good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
-        super().__init__(self.relaxing, pull_of(scene), loading, good, stop)
+        super().__init__(self.relaxing, load_of(scene), loading, good, stop)
         self._watched = [_Watched(probes, self.relaxing.body, laws) for probes in (finger.ending, finger.point)]
         self._longest, self._times, self._sense = scene.materials.longest_creep, times, 0
         self.sed: list[tuple[float, float]] = []
@@ -150,7 +150,7 @@ class RelaxingCourse(Way):
         """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
         step = aim.time - self.aim.time
         self.relaxing.ready(step)
-        shape = super().found(replace(before, pull=before.pull._replace(sense=self._sense)), aim)
+        shape = super().found(replace(before, load=before.load._replace(sense=self._sense)), aim)
         self.relaxing.took(shape, step)
         ending, point = (watched.follow(shape, step) for watched in self._watched)
         self.sed.append((ending, point))

@@ -10,7 +10,7 @@ from dataclasses import replace
 from solver._kernels import STICK
 from solver.arrays import Array
 from solver.equilibrium.load_stepping import advance
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton, Pull, lowered
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
 from solver.equilibrium.root import UNMET, find_root
 from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import report_progress
@@ -24,22 +24,22 @@ def corrected(
     `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
     `kept` the tangent is the last one. None where there is no way.
     """
-    pull = shape.pull
+    load = shape.load
     if given.tangential is None:
-        pull = pull._replace(travel=given.travel)
+        load = load._replace(travel=given.travel)
     linearise = newton.relinearise if kept else newton.linearise
-    if not linearise(shape, pull, origin + pull.travel - before, 0, given):
+    if not linearise(shape, load, origin + load.travel - before, 0, given):
         return None
     deeper, along = newton.system.motion.tolist()
-    pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
-    after, largest, changed = newton.moved(shape, pull, newton.steps[:, EQUILIBRIUM], origin + pull.travel - before)
+    load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
+    after, largest, changed = newton.moved(shape, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before)
     return after, max(largest, abs(deeper), abs(along)), changed
 
 
 def balanced(
     newton: Newton, start: EquilibriumState, given: Given, tolerance: float = 1e-8, limit: int = 30
 ) -> EquilibriumState:
-    """Return the equilibrium under `given`, one backward Euler step from `start`, whose pull has friction and sense.
+    """Return the equilibrium under `given`, one backward Euler step from `start`, whose load has friction and sense.
 
     Raises NotConverged where `limit` iterations do not do it.
     """
@@ -56,12 +56,12 @@ def _iterated(
     newton: Newton, start: EquilibriumState, begin: EquilibriumState, given: Given, tolerance: float, limit: int
 ) -> EquilibriumState:
     """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
-    origin, before = start.place(newton.condensed)[:, 0], start.pull.travel
+    origin, before = start.place(newton.condensed)[:, 0], start.load.travel
     shape = begin
     if newton.condensed.constant:
         if given.tangential is None:
-            shape = replace(shape, pull=shape.pull._replace(travel=given.travel))
-        return newton.solved(shape, shape.pull, origin + shape.pull.travel - before, given)
+            shape = replace(shape, load=shape.load._replace(travel=given.travel))
+        return newton.solved(shape, shape.load, origin + shape.load.travel - before, given)
     for _ in range(limit):
         done = corrected(newton, shape, given, origin, before)
         if done is None:
@@ -76,9 +76,9 @@ def _iterated(
 
 def _slips_freely(shape: EquilibriumState, given: Given) -> bool:
     """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
-    if given.tangential is None or not shape.pull.mu > 0.0 or (shape.state == STICK).any():
+    if given.tangential is None or not shape.load.mu > 0.0 or (shape.state == STICK).any():
         return False
-    return abs(shape.force[0] - given.tangential) > UNMET * shape.pull.mu * given.normal
+    return abs(shape.force[0] - given.tangential) > UNMET * shape.load.mu * given.normal
 
 
 def _met_by_travel(
@@ -95,7 +95,7 @@ def _met_by_travel(
         near = _iterated(newton, start, near, Given(given.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - wanted, near
 
-    found = find_root(at, shape.pull.travel, UNMET * shape.pull.mu * given.normal)
+    found = find_root(at, shape.load.travel, UNMET * shape.load.mu * given.normal)
     if found is None:
         raise NotConverged("no travel meets the drag")
     return found
@@ -122,11 +122,11 @@ def march(
             nonlocal shape
             shape = balanced(newton, lowered(newton.condensed, shape), begin.towards(aim, part))
 
-        advance(step, lambda _done, _part, why: followed_to(shape.pull.depth, shape.pull.travel, why), stop=stop)
+        advance(step, lambda _done, _part, why: followed_to(shape.load.depth, shape.load.travel, why), stop=stop)
         begin = aim
         yield shape
 
 
 def untouched(newton: Newton, mu: float, tau: float) -> EquilibriumState:
     """Return the undeformed body over a surface with this friction."""
-    return replace(EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, mu, tau).checked())
+    return replace(EquilibriumState.undeformed(newton.condensed), load=LoadState(0.0, mu, tau).checked())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.failures import ContactLost, NotConverged
 from solver.progress import report_progress
 
@@ -23,60 +23,60 @@ SMALLEST = 1.0 / 64.0  # part of the way below which a failing step is given up
 
 def settled(
     newton: Newton,
-    pull: Pull,
+    load: LoadState,
     start: EquilibriumState | None = None,
     tolerance: float = 1e-10,
     stop: Callable[[], bool] = lambda: False,
 ) -> EquilibriumState:
-    """Return the sliding state under `pull` (sense +1 or -1), from undeformed or from `start`, in one step.
+    """Return the sliding state under `load` (sense +1 or -1), from undeformed or from `start`, in one step.
 
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
-    Cancelled where `stop` says so, ValueError for a pull that is none.
+    Cancelled where `stop` says so, ValueError for a load state that is none.
     """
-    pull = pull.checked()
+    load = load.checked()
     if newton.condensed.constant:
-        return _at_once(newton, pull, start)
+        return _at_once(newton, load, start)
     shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
-    begin = shape.pull if start is not None else Pull(0.0, pull.mu, pull.tau, pull.sense)
+    begin = shape.load if start is not None else LoadState(0.0, load.mu, load.tau, load.sense)
     most = newton.systems + WORK
 
     def step(part: float) -> None:
         nonlocal shape
         if part < 1.0:
-            report_progress(f"coming to sliding at mu = {pull.mu:.3g} in small steps", part)
-        shape = newton.settle(shape, _between(begin, pull, part), tolerance if part == 1.0 else FIRST_TOLERANCE)
+            report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
+        shape = newton.settle(shape, _between(begin, load, part), tolerance if part == 1.0 else FIRST_TOLERANCE)
 
     def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
-        last = _between(begin, pull, done)
+        last = _between(begin, load, done)
         return NotConverged(
             f"no sliding state was found beyond {last.depth:.3g} mm of indentation at mu = {last.mu:.3g}: {reason}, in "
             f"steps of 1/{1 / part:.0f} of the way"
         )
 
-    control = StepControl(smallest=1.0 if begin == pull else SMALLEST)
+    control = StepControl(smallest=1.0 if begin == load else SMALLEST)
     advance(step, refusal, control, stop, exhausted=lambda: newton.systems > most)
     return shape
 
 
-def _at_once(newton: Newton, pull: Pull, start: EquilibriumState | None) -> EquilibriumState:
+def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
     """Return the sliding state of a body of constant stiffness, which is one step from any. Raises ContactLost.
 
     What differs is the contact that is thought of first: that of `start`, or skin that would lie deep in the surface.
     """
-    if pull.sense == 0:
+    if load.sense == 0:
         raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
     if start is not None:
-        return slide_beside(newton, pull, start.state)
+        return slide_beside(newton, load, start.state)
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     if newton.condensed.motions.shape[1]:  # how deep it lies, or a part of it, is found
-        return _first_of(newton, pull, float(np.ptp(height)), None)
-    above = height - pull.depth
-    guesses = [(above < -HERTZ * pull.depth, SLIP, SHORT), (above < 0.0, SLIP, None)]
-    if isfinite(pull.tau):
+        return _first_of(newton, load, float(np.ptp(height)), None)
+    above = height - load.depth
+    guesses = [(above < -HERTZ * load.depth, SLIP, SHORT), (above < 0.0, SLIP, None)]
+    if isfinite(load.tau):
         guesses.append((above < 0.0, SHEAR_LIMITED, None))
     for number, (low, slips, rounds) in enumerate(guesses):
         try:
-            return slide_beside(newton, pull, np.where(low, slips, OPEN), rounds=rounds)
+            return slide_beside(newton, load, np.where(low, slips, OPEN), rounds=rounds)
         except ContactLost:
             if number == len(guesses) - 1:
                 raise
@@ -84,52 +84,52 @@ def _at_once(newton: Newton, pull: Pull, start: EquilibriumState | None) -> Equi
 
 
 def slide_beside(
-    newton: Newton, pull: Pull, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
+    newton: Newton, load: LoadState, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
 ) -> EquilibriumState:
     """Return the slide of a body of constant stiffness whose contact states are sought from a `guess` (k,) of them.
 
-    Under a normal `force` [N/mm] the depth of `pull` is found. Raises ContactLost, after so many `rounds` of changes.
+    Under a normal `force` [N/mm] the depth of `load` is found. Raises ContactLost, after so many `rounds` of changes.
     """
     rest = EquilibriumState.undeformed(newton.condensed)
     states = guess.astype(np.int32)
-    begin = replace(rest, state=states, sense=np.full(len(states), pull.sense, np.int32))
+    begin = replace(rest, state=states, sense=np.full(len(states), load.sense, np.int32))
     given = None if force is None else Given(force, None)
-    return newton.solved(begin, pull, newton.skin_x, given, rounds)
+    return newton.solved(begin, load, newton.skin_x, given, rounds)
 
 
-def slide_under(newton: Newton, pull: Pull, force: float, deepest: float | None = None) -> EquilibriumState:
+def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:
     """Return the slide of a body of constant stiffness under a normal `force` [N/mm], its depth found.
 
     `deepest` [mm] is the scale of the first guesses, by default the height of the skin. Raises ContactLost.
     """
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    found = _first_of(newton, pull, float(np.ptp(height)) if deepest is None else deepest, force)
-    if deepest is None or found.pull.depth > 0.0:
+    found = _first_of(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
+    if deepest is None or found.load.depth > 0.0:
         return found
     raise ContactLost("the touching points have no forces that amount to the normal force")
 
 
-def _first_of(newton: Newton, pull: Pull, scale: float, force: float | None) -> EquilibriumState:
+def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
     """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     for number, part in enumerate(GUESSES):
         guess = np.where(height <= float(height.min()) + part * scale, SLIP, OPEN)
         try:
-            found = slide_beside(newton, pull, guess, force)
+            found = slide_beside(newton, load, guess, force)
         except ContactLost:
             if number == len(GUESSES) - 1:
                 raise
             continue
-        if force is None or found.pull.depth > 0.0 or number == len(GUESSES) - 1:
+        if force is None or found.load.depth > 0.0 or number == len(GUESSES) - 1:
             return found
     raise AssertionError  # there is always a guess
 
 
-def _between(begin: Pull, end: Pull, part: float) -> Pull:
-    """Return the pull `part` of the way; a bound that was not there before takes its value at once."""
+def _between(begin: LoadState, end: LoadState, part: float) -> LoadState:
+    """Return the load state `part` of the way; a bound that was not there before takes its value at once."""
     if part == 1.0:
         return end
     both = begin.tau < float("inf") and end.tau < float("inf")
     tau = begin.tau + part * (end.tau - begin.tau) if both else end.tau
     mu = begin.mu + part * (end.mu - begin.mu)
-    return Pull(begin.depth + part * (end.depth - begin.depth), mu, tau, end.sense)
+    return LoadState(begin.depth + part * (end.depth - begin.depth), mu, tau, end.sense)

@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_stepping import StepControl, advance, never
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.failures import Cancelled, NotConverged, followed_to
 from solver.scene import Loading
 
@@ -33,12 +33,12 @@ class Instant:
     @property
     def depth(self) -> float:
         """The bone's indentation [mm]."""
-        return self.state.pull.depth
+        return self.state.load.depth
 
     @property
     def travel(self) -> float:
         """How far the bone has moved along +x [mm]."""
-        return 0.0 - self.state.pull.travel
+        return 0.0 - self.state.load.travel
 
 
 class Aim(NamedTuple):
@@ -57,7 +57,7 @@ Progress = Callable[[float], bool]  # told the part done, 0 to 1; False asks to 
 
 
 def march(
-    newton: Newton, friction: Pull, loading: Loading, progress: Progress | None = None, times: float = 1.0
+    newton: Newton, friction: LoadState, loading: Loading, progress: Progress | None = None, times: float = 1.0
 ) -> tuple[Instant, ...]:
     """Drive a body down and along, step by step (backward Euler), until every slide of `loading` has settled.
 
@@ -91,10 +91,10 @@ def press_and_drag(way: "Way", loading: Loading, report: Callable[[float], None]
         way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
         report(number / count)
     if loading.tangential_force is not None:
-        pull = -loading.direction * loading.tangential_force
+        load = -loading.direction * loading.tangential_force
         for number in range(1, dragging + 1):
             part = number / dragging
-            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, pull * part))
+            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
             report((pressing + number) / count)
 
 
@@ -109,7 +109,7 @@ class Way:
     def __init__(
         self,
         newton: Newton,
-        friction: Pull,
+        friction: LoadState,
         loading: Loading,
         tolerance: float = TOLERANCE,
         stop: Callable[[], bool] = never,
@@ -124,7 +124,7 @@ class Way:
         # without friction there is no drag to speak of, and nothing that it could hold
         self.by_drag = loading.dragged and not self.frictionless
         rest = replace(
-            EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, friction.mu, friction.tau).checked()
+            EquilibriumState.undeformed(newton.condensed), load=LoadState(0.0, friction.mu, friction.tau).checked()
         )
         self.instants = [Instant(0.0, rest)]
         self.aim = Aim(0.0, 0.0, 0.0)
@@ -151,12 +151,12 @@ class Way:
         advance(step, self._refusal, CONTROL, self._stop)
 
     def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
-        return followed_to(self.last.pull.depth, self.last.pull.travel, reason)
+        return followed_to(self.last.load.depth, self.last.load.travel, reason)
 
     def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, coming from `before`. Raises NotConverged."""
         if not self.by_force:
-            return self.newton.settle(before, before.pull._replace(depth=aim.press, travel=-aim.along), self._tolerance)
+            return self.newton.settle(before, before.load._replace(depth=aim.press, travel=-aim.along), self._tolerance)
         given = Given(aim.press, aim.along) if self.by_drag else Given(aim.press, None, -aim.along)
         return balanced(self.newton, lowered(self.newton.condensed, before), given)
 

@@ -76,7 +76,7 @@ class MeshTransfer:
         """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
         state, sense = shape.state[self.nearest], shape.sense[self.nearest]
         state[state == kernels.STICK] = kernels.SLIP
-        return EquilibriumState(u, pressure, state, sense, self.forces @ shape.reaction, shape.pull, shape.iterations)
+        return EquilibriumState(u, pressure, state, sense, self.forces @ shape.reaction, shape.load, shape.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
         """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).

@@ -6,7 +6,9 @@ pressure in the geometric stiffness is the linearised prediction of the iteratio
 Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -20,13 +22,14 @@ from solver._kernels.arguments import (
     ContactStates,
     ContactSystem,
     ForceControl,
-    LoadState,
+    LoadArguments,
     Skin,
     SkinPosition,
 )
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
 from solver.body.finite import CondensedFinite, FiniteBody
+from solver.body.finite_measures import energy, energy_slope
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
 from solver.failures import ContactLost, NotConverged
@@ -45,7 +48,7 @@ SAME, AGAIN = 1e-3, 4  # relative difference of steps that are the same, and how
 EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
 
 
-class Pull(NamedTuple):
+class LoadState(NamedTuple):
     """What the surface does: how far it has risen, how far it has moved, and its friction."""
 
     depth: float  # of the bone's travel towards the surface [mm]
@@ -61,13 +64,13 @@ class Pull(NamedTuple):
         """Whether no tangential force is possible."""
         return self.mu == 0.0 or self.tau == 0.0
 
-    def checked(self) -> "Pull":
+    def checked(self) -> "LoadState":
         """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
         law = FrictionLaw(float(self.mu), float(self.tau))
         if self.sense not in (-1, 0, 1):
             raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
         depth, travel = finite("depth", self.depth), finite("travel", self.travel)
-        return Pull(depth, law.mu, law.tau_max, int(self.sense), travel)
+        return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
 
 
 class Given(NamedTuple):
@@ -118,7 +121,7 @@ class EquilibriumState:
     state: States  # (k,)
     sense: States  # (k,) direction of the friction force on the skin where it slips
     reaction: Array  # (k, 2) forces of the surface on the skin [N/mm]
-    pull: Pull
+    load: LoadState
     iterations: int  # linear systems solved on the way here, from undeformed
 
     @staticmethod
@@ -126,7 +129,7 @@ class EquilibriumState:
         """Return the body before anything touches it."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
-        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), Pull(0.0, 0.0), 0)
+        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), LoadState(0.0, 0.0), 0)
 
     def place(self, body: Deformable) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
@@ -136,6 +139,11 @@ class EquilibriumState:
     def touching(self) -> NDArray[np.bool_]:
         """Which nodes touch, (k,)."""
         return self.state != OPEN
+
+    @property
+    def sticking(self) -> float:
+        """Part of the touching nodes that stick [-]."""
+        return float(np.sum(self.state == STICK) / max(int(self.touching.sum()), 1))
 
     @property
     def normal(self) -> Array:
@@ -177,9 +185,9 @@ class Newton:
         self._meet = bind_arguments(kernels.meet, self.skin, self.system.length)
 
     def linearise(
-        self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int = 0, given: Given | None = None
+        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, given: Given | None = None
     ) -> bool:
-        """Set up the system at `shape` under `pull`, solve it for the skin's `steps` (2 k, 4); False where it fails.
+        """Set up the system at `shape` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
         times until none contradicts the linearised body. Where forces are `given`, the first step meets them too.
@@ -187,17 +195,17 @@ class Newton:
         self.systems += 1
         if not self.condensed.linearise(shape.u, shape.pressure):
             return False
-        return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
+        return self._touch(shape, load, anchor, rounds, given) != SINGULAR
 
     def relinearise(
-        self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int, given: Given | None = None
+        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None = None
     ) -> bool:
         """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
         if not self.condensed.relinearise(shape.u):
             return False
-        return self._touch(shape, pull, anchor, rounds, given) != SINGULAR
+        return self._touch(shape, load, anchor, rounds, given) != SINGULAR
 
-    def _touch(self, shape: EquilibriumState, pull: Pull, anchor: Array, rounds: int, given: Given | None) -> int:
+    def _touch(self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None) -> int:
         """Solve the contact of the linearised body at `shape`; return what `solve_active_set` does."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = shape.state, shape.sense
@@ -206,7 +214,7 @@ class Newton:
             kind = PUSH_GIVEN if given.tangential is None else DRAG_GIVEN
             drag, push = given.tangential or 0.0, given.normal
         return self._solve_contact(
-            self.arrays(), self.skin, self._states, load_state(pull), self._position(shape.u, pull, anchor),
+            self.arrays(), self.skin, self._states, load_arguments(load), self._position(shape.u, load, anchor),
             ForceControl(kind, float(drag), float(push), np.inf if body.constant else STRIDE), rounds,
         )  # fmt: skip
 
@@ -215,65 +223,81 @@ class Newton:
         body = self.condensed
         return CondensedArrays(body.stiffness, body.force, body.compliance, body.motions)
 
-    def _position(self, u: Array, pull: Pull, anchor: Array) -> SkinPosition:
+    def _position(self, u: Array, load: LoadState, anchor: Array) -> SkinPosition:
         """Return where the skin lies for displacements `u`, relative to the surface."""
         place = self.condensed.place(u)
-        return SkinPosition(place[:, 0].copy(), place[:, 1] - pull.depth, anchor)
+        return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
+
+    def relaxed(self, state: EquilibriumState) -> EquilibriumState:
+        """Return a state of tissues that relax with the displacements that its forces hold once they have."""
+        skin = self.condensed
+        return replace(state, u=(skin.compliance @ (skin.load + state.reaction.ravel())).reshape(-1, 2))
+
+    def stored(self, state: EquilibriumState) -> float:
+        """Return the energy stored in the body at a state [N mm per mm]."""
+        return 0.5 * float(np.sum(state.reaction * self.relaxed(state).u))
+
+    def elastic_work(self, states: Sequence[EquilibriumState], trapezoid: float) -> float:  # noqa: ARG002
+        """Return the work of the skin's forces along `states`, by the `trapezoid` rule so much [N mm per mm].
+
+        That rule is exact where forces grow in proportion.
+        """
+        return trapezoid
 
     def follows(self, steps: Array) -> Array:
         """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def moved(
-        self, shape: EquilibriumState, pull: Pull, skin: Array, anchor: Array, scale: float = 1.0
+        self, shape: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
         """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
         body, skin = self.condensed, np.ascontiguousarray(skin)
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(shape.u, shape.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
-        changed = self._meet(states, self._position(u, pull, anchor), load_state(pull))
-        return EquilibriumState(u, pressure, *states, pull, shape.iterations + 1), largest, changed
+        changed = self._meet(states, self._position(u, load, anchor), load_arguments(load))
+        return EquilibriumState(u, pressure, *states, load, shape.iterations + 1), largest, changed
 
     def settle(
-        self, start: EquilibriumState, pull: Pull, tolerance: float = 1e-10, limit: int = 25
+        self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
     ) -> EquilibriumState:
-        """Return the equilibrium under `pull`, from `start`, its displacements good to `tolerance` [mm].
+        """Return the equilibrium under `load`, from `start`, its displacements good to `tolerance` [mm].
 
         Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
         the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
         `limit` iterations do not do it or the body would turn inside out.
         """
-        x = start.place(self.condensed)[:, 0]
-        anchor = x + (pull.travel - start.pull.travel)
-        begin = self._entered(start, pull, x)
+        x = start.place(self.condensed)[:, 0].copy()  # as loops are compiled for
+        anchor = x + (load.travel - start.load.travel)
+        begin = self._entered(start, load, x)
         if self.condensed.constant:
             if self.condensed.motions.shape[1]:
-                begin = lowered(self.condensed, replace(begin, pull=pull))
-            return self.solved(begin, pull, anchor)
-        return self._iterated(begin, pull, anchor, tolerance, limit)
+                begin = lowered(self.condensed, replace(begin, load=load))
+            return self.solved(begin, load, anchor)
+        return self._iterated(begin, load, anchor, tolerance, limit)
 
     def _iterated(
-        self, start: EquilibriumState, pull: Pull, anchor: Array, tolerance: float, limit: int
+        self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
     ) -> EquilibriumState:
-        """Do as `settle` from `start`, whose states are those that `pull` brings at once, `anchor` (k,) being known."""
+        """Do as `settle` from `start`, whose states are those that `load` brings at once, `anchor` (k,) being known."""
         shape = before = start
         kept = self.condensed.found is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
             if kept:
-                if not self.relinearise(shape, pull, anchor, ROUNDS):
+                if not self.relinearise(shape, load, anchor, ROUNDS):
                     kept = False
                     continue
                 before = shape
-            elif not self.linearise(shape, pull, anchor, ROUNDS):
+            elif not self.linearise(shape, load, anchor, ROUNDS):
                 scale /= 2.0  # the last step went too far
-                if shape is before or scale < SHORTEST or not self.linearise(before, pull, anchor, ROUNDS):
+                if shape is before or scale < SHORTEST or not self.linearise(before, load, anchor, ROUNDS):
                     raise NotConverged("the body would turn inside out")
                 shape = before
             elif shape is not before:
                 before, scale = shape, min(1.0, 2.0 * scale)
-            shape, largest, changed = self.moved(before, pull, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+            shape, largest, changed = self.moved(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < 1e3:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
@@ -292,7 +316,12 @@ class Newton:
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
     def solved(
-        self, shape: EquilibriumState, pull: Pull, anchor: Array, given: Given | None = None, rounds: int | None = None
+        self,
+        shape: EquilibriumState,
+        load: LoadState,
+        anchor: Array,
+        given: Given | None = None,
+        rounds: int | None = None,
     ) -> EquilibriumState:
         """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `shape`.
 
@@ -301,24 +330,24 @@ class Newton:
         self.systems += 1
         self.condensed.relinearise(self._rest)  # from which all is one step
         rounds = PATIENCE + 4 * len(self.skin_x) if rounds is None else rounds
-        used = self._touch(replace(shape, u=self._rest), pull, anchor, rounds, given)
+        used = self._touch(replace(shape, u=self._rest), load, anchor, rounds, given)
         if used == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
         if used == UNSETTLED:
             raise ContactLost(f"the states of the touching points still contradicted each other after {rounds} systems")
         u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
         deeper, along = self.system.motion.tolist()
-        pull = pull._replace(depth=pull.depth + deeper, travel=pull.travel + along)
+        load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
         iterations = shape.iterations + used
         found = self._states
         return EquilibriumState(
-            u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), pull, iterations
+            u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), load, iterations
         )
 
-    def _entered(self, start: EquilibriumState, pull: Pull, x: Array) -> EquilibriumState:
-        """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `pull` brings at once."""
+    def _entered(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
+        """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `load` brings at once."""
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
-        self._meet(states, self._position(start.u, pull, x), load_state(pull))
+        self._meet(states, self._position(start.u, load, x), load_arguments(load))
         return replace(start, state=states.state, sense=states.sense)
 
 
@@ -331,13 +360,13 @@ def lowered(body: CondensedBody, shape: EquilibriumState) -> EquilibriumState:
         return shape
     state, count = shape.state.copy(), max(body.motions.shape[1], 1)
     lowest = np.argsort(shape.place(body)[:, 1], kind="stable")[:count]
-    state[lowest] = SLIP if shape.pull.frictionless else STICK
+    state[lowest] = SLIP if shape.load.frictionless else STICK
     return replace(shape, state=state)
 
 
-def load_state(pull: Pull) -> LoadState:
-    """Return `pull` as loops take it."""
-    return LoadState(float(pull.depth), float(pull.mu), float(pull.tau), int(pull.sense))
+def load_arguments(load: LoadState) -> LoadArguments:
+    """Return `load` as loops take it."""
+    return LoadArguments(float(load.depth), float(load.mu), float(load.tau), int(load.sense))
 
 
 class FiniteNewton(Newton):
@@ -347,3 +376,15 @@ class FiniteNewton(Newton):
         """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan."""
         self.body, self.finite = body, CondensedFinite(body, None if beside is None else beside.finite)
         super().__init__(self.finite)
+
+    def stored(self, state: EquilibriumState) -> float:
+        """Return the energy stored in the body at a state [N mm per mm]."""
+        return energy(self.body, state.u)
+
+    def elastic_work(self, states: Sequence[EquilibriumState], trapezoid: float) -> float:
+        """Return the work of the skin's forces along `states`, by Simpson's rule [N mm per mm].
+
+        The forces halfway are those of the elements at the mean displacement.
+        """
+        halfway = (energy_slope(self.body, (one.u + other.u) / 2.0, other.u - one.u) for one, other in pairwise(states))
+        return (trapezoid + 2.0 * sum(halfway)) / 3.0

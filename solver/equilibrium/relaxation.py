@@ -18,12 +18,12 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.body.linear import CondensedLinear, LinearBody
-from solver.body.receptor import Endings
+from solver.body.receptor import Endings, patch_means
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_terms
 from solver.constitutive.linear import Moduli, Prony, kept
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
-from solver.equilibrium.newton import EquilibriumState, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh import Mesh
 from solver.scene import Loading
 
@@ -134,9 +134,7 @@ class RelaxingBody:
 
     def average(self, endings: Endings) -> Array:
         """Return the stored energy averaged over each patch (r,) [MPa]; nan where there is no patch."""
-        total = np.bincount(endings.patch, self.energy(endings.probes) * endings.weights, endings.count)
-        area = np.bincount(endings.patch, endings.weights, endings.count)
-        return total / np.where(area > 0.0, area, np.nan)
+        return patch_means(self.energy(endings.probes), endings.weights, endings.patch, endings.areas)
 
     def _strain(self, probes: Probes, local: Array) -> tuple[Array, Array]:
         """Return e:e of the strain's deviator and the volume strain (p,) for element displacements (p, 18)."""
@@ -169,7 +167,7 @@ class RelaxingWay(Way):
     def __init__(
         self,
         body: RelaxingBody,
-        friction: Pull,
+        friction: LoadState,
         loading: Loading,
         ending: Endings,
         point: Endings,

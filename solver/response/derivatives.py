@@ -5,7 +5,7 @@ changes. At a kink, where a node is about to change its state, the derivatives a
 stay. Differences across a kink lie between the derivatives of both sides.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, cast
 
@@ -16,9 +16,9 @@ from solver._kernels import SHEAR_LIMITED, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
 from solver.body.finite_measures import IMAGINARY
-from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, FiniteNewton, Newton, load_state
+from solver.body.receptor import Patches
+from solver.equilibrium.finger import Finger
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, load_arguments
 from solver.quantities import NAMES, SED
 from solver.scene import Scene
 
@@ -45,18 +45,14 @@ class Derivatives:
     responses: Mapping[str, By]  # of every quantity at the ending, by its name
 
 
-def of_slide(finger: FingerModel | FiniteFinger, scene: Scene, state: EquilibriumState) -> Derivatives:
+def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> Derivatives:
     """Return the derivatives at a settled slide, driven by depth or by force.
 
     Raises ValueError where points stick, since such a state depends on the way to it, and where it has no tangent.
     """
     skin = of_skin(finger.newton, state)
     along, up = finger.newton.follows(skin)
-    ending = (
-        _of_responses(finger, state, skin)
-        if isinstance(finger, FingerModel)
-        else _of_finite_responses(finger, state, skin)
-    )
+    ending = slope(finger.ending, finger.displacement(state), finger.following(skin))[:, 0]
     rows = np.array([*ending, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
     if scene.normal_force is None:
         return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
@@ -77,17 +73,17 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
 
     Raises ValueError where a state is no slide, or has no tangent: it lies at a limit.
     """
-    pull, size = state.pull, len(state.state)
-    if pull.sense == 0 or (state.state == STICK).any():
+    load, size = state.load, len(state.state)
+    if load.sense == 0 or (state.state == STICK).any():
         raise ValueError("a state with sticking points depends on the way to it, which its tangent does not know")
-    if not newton.linearise(state, pull, newton.skin_x):
+    if not newton.linearise(state, load, newton.skin_x):
         raise ValueError("the state has no tangent")
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
     system = newton.system
-    kernels.bounded_length(x, newton.skin, state.state, pull.mu, system.length)
+    kernels.bounded_length(x, newton.skin, state.state, load.mu, system.length)
     count = kernels.assemble_contact_system(
-        newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_state(pull),
+        newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_arguments(load),
         position, system,
     )  # fmt: skip
     free, by = system.free[:count], np.zeros((count, 3))
@@ -101,38 +97,14 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     return out
 
 
-def _of_responses(finger: FingerModel, state: EquilibriumState, skin: Array) -> Array:
-    """Return the derivatives (q, 3) of the ending's responses at small strain, for those of the skin (2 k, 3)."""
-    moved = np.concatenate([state.u.reshape(-1, 1), skin], axis=1).reshape(*state.u.shape, -1)
-    moved = finger.body.displacement(moved, only=finger.ending.nodes(finger.geometry.mesh))
-    return slope(finger.responses, moved[:, :, 0], moved[:, :, 1:])
+def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
+    """Return how the responses of endings change (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
 
-
-def _of_finite_responses(finger: FiniteFinger, state: EquilibriumState, skin: Array) -> Array:
-    """Return the derivatives (q, 3) of the ending's responses at finite strain, for those of the skin (2 k, 3)."""
-    newton = finger.newton
-    moved = [newton.finite.inside.back_substitute(one, still=True) for one in skin.T.copy()]
-    return slope(finger.responses, state.u, _spread(newton, np.stack(moved, axis=1)))
-
-
-def slope(responses: Callable[[Array], Array], displacement: Array, steps: Array) -> Array:
-    """Return how responses change (q, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
-
-    `responses` makes (c, q) of (nodes, 2, c). By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40,
+    By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40,
     110), exact to round-off.
     """
     beside = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
-    return responses(beside).imag.T / IMAGINARY
-
-
-def _spread(newton: FiniteNewton, unknowns: Array) -> Array:
-    """Return the displacements (nodes, 2, c) for the unknowns (n, c), the centres of elements following."""
-    body = newton.body
-    out = np.zeros((*body.mesh.nodes.shape, unknowns.shape[1]))
-    outer = np.where((body.unknown >= 0)[..., None], unknowns[body.unknown], 0.0)  # (e, 8, 2, c)
-    out[body.nodes[:, :8]] = outer
-    out[body.nodes[:, 8]] = -newton.finite.system.recovery_matrix[:, :, :16] @ outer.reshape(len(outer), 16, -1)
-    return out
+    return endings.responses(beside).imag / IMAGINARY
 
 
 def drag_along(scene: Scene) -> int:

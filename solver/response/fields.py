@@ -102,14 +102,14 @@ def _energies(prediction: Prediction, sketch: Sketch) -> Array:
     if scene.solve.kinematics == "small":
         return sketch.energies(prediction.displacement[:, :, None])[:, 0]
     # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
-    from solver.body.finite import FiniteBody, FiniteProbes
+    from solver.body.finite import FiniteBody, FinitePatches
 
     body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
     count = len(sketch.probes.element)
 
     def energies(probes: Probes) -> Array:
         places = Endings(probes, np.ones(count), np.arange(count), count, np.tile([1.0, 0.0], (count, 1)))
-        return FiniteProbes.of(body, places).energy(body, prediction.displacement)
+        return FinitePatches.of(body, places).energy(prediction.displacement)
 
     found = energies(sketch.probes)
     if np.isfinite(found).all():

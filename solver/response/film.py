@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant, Progress, Way, course
-from solver.equilibrium.loads import pull_of
+from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
 from solver.prediction import Skin
+from solver.response.answer import skin_of
 from solver.response.fields import Fields, Sketch
-from solver.response.small_solution import skin_of
 from solver.scene import Scene
 
 
@@ -29,13 +29,12 @@ class Still:
     sed: float  # averaged over the ending [MPa]
 
 
-def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
+def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
     """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
     displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
     energies = sketch.energies(displacement)
-    mesh, elastic = finger.geometry.mesh, finger.body.elastic
-    rows = finger.row.average(mesh, elastic, displacement)
-    ending = finger.ending.average(mesh, elastic, displacement)[0]
+    rows = finger.row.average(displacement)
+    ending = finger.ending.average(displacement)[0]
     return tuple(
         Still(
             instant,
@@ -49,14 +48,14 @@ def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> 
 
 
 def way_until(
-    scene: Scene, finger: FingerModel, progress: Progress | None = None
+    scene: Scene, finger: LinearFinger, progress: Progress | None = None
 ) -> tuple[tuple[Instant, ...], SolveFailure | None]:
     """Return the states from first touch on, and why there are no more where they end before the finger settles.
 
     They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
     Cancelled where `progress` says so.
     """
-    way = Way(finger.newton, pull_of(scene), scene.loading_per_mm)
+    way = Way(finger.newton, load_of(scene), scene.loading_per_mm)
     try:
         course(way, scene.loading_per_mm, progress)
     except SolveFailure as failure:
@@ -64,16 +63,16 @@ def way_until(
     return tuple(way.instants), None
 
 
-def _unfolded(finger: FingerModel, instants: Sequence[Instant]) -> tuple[Instant, ...]:
+def _unfolded(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:
     """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
 
     def folds(instant: Instant) -> bool:
-        return bool(np.prod(finger.stretches(finger.displacement(instant.state)), axis=0).min() <= 0.0)
+        return finger.smallest_det(finger.displacement(instant.state)) <= 0.0
 
     return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
 
-def most_squeezed(finger: FingerModel, state: EquilibriumState, depth: float) -> tuple[float, float]:
+def most_squeezed(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
     """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh

@@ -11,26 +11,21 @@ from time import perf_counter
 
 import numpy as np
 
-from solver import _kernels as kernels
-from solver._kernels import STICK
-from solver.accuracy import omitted_effects as evidence
 from solver.accuracy.adaptivity import Maker, MeshSolution, NestedSolution, coarse_solution, on_nested, refine
-from solver.accuracy.audits import forces_missed, refuse_unsound, rounding, unbalanced
-from solver.accuracy.error_estimate import errors, responses, row_errors
-from solver.accuracy.finite_audits import audits, course_audits
+from solver.accuracy.audits import audits, course_audits, forces_missed, refuse_unsound, unbalanced
 from solver.accuracy.finite_ends import times_on_way
-from solver.contact.law import NAMES
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.finite_relaxation import RelaxingCourse
+from solver.equilibrium.finite_relaxation import RelaxingCourse, RelaxingNewton
 from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.prediction import FORCES_AND_PLACES, ROW, History, Prediction, Row, Skin, drag, sed_alone
+from solver.prediction import Prediction
 from solver.progress import report_progress
+from solver.response.answer import Solved, history, prediction
 from solver.scene import Scene
 
 ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
@@ -95,132 +90,58 @@ def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], m
         way = relaxing or course(scene, finger, stop, times)
         shape = way.last
     if not shape.touching.any():
-        raise NotConverged(f"No contact was found at {shape.pull.depth:g} mm of indentation: ask for more depth.")
-    within_reach(scene, shape.pull.depth)
-    driven = scene.driven(shape.pull.depth)
-    body = finger.newton.body
+        raise NotConverged(f"No contact was found at {shape.load.depth:g} mm of indentation: ask for more depth.")
+    within_reach(scene, shape.load.depth)
     newton = finger.newton if relaxing is None else relaxing.relaxing
-    shape, checks = _balanced(newton, shape, lambda found: audits(driven, finger, found, newton))
-    refuse_unsound(checks, shape.pull.depth)
-    numbers = finger.all_numbers([shape])[0]
-    sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
-    skin = _skin(finger, shape)
+    shape, checks = _balanced(finger, newton, shape)
+    refuse_unsound(checks, shape.load.depth)
     checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
+    numbers = finger.all_numbers([shape])[0]
     if way:
-        checks |= course_audits(newton, way.states)
-    if way and (relaxing is None or _sticking(shape) == 0.0):  # stuck and relaxing, the end depends on the way
-        checks["course_against_direct"] = abs(finger.sed_ending(at.shape) / sed - 1.0)
-    held = scene.loading.dragged and _sticking(shape) > 0.0  # sliding, a finger may have shifted by anything
+        states = [instant.state for instant in way.instants]
+        checks |= course_audits(newton, states, relaxing=relaxing is not None)
+    if way and (relaxing is None or shape.sticking == 0.0):  # stuck and relaxing, the end depends on the way
+        checks["course_against_direct"] = abs(finger.sed_ending(at.shape.u) / numbers[0] - 1.0)
+    over_time = None if relaxing is None else np.array(relaxing.sed)
+    marched = history(scene, finger, way.instants[1:], over_time) if way else None
     solved = perf_counter()
     report_progress("estimating errors, on the nested mesh")
     finer, steps = on_nested(scene, at, steps, stop, make)
-    off = errors(scene, numbers, finer, steps)
-    row = finger.row.average(body, shape.u)
-    estimated = perf_counter()
-    model = evidence.finite_model(
-        driven, force=shape.force, width=width, sticking=_sticking(shape), slide=_slide(finger, shape)
-    )
-    return Prediction(
-        scene=scene,
-        sed_ending=sed,
-        sed_point=point,
-        normal_force=normal,
-        tangential_force=drag(scene, tangential),
-        contact_width=width,
-        indentation=depth,
-        shift=shift if held else None,
-        error_estimate=off.sed,
-        normal_force_error=off.normal,
-        tangential_force_error=off.tangential,
-        indentation_error=off.indentation,
-        shift_error=off.shift if held else None,
-        contact_width_error=off.width,
-        nested=finer,
-        sed_point_error=off.point,
-        dofs=body.dofs,
-        newton_iterations=shape.iterations,
-        wall_s=solved - begun - setup,
-        setup_s=setup,
-        estimate_s=estimated - solved,
-        row=Row(ROW, row, row_errors(row, finer)),
-        responses=responses(numbers, off),
-        model=model,
-        audits=checks,
-        skin=skin,
-        geometry=finger.geometry,
-        displacement=shape.u,
-        history=_history(scene, finger, way, relaxing) if way else None,
-        warnings=(*evidence.warnings(driven, model["left_out"]), *doubts(finger, shape, stop), *rounding(checks)),
-    )
-
-
-def _sticking(shape: EquilibriumState) -> float:
-    touching = int(shape.touching.sum())
-    return int((shape.state == STICK).sum()) / touching if touching else 0.0
-
-
-def _slide(finger: FiniteFinger, shape: EquilibriumState) -> float:
-    """Return the largest sideways displacement of the skin that may touch [mm]."""
-    return float(np.abs(shape.u[finger.geometry.mesh.skin, 0]).max())
-
-
-def _skin(finger: FiniteFinger, shape: EquilibriumState) -> Skin:
-    body = finger.newton.body
-    place, touching, length = shape.place(body), shape.touching, np.empty(len(shape.state))
-    kernels.tributary(np.ascontiguousarray(place[:, 0]), body.middle, length)
-    length = np.where(touching, length, 1.0)
-    return Skin(
-        x=place[:, 0],
-        gap=np.where(touching, 0.0, place[:, 1] - shape.pull.depth),
-        pressure=shape.reaction[:, 1] / length,
-        traction=shape.reaction[:, 0] / length,
-        state=tuple(NAMES[int(state)] for state in shape.state),
-    )
+    row = finger.row.average(shape.u)
+    took = perf_counter() - solved
+    told = doubts(finger, shape, stop)
+    done = Solved(scene, shape, shape.u, checks, steps, marched, told, solved - begun - setup, setup)
+    return prediction(done, finger, numbers, row, finer, took)
 
 
 def _balanced(
-    newton: FiniteNewton, shape: EquilibriumState, audits: Callable[[EquilibriumState], dict[str, float]]
+    finger: FiniteFinger, newton: FiniteNewton, shape: EquilibriumState
 ) -> tuple[EquilibriumState, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
 
-    Displacements good to a part of a nanometre leave much of a light touch on a nearly incompressible body unbalanced.
+    `newton` is the finger's own, or that of its tissues as they relax. Displacements good to a part of a nanometre
+    leave much of a light touch on a nearly incompressible body unbalanced.
     """
-    checks = audits(shape)
+    checks = _audits(finger, newton, shape)
     for _ in range(CORRECTIONS):
         if unbalanced(checks) <= ROUGH:
             break
         x = shape.place(newton.body)[:, 0]
-        if not newton.linearise(shape, shape.pull, x):
+        if not newton.linearise(shape, shape.load, x):
             break
-        after, _, _ = newton.moved(shape, shape.pull, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after, _, _ = newton.moved(shape, shape.load, newton.steps[:, EQUILIBRIUM].copy(), x)
         after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
-        better = audits(after)
+        better = _audits(finger, newton, after)
         if _contradicting(better) > max(_contradicting(checks), ROUGH) or unbalanced(better) >= unbalanced(checks):
             break
         shape, checks = after, better
     return shape, checks
 
 
+def _audits(finger: FiniteFinger, newton: FiniteNewton, shape: EquilibriumState) -> dict[str, float]:
+    over = finger.body.nodal(newton.excess(shape)) if isinstance(newton, RelaxingNewton) else None
+    return audits(finger, shape, shape.u, over)
+
+
 def _contradicting(checks: dict[str, float]) -> float:
     return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
-
-
-def _history(scene: Scene, finger: FiniteFinger, way: Way, relaxing: RelaxingCourse | None) -> History:
-    states = way.states
-    if relaxing is None:
-        point = [float(finger.point.average(finger.newton.body, shape.u)[0]) for shape in states]
-        sed = np.stack([[finger.sed_ending(shape) for shape in states], point], axis=1)
-    else:
-        sed = np.array(relaxing.sed)
-    return History(
-        time=np.array([instant.time for instant in way.instants[1:]]),
-        bone_x=np.array([-shape.pull.travel for shape in states]),
-        bone_y=np.array([-shape.pull.depth for shape in states]),
-        sed_ending=sed[:, 0],
-        sed_point=sed[:, 1],
-        normal_force=np.array([float(shape.force[1]) for shape in states]),
-        tangential_force=np.array([drag(scene, float(shape.force[0])) for shape in states]),
-        contact_width=np.array([finger.contact_width(shape) for shape in states]),
-        slipping=np.array([1.0 - _sticking(shape) if shape.touching.any() else 0.0 for shape in states]),
-        responses=finger.responses_of(states) if relaxing is None else sed_alone(sed[:, 0]),
-    )

@@ -76,7 +76,7 @@ class FiniteStepper(Stepper):
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
         newton = self._newton
         shape = self._ready(normal, tangential)
-        origin, before = shape.place(newton.body)[:, 0], shape.pull.travel
+        origin, before = shape.place(newton.body)[:, 0], shape.load.travel
         given, hurried = Given(normal, tangential), self._goes_far(normal)
         far, turns = (NEAR, ARRIVING) if self._behind else (FAR, HURRIED)
         for number in range(1, max(iterations, turns) + 1):
@@ -101,7 +101,7 @@ class FiniteStepper(Stepper):
             return float("nan")
         if compression.lowest < FOLDING or compression.kink > CREASING:
             return self._lose(normal)
-        return self._finger.sed_ending(shape)
+        return self._finger.sed_ending(shape.u)
 
     def _goes_far(self, normal: float) -> bool:
         """Return whether the finger is about to move far: then the tangent of the last reading leads a part of the way.
@@ -119,7 +119,7 @@ class FiniteStepper(Stepper):
 
     def row(self) -> Array:
         """Return the SED of the row of endings as it is now (r,) [MPa]; nan where the finger ends before one."""
-        return self._finger.row.average(self._newton.body, self.state.u)
+        return self._finger.row.average(self.state.u)
 
     def outline(self) -> Array:
         """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""

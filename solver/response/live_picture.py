@@ -7,12 +7,12 @@ from typing import Self
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
 from solver.body.tissues import settled_moduli
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh import Mesh
 from solver.scene import Scene
@@ -59,7 +59,7 @@ class SmallPicture(LivePicture):
     _lame: Array  # (f,) [MPa]
 
     @classmethod
-    def of(cls, finger: FingerModel) -> Self:
+    def of(cls, finger: LinearFinger) -> Self:
         """Make the matrices of `finger`."""
         mesh, elastic = finger.geometry.mesh, finger.body.elastic
         everywhere = finger.body.every_step()  # (nodes, 2, 2 k)
@@ -78,7 +78,7 @@ class SmallPicture(LivePicture):
 
     def nodes(self, state: EquilibriumState) -> Array:
         """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
-        return self.rest + (self._moved @ state.u.ravel()).reshape(-1, 2) - [0.0, state.pull.depth]
+        return self.rest + (self._moved @ state.u.ravel()).reshape(-1, 2) - [0.0, state.load.depth]
 
     def sed(self, state: EquilibriumState) -> Array:
         """Return the SED in the middle of each face (f,) [MPa]."""
@@ -93,7 +93,7 @@ class FinitePicture(LivePicture):
     """A finger at finite strain."""
 
     _body: FiniteBody
-    _at: FiniteProbes
+    _at: FinitePatches
 
     @classmethod
     def of(cls, finger: FiniteFinger, scene: Scene) -> Self:
@@ -104,12 +104,12 @@ class FinitePicture(LivePicture):
         each = Endings(
             probes, np.ones(len(element)), np.arange(len(element)), len(element), np.tile([1.0, 0.0], (len(element), 1))
         )
-        return cls(_faces(mesh), mesh.nodes, body, FiniteProbes.of(body, each))
+        return cls(_faces(mesh), mesh.nodes, body, FinitePatches.of(body, each))
 
     def nodes(self, state: EquilibriumState) -> Array:
         """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
-        return self.rest + state.u - [0.0, state.pull.depth]
+        return self.rest + state.u - [0.0, state.load.depth]
 
     def sed(self, state: EquilibriumState) -> Array:
         """Return the SED in the middle of each face (f,) [MPa]."""
-        return self._at.energy(self._body, state.u)
+        return self._at.energy(state.u)

@@ -20,11 +20,11 @@ from solver.contact.law import NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control, full_slip
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import EquilibriumState, Given, Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.loads import sliding_load
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin
 from solver.response.derivatives import Derivatives, of_slide
@@ -64,7 +64,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     None where the finger is only pressed or held by a drag, so that its state depends on the way to it, and where the
     state is not met again.
     """
-    model: FingerModel | None = None
+    model: LinearFinger | None = None
     for found in predictions:
         scene = found.scene
         if scene.loading.direction == 0 or scene.loading.dragged:
@@ -75,7 +75,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
                 yield _FiniteNearby.of(found)
                 continue
             if model is None or model.geometry is not found.geometry:
-                model = FingerModel.on(scene, found.geometry)
+                model = LinearFinger.on(scene, found.geometry)
             yield _SmallNearby(scene, _slide(model, scene, states(found.skin)), model)
         except NotConverged:
             yield None
@@ -83,7 +83,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SmallNearby(Nearby):
-    finger: FingerModel
+    finger: LinearFinger
 
     def derivatives(self) -> Derivatives:
         return of_slide(self.finger, self.scene, self.here)
@@ -106,9 +106,9 @@ def states(skin: Skin) -> NDArray[np.int64]:
     return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
-def _slide(finger: FingerModel, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
+def _slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
     """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
-    return slide_beside(finger.newton, sliding_pull(scene), guess, scene.normal_force)
+    return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,31 +124,31 @@ class _FiniteNearby(Nearby):
         body, sense = finger.newton.body, -scene.loading.direction
         length = np.empty(len(skin.x))
         kernels.tributary(skin.x, body.middle, length)
-        pull = Pull(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
+        load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
         state = states(skin).astype(np.int32)
         reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
         modes, senses = pressure(body, found.displacement), np.full(len(state), sense, np.int32)
-        start = EquilibriumState(found.displacement, modes, state, senses, reaction, pull, 0)
-        return cls(scene, finger.newton.settle(start, pull), finger)
+        start = EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0)
+        return cls(scene, finger.newton.settle(start, load), finger)
 
     def derivatives(self) -> Derivatives:
         return of_slide(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
         found = [self._beside(scene) for scene in scenes]
-        return np.array([(np.nan, np.nan) if shape is None else self.finger.seds(shape) for shape in found])
+        return np.array([(np.nan, np.nan) if shape is None else tuple(self.finger.seds([shape])[0]) for shape in found])
 
     def _beside(self, scene: Scene) -> EquilibriumState | None:
         newton, here = self.finger.newton, self.here
-        pull = here.pull._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
+        load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         try:
             if scene.normal_force is None:
-                there = full_slip.settled(newton, pull._replace(depth=scene.loading.depth), here, GOOD)
+                there = full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
             else:
-                there = force_control.balanced(newton, replace(here, pull=pull), Given(scene.normal_force, None), GOOD)
+                there = force_control.balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
         except NotConverged:
             return None
-        beyond = there.pull.mu > here.pull.mu or there.pull.depth > here.pull.depth
+        beyond = there.load.mu > here.load.mu or there.load.depth > here.load.depth
         # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
         unproven = beyond and not sound(self.finger, there)
         return None if self._reaches_out(there) or unproven or jumped_branch(self.finger, here, there) else there

@@ -26,8 +26,8 @@ def rates(history: History) -> Mapping[str, Rates]:
     values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
     moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
     first = int(moved[0]) if len(moved) else len(history.time)  # the instant before it, counted from first touch
-    slid = np.flatnonzero((history.slipping >= ALL) & (np.arange(len(history.time)) >= first))
-    last = int(slid[0]) + 1 if len(slid) else len(history.time)
+    slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(len(history.time)) >= first))
+    last = int(slip[0]) + 1 if len(slip) else len(history.time)
     ends = [(0, first), (first, last), (last, len(history.time))]
     parts = np.array([_mean(time, values, begin, end) for begin, end in ends])
     return {name: Rates(*row) for name, row in zip(NAMES, parts.T.tolist(), strict=True)}

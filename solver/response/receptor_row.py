@@ -1,12 +1,12 @@
 """Every quantity along a row of receptors of a prediction, at any depth: those of the ending are in it already."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
 
 from solver.arrays import Array
-from solver.body.receptor import endings
+from solver.body.receptor import LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
 from solver.body.tissues import finite_laws, settled_moduli
 from solver.prediction import ROW, Prediction
@@ -24,20 +24,18 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
     for _, same in groupby(predictions, lambda found: (id(found.geometry), found.scene.solve.kinematics)):
         group = list(same)
         along = _probed(group[0], arcs, receptor or group[0].scene.receptor)
-        out += [along(found.displacement) for found in group]
+        out += [along.responses(found.displacement) for found in group]
     return np.array(out)
 
 
-def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Callable[[Array], Array]:
-    """Return what makes responses (q, r) of displacements (nodes, 2) on the mesh of a prediction."""
+def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Patches:
+    """Return endings like that of `receptor` on the mesh of a prediction."""
     mesh, materials = found.geometry.mesh, found.scene.materials
     elastic = Elastic.of(mesh, settled_moduli(materials))
     row = endings(found.geometry, elastic, receptor, arcs)
     if found.scene.solve.kinematics == "small":
-        return lambda displacement: row.responses(mesh, elastic, displacement[:, :, None])[:, :, 0]
+        return LinearPatches(mesh, elastic, row)
     # Imported here: small strain need not wait for the compiled loops of finite strain to be loaded.
-    from solver.body.finite import FiniteBody, FiniteProbes
+    from solver.body.finite import FiniteBody, FinitePatches
 
-    body = FiniteBody.of(mesh, finite_laws(materials), checked=True)
-    probes = FiniteProbes.of(body, row)
-    return lambda displacement: probes.responses(body, displacement)
+    return FinitePatches.of(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)

@@ -12,15 +12,14 @@ from numpy.linalg import LinAlgError
 
 from solver.accuracy.adaptivity import COARSE, WIDER
 from solver.arrays import Array
-from solver.body.finite import FiniteProbes
 from solver.body.receptor import endings
 from solver.continuation.finite_states import roughly
 from solver.continuation.limit_point import sound
 from solver.continuation.small_existence import direct
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
@@ -45,7 +44,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     pending = list(range(len(scenes)))
     for margin in (1.0, WIDE):
         try:
-            finger = FingerModel.of(first, Sizing(FINENESS, depth, margin=margin))
+            finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=margin))
         except (MeshError, LinAlgError) as bad:
             key, value = "finger.tip_radius", first.finger.tip_radius
             raise SceneError(key, value, f"no mesh fits this finger ({bad})") from bad
@@ -55,13 +54,11 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
                 state = direct(scenes[number], finger, widest=margin == WIDE)
             except SolveFailure:
                 continue
-            if state is not None and not finger.reaches_out(state, finger.displacement(state), state.pull.depth):
+            if state is not None and not finger.reaches_out(state, finger.displacement(state), state.load.depth):
                 states[number] = state
         if states:
-            moved = finger.body.displacement(np.stack([state.u for state in states.values()], axis=2))
-            row = endings(finger.geometry, finger.body.elastic, first.receptor, np.asarray(arcs, np.float64))
-            found = row.responses(finger.geometry.mesh, finger.body.elastic, moved)
-            out[list(states)] = np.moveaxis(found, 2, 0)
+            row = finger.patches(endings(finger.geometry, finger.elements, first.receptor, np.asarray(arcs)))
+            out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
         pending = [number for number in pending if number not in states]
         if not pending:
             break
@@ -76,8 +73,7 @@ def _finite(scenes: Sequence[Scene], arcs: Array) -> Array:
         group, near = list(numbers), None
         depth = max(expected_depth(scenes[number]) for number in group)
         finger = FiniteFinger.of(scenes[group[0]], Sizing(COARSE, depth, margin=WIDER))
-        body = finger.newton.body
-        row = FiniteProbes.of(body, endings(finger.geometry, body, scenes[0].receptor, arcs))
+        row = finger.patches(endings(finger.geometry, finger.elements, scenes[0].receptor, arcs))
         for number in group:
             try:
                 state = roughly(finger, scenes[number], never, near)
@@ -85,5 +81,5 @@ def _finite(scenes: Sequence[Scene], arcs: Array) -> Array:
                 continue
             if sound(finger, state):
                 near = state
-                out[number] = row.responses(body, state.u)
+                out[number] = row.responses(state.u)
     return out

@@ -11,33 +11,22 @@ from time import perf_counter
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import SLIP, STICK
-from solver.accuracy.audits import (
-    MIXED,
-    audits,
-    course_audits,
-    forces_missed,
-    inside_out,
-    refuse_unsound,
-    rounding,
-    unbalanced,
-)
-from solver.accuracy.error_estimate import errors, responses, row_errors
-from solver.accuracy.omitted_effects import model, warnings
+from solver._kernels import STICK
+from solver.accuracy.audits import MIXED, audits, course_audits, forces_missed, inside_out, refuse_unsound, unbalanced
 from solver.accuracy.small_errors import on_nested, steps_asked, times_on_way
 from solver.arrays import Array
-from solver.contact.law import NAMES, FrictionLaw
 from solver.continuation.small_existence import direct
-from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined, shift_of
+from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined
 from solver.continuation.wedging import WIDE
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
+from solver.prediction import FORCES_AND_PLACES, Prediction
+from solver.response.answer import Solved, history, prediction
 from solver.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
@@ -49,7 +38,7 @@ YIELDS = (
 
 Answer = Prediction | SolveFailure
 Way = tuple[Instant, ...]
-Watch = Callable[[int, Answer, FingerModel, Way | None], None]  # told each answer as it is found, and how
+Watch = Callable[[int, Answer, LinearFinger, Way | None], None]  # told each answer as it is found, and how
 Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
 
 
@@ -57,8 +46,8 @@ Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False 
 class _Shared:
     """What scenes solved together share, and each one's part of what it took [s]."""
 
-    mesh: FingerModel
-    nested: FingerModel
+    mesh: LinearFinger
+    nested: LinearFinger
     setup_s: float
     solve_s: float
     estimate_s: float
@@ -72,7 +61,7 @@ class Fingers:
         """Make none yet."""
         self._scene = scene
         self._fineness = 0.0
-        self._made: dict[Sizing, tuple[FingerModel, float]] = {}
+        self._made: dict[Sizing, tuple[LinearFinger, float]] = {}
 
     def begin(self, fineness: float) -> None:
         """Forget those of another fineness."""
@@ -80,7 +69,7 @@ class Fingers:
             self._made.clear()
         self._fineness = fineness
 
-    def of(self, sizing: Sizing) -> tuple[FingerModel, float]:
+    def of(self, sizing: Sizing) -> tuple[LinearFinger, float]:
         """Return the finger, and what it took to make [s]. Raises SceneError, NotConverged."""
         if sizing not in self._made:
             begun = perf_counter()
@@ -114,7 +103,7 @@ def answers(
         # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
         together = 1 if any(scene.solve.course == "history" for scene in scenes) else len(scenes)
         for first in range(0, len(scenes), together):
-            states: list[_Solved | SolveFailure | None] = []
+            states: list[tuple[Solved, Way | None] | SolveFailure | None] = []
             for number, scene in enumerate(scenes[first : first + together], first):
                 _report(progress, number / len(scenes))
                 try:
@@ -144,9 +133,9 @@ def _report(progress: Progress | None, part: float) -> None:
         raise Cancelled
 
 
-def _meshed(scene: Scene, sizing: Sizing) -> FingerModel:
+def _meshed(scene: Scene, sizing: Sizing) -> LinearFinger:
     try:
-        return FingerModel.of(scene, sizing)
+        return LinearFinger.of(scene, sizing)
     except MeshError as bad:
         raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
     except LinAlgError as bad:
@@ -168,25 +157,10 @@ def _in_steps(scene: Scene, shared: _Shared) -> tuple[EquilibriumState | None, S
     return (contact if steps.times == 1 else direct(scene, shared.mesh, steps.times, widest=shared.widest)), steps
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Solved:
-    """The state of a scene on one mesh."""
+def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Solved, Way | None] | None:
+    """Return the state of one scene, and its way where that can be drawn from forces alone.
 
-    scene: Scene
-    contact: EquilibriumState
-    displacement: Array  # (nodes, 2) [mm]
-    checks: dict[str, float]
-    steps: Steps | None  # of a course, where the state depends on its way
-    way: Way | None
-    over_time: Array | None  # (m, 2) SED of ending and point along the way of tissues that relax [MPa]
-    sed: float  # of the ending [MPa]
-    wall_s: float
-
-
-def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> _Solved | None:
-    """Return the state of one scene; None where contact must be looked for on more of the skin.
-
-    Raises SolveFailure.
+    None where contact must be looked for on more of the skin. Raises SolveFailure.
     """
     finger = shared.mesh
     begun = perf_counter()
@@ -199,9 +173,9 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> _Solved
     direct = contact
     if scene.solve.course == "history":
         way, over_time = marched(scene, finger, progress, times)
-        contact = way[-1].state if over_time is None else finger.relaxed(way[-1].state)
+        contact = way[-1].state if over_time is None else finger.newton.relaxed(way[-1].state)
     displacement = finger.displacement(contact)
-    depth = contact.pull.depth
+    depth = contact.load.depth
     in_tissue(scene, finger, depth)
     if finger.reaches_out(contact, displacement, depth):
         return None
@@ -214,129 +188,46 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> _Solved
     refuse_unsound(checks, depth)
     checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
     if way is not None:
-        checks |= course_audits(finger, way)
-        if over_time is not None:  # what the balance of work leaves over is what the tissues took by relaxing
-            checks["course_viscous_work"] = checks.pop("course_work_balance")
+        checks |= course_audits(finger.newton, [instant.state for instant in way], relaxing=relaxed)
         if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
             checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
-    return _Solved(scene, contact, displacement, checks, steps, way, over_time, sed, perf_counter() - begun)
+    warnings = tuple(filter(None, [inside_out(checks), YIELDS if gives_way(scene, finger, contact) else ""]))
+    course = None if way is None else history(scene, finger, way, over_time)
+    took = perf_counter() - begun + shared.solve_s
+    solved = Solved(scene, contact, displacement, checks, steps, course, warnings, took, shared.setup_s)
+    return solved, way if over_time is None else None
 
 
 def _estimated(
-    states: Sequence[_Solved | SolveFailure | None], shared: _Shared
+    states: Sequence[tuple[Solved, Way | None] | SolveFailure | None], shared: _Shared
 ) -> list[tuple[Answer | None, Way | None]]:
     """Return the prediction of each state that was solved, and its way where that can be drawn from forces alone."""
-    solved = [one for one in states if isinstance(one, _Solved)]
+    solved = [one[0] for one in states if isinstance(one, tuple)]
     if not solved:
-        return [(one, None) for one in states if not isinstance(one, _Solved)]
+        return [(one, None) for one in states if not isinstance(one, tuple)]
     begun, finger = perf_counter(), shared.mesh
-    numbers = finger.all_numbers([one.contact for one in solved])
+    numbers = finger.all_numbers([one.state for one in solved])
     displacements = np.stack([one.displacement for one in solved], axis=2)
-    numbers[:, FORCES_AND_PLACES:] = finger.responses(displacements)
-    rows = finger.row.average(finger.geometry.mesh, finger.body.elastic, displacements)
+    numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
+    numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
+    rows = finger.row.average(displacements)
     nested = on_nested(shared.nested, [(one.scene, one.steps) for one in solved])
-    took = (perf_counter() - begun) / len(solved)
-    predictions = iter(
-        [
-            _prediction(one, shared, numbers[number], rows[:, number], nested[number], took)
-            for number, one in enumerate(solved)
-        ]
+    took = (perf_counter() - begun) / len(solved) + shared.estimate_s
+    made = (
+        prediction(one, finger, numbers[number], rows[:, number], nested[number], took)
+        for number, one in enumerate(solved)
     )
-    return [
-        (next(predictions), one.way if one.over_time is None else None) if isinstance(one, _Solved) else (one, None)
-        for one in states
-    ]
-
-
-def _prediction(
-    solved: _Solved, shared: _Shared, numbers: Array, row: Array, nested: NestedNumbers | None, estimate_s: float
-) -> Prediction:
-    """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
-    scene, contact, checks, finger = solved.scene, solved.contact, solved.checks, shared.mesh
-    shift, depth = shift_of(scene, contact), contact.pull.depth
-    left = model(scene.driven(depth), finger, contact, solved.displacement)
-    numbers[0], numbers[4] = solved.sed, shift or 0.0
-    off = errors(scene, numbers, nested, solved.steps)
-    return Prediction(
-        scene=scene,
-        sed_ending=solved.sed,
-        sed_point=float(numbers[6]),
-        normal_force=float(contact.normal.sum()),
-        tangential_force=drag(scene, float(contact.tangential.sum())),
-        contact_width=float(numbers[5]),
-        indentation=depth,
-        shift=shift,
-        error_estimate=off.sed,
-        normal_force_error=off.normal,
-        tangential_force_error=off.tangential,
-        indentation_error=off.indentation,
-        shift_error=None if shift is None else off.shift,
-        contact_width_error=off.width,
-        nested=nested,
-        sed_point_error=off.point,
-        dofs=finger.body.dofs,
-        newton_iterations=contact.iterations,
-        wall_s=solved.wall_s + shared.solve_s,
-        setup_s=shared.setup_s,
-        estimate_s=estimate_s + shared.estimate_s,
-        row=Row(ROW, row, row_errors(row, nested)),
-        responses=responses(numbers, off),
-        model=left,
-        audits=checks,
-        skin=skin_of(finger, contact),
-        geometry=finger.geometry,
-        displacement=solved.displacement,
-        history=None if solved.way is None else _history(scene, finger, solved.way, solved.over_time),
-        warnings=(
-            *warnings(scene, left["left_out"]),
-            *filter(None, [inside_out(checks)]),
-            *([YIELDS] if gives_way(scene, finger, contact) else []),
-            *rounding(checks),
-        ),
-    )
+    return [(next(made), one[1]) if isinstance(one, tuple) else (one, None) for one in states]
 
 
 def _balanced(
-    scene: Scene, finger: FingerModel, state: EquilibriumState, displacement: Array, *, at_once: bool, where_seen: bool
+    scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array, *, at_once: bool, where_seen: bool
 ) -> tuple[EquilibriumState, Array, dict[str, float]]:
     """Return a state, its displacement and their audits with less round-off, taken out `at_once` or where it shows."""
-    law, depth = FrictionLaw(state.pull.mu, state.pull.tau), state.pull.depth
     if at_once:
         state, displacement = refined(scene, finger, state, displacement)
-    checks = audits(finger, law, state, depth, displacement)
+    checks = audits(finger, state, displacement)
     if where_seen and unbalanced(checks) > ROUGH:
         state, displacement = refined(scene, finger, state, displacement)
-        checks = audits(finger, law, state, depth, displacement)
+        checks = audits(finger, state, displacement)
     return state, displacement, checks
-
-
-def skin_of(finger: FingerModel, state: EquilibriumState) -> Skin:
-    """Return the skin that may touch in a state of contact."""
-    place, length = state.place(finger.body.condensed), finger.body.condensed.fixed_length
-    return Skin(
-        x=place[:, 0],
-        gap=np.where(state.touching, 0.0, place[:, 1] - state.pull.depth),
-        pressure=state.normal / length,
-        traction=state.tangential / length,
-        state=tuple(NAMES[int(s)] for s in state.state),
-    )
-
-
-def _history(scene: Scene, finger: FingerModel, way: Sequence[Instant], over_time: Array | None) -> History:
-    """Return the course as arrays."""
-    states = [instant.state for instant in way]
-    sed = finger.seds(states) if over_time is None else over_time
-    touching = np.array([s.touching.sum() for s in states])
-    slipping = np.array([(s.state >= SLIP).sum() for s in states])
-    return History(
-        time=np.array([i.time for i in way]),
-        bone_x=np.array([i.travel for i in way]),
-        bone_y=np.array([-i.depth for i in way]),
-        sed_ending=sed[:, 0],
-        sed_point=sed[:, 1],
-        normal_force=np.array([s.normal.sum() for s in states]),
-        tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
-        contact_width=np.array([finger.contact_width(s) for s in states]),
-        slipping=slipping / np.maximum(touching, 1),
-        responses=finger.responses_of(states) if over_time is None else sed_alone(sed[:, 0]),
-    )

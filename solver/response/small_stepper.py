@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array
 from solver.body.linear import CondensedLinear
-from solver.body.receptor import Endings
-from solver.equilibrium.finger import FingerModel
+from solver.body.receptor import LinearPatches
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import Given, Newton, lowered
 from solver.failures import ContactLost
 from solver.response.stepper import SLIDING, Stepper
@@ -36,15 +36,15 @@ class Condensed:
     outline_by_skin: Array  # (2 w, 2 k) its displacements, x and y in turn [-]
 
     @classmethod
-    def of(cls, finger: FingerModel) -> Self:
+    def of(cls, finger: LinearFinger) -> Self:
         """Condense `finger`."""
         everywhere = finger.body.every_step()  # (nodes, 2, 2 k)
-        parts = _square_roots(finger, finger.row, everywhere)
+        parts = _square_roots(finger.row, everywhere)
         starts = np.cumsum([0, *(len(part) for part in parts[:-1])])
         whole = finger.geometry.whole
         return cls(
             finger.body.condensed,
-            _square_roots(finger, finger.ending, everywhere)[0],
+            _square_roots(finger.ending, everywhere)[0],
             np.concatenate(parts),
             starts,
             np.array([bool(part.any()) for part in parts]),
@@ -53,13 +53,14 @@ class Condensed:
         )
 
 
-def _square_roots(finger: FingerModel, endings: Endings, everywhere: Array) -> list[Array]:
+def _square_roots(patches: LinearPatches, everywhere: Array) -> list[Array]:
     """Return for each ending a matrix (a, 2 k): the SED is the sum of squares of it times the skin's unknowns."""
-    mesh, elastic, probes = finger.geometry.mesh, finger.body.elastic, endings.probes
+    mesh, elastic, endings = patches.mesh, patches.elastic, patches.endings
+    probes = endings.probes
     shear, lame = elastic.shear[probes.element, None, None], elastic.lame[probes.element, None, None]
     lines = probes.strains(mesh, everywhere)  # (p, 4, 2 k)
     lines *= np.sqrt(np.concatenate([shear, shear, shear, lame / 2.0], axis=1))  # W = G eps:eps + lambda/2 theta^2
-    area = np.bincount(endings.patch, endings.weights, endings.count)
+    area = endings.areas
     out: list[Array] = []
     for number in range(endings.count):
         mine = endings.patch == number
@@ -90,10 +91,10 @@ class SmallStepper(Stepper):
         start = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not start.state.any():
             start = lowered(self._newton.condensed, start)
-        given = Given(normal, None, start.pull.travel) if slides else Given(normal, tangential)
+        given = Given(normal, None, start.load.travel) if slides else Given(normal, tangential)
         x = start.u[:, 0] + self._newton.skin_x
         try:
-            found = self._newton.solved(start, start.pull, x, given, CHANGES)
+            found = self._newton.solved(start, start.load, x, given, CHANGES)
         except ContactLost:
             self.forget()
             return float("nan")

@@ -10,7 +10,7 @@ from solver.accuracy.measured_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
 from solver.contact.law import STEEP
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
@@ -74,7 +74,7 @@ def solve_many(
             known[id(answer)] = answer, _with_evidence(answer, progress)
         return known[id(answer)][1]
 
-    def seen(number: int, answer: Answer, finger: FingerModel, way: tuple[Instant, ...] | None) -> None:
+    def seen(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
         assert watch is not None
         watch(number, evident(answer), finger, way)
 
@@ -160,7 +160,7 @@ def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: W
     ended = _refined(ends, fineness, on_mesh, None, None)
     out: dict[int, Answer] = {}
 
-    def noted(number: int, answer: Answer, finger: FingerModel, way: tuple[Instant, ...] | None) -> None:
+    def noted(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
         out[number] = _saying(answer, ended.told[number])
         if watch is not None:
             watch(number, out[number], finger, way)

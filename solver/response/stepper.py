@@ -10,9 +10,9 @@ import numpy as np
 from solver._kernels import SLIP, STICK
 from solver.arrays import Array
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Deformable, EquilibriumState, Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.newton import Deformable, EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
@@ -45,12 +45,12 @@ class Stepper(ABC):
     @property
     def depth(self) -> float:
         """Indentation found [mm]."""
-        return self.state.pull.depth
+        return self.state.load.depth
 
     @property
     def travel(self) -> float:
         """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
-        return 0.0 - self.state.pull.travel
+        return 0.0 - self.state.load.travel
 
     def step(self, normal: float, tangential: float) -> float:
         """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
@@ -85,11 +85,11 @@ class Stepper(ABC):
 
     def _under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
         """Return the last state under today's friction; all that touches slips to `sense` where it `slides`."""
-        last, pull = self.state, self.state.pull
+        last, load = self.state, self.state.load
         state = np.where(last.state == STICK, SLIP, last.state).astype(np.int32) if slides else last.state.copy()
         senses = np.full(len(state), sense, np.int32) if slides else last.sense.copy()
-        pull = Pull(pull.depth, self.mu, self.tau, sense if slides else 0, pull.travel)
-        return replace(last, state=state, sense=senses, pull=pull)
+        load = LoadState(load.depth, self.mu, self.tau, sense if slides else 0, load.travel)
+        return replace(last, state=state, sense=senses, load=load)
 
 
 def stepper(scene: Scene) -> Stepper:
@@ -116,7 +116,7 @@ def stepper_and_picture(scene: Scene, *, picture: bool = True) -> "tuple[Stepper
         drawn = FinitePicture.of(finite, scene) if picture else None
         follower: Stepper = FiniteStepper(finite, mu, tau)
     else:
-        finger = FingerModel.of(scene, sizing)
+        finger = LinearFinger.of(scene, sizing)
         drawn = SmallPicture.of(finger) if picture else None
         follower = SmallStepper(Condensed.of(finger), mu, tau)
     follower.step(1e-3, 0.0)  # compiles, or loads what was compiled

@@ -14,9 +14,9 @@ from solver.body.tissues import settled_moduli
 from solver.continuation.existence import steady
 from solver.continuation.small_states import settled
 from solver.element import Q2P1
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.verification.asked import clock
@@ -72,7 +72,7 @@ class SmallMeshed:
         """Mesh and reduce the finger of `scene`."""
         self._moduli = settled_moduli(scene.materials)
         begun, passing = clock(), perf_counter()
-        self.finger = FingerModel.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
+        self.finger = LinearFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
         took, passed = clock() - begun, perf_counter() - passing
         self.prepared_s = took * self.finger.solve_s / passed  # which it tells by the time that passes
         self.setup_s = took - self.prepared_s
@@ -124,7 +124,7 @@ class FiniteMeshed:
         if before is None:
             low = coarse_solution(scene, scene.loading.depth, self._fineness, lambda: False, self._make)
             before = self.finger.transfer(low.shape, low.finger)
-        return steady(self.finger, pull_of(scene), start=before)
+        return steady(self.finger, load_of(scene), start=before)
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
@@ -142,14 +142,14 @@ class FiniteMeshed:
 def _system(newton: FiniteNewton) -> float:
     shape = EquilibriumState.undeformed(newton.body)
     begun = clock()
-    newton.linearise(shape, Pull(0.1, 0.0), newton.skin_x)
+    newton.linearise(shape, LoadState(0.1, 0.0), newton.skin_x)
     return clock() - begun
 
 
-def pull_of(scene: Scene) -> Pull:
+def load_of(scene: Scene) -> LoadState:
     """Return what the surface does in a scene of settled sliding."""
     friction, loading = scene.friction, scene.loading
-    return Pull(loading.depth, float(friction.mu), friction.cap, -(loading.direction or 1))
+    return LoadState(loading.depth, float(friction.mu), friction.cap, -(loading.direction or 1))
 
 
 _ELIMINATION = "nested dissection in compiled loops"

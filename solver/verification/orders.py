@@ -8,8 +8,8 @@ import numpy as np
 
 from solver.continuation.finite_states import settled as finite_settled
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
@@ -112,7 +112,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
 
     def sed(asked: Scene, fineness: float, shift: bool) -> float:
-        model = FingerModel.of(asked, Sizing(fineness, 2.0, shift))
+        model = LinearFinger.of(asked, Sizing(fineness, 2.0, shift))
         return float(model.numbers([settled(asked, model)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
@@ -127,7 +127,7 @@ def finite_finger(quick: bool) -> Iterator[Order]:
 
     def sed(fineness: float, shift: bool) -> float:
         finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.depth, shift, margin=3.0))
-        return finger.sed_ending(finite_settled(finger, asked, lambda: False))
+        return finger.sed_ending(finite_settled(finger, asked, lambda: False).u)
 
     finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
     yield _finger(asked.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march, press_and_slide
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import LoadState
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Friction, Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, within
@@ -89,7 +89,7 @@ def _small(scene: Scene) -> Iterator[Reading]:
     depth, direction = scene.loading.depth, scene.loading.direction
     course = press_and_slide(depth, scene.friction.mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
     lifts = [(down, DISTANCE + depth * (n + 1)) for n, down in enumerate(_lifts(depth))]
-    course += [Pull(down, scene.friction.mu, travel=-direction * along) for down, along in lifts]
+    course += [LoadState(down, scene.friction.mu, travel=-direction * along) for down, along in lifts]
     for state in march(finger.newton, course):
         sed = finger.sed_ending(finger.displacement(state))
         yield float(state.force[1]), float(state.force[0]), sed
@@ -100,11 +100,11 @@ def _finite(scene: Scene) -> Iterator[Reading]:
     depth, mu, direction = scene.loading.depth, scene.friction.mu, scene.loading.direction
     course = press_and_slide(depth, mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
     for shape in march(finger.newton, course, tolerance=1e-6):
-        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
+        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape.u)
     shape = None
     for down in _lifts(depth):
-        shape = settled(finger.newton, Pull(down, mu, np.inf, -direction), shape)
-        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape)
+        shape = settled(finger.newton, LoadState(down, mu, np.inf, -direction), shape)
+        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape.u)
 
 
 def _lifts(depth: float) -> list[float]:

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 
 from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
-from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import endings
 from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
@@ -24,7 +24,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     moduli = [tissue.E for tissue in (tissues.epidermis, tissues.dermis, tissues.fat)]
     body = FiniteBody.of(made.mesh, [NeoHooke(E, nu) for E in moduli])
     elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
-    probes = FiniteProbes.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
+    probes = FinitePatches.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
     return FiniteNewton(body), probes, made.whole
 
 

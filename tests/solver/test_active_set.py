@@ -13,7 +13,7 @@ from solver.contact.law import FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import march
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull, lowered
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain
@@ -50,10 +50,10 @@ def agree(found, plain):
 @pytest.mark.parametrize("law", LAWS, ids=str)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_settled_slides_are_the_plain_ones(newton, plain, law, direction):
-    pull = Pull(1.5, law.mu, law.tau_max, -direction)
-    found = settled(newton, pull)
+    load = LoadState(1.5, law.mu, law.tau_max, -direction)
+    found = settled(newton, load)
     agree(found, Course(plain, law).sliding(1.5, direction))
-    agree(settled(newton, pull._replace(depth=1.4), found), Course(plain, law).sliding(1.4, direction, found.state))
+    agree(settled(newton, load._replace(depth=1.4), found), Course(plain, law).sliding(1.4, direction, found.state))
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
@@ -62,7 +62,7 @@ def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain
     state, met = EquilibriumState.undeformed(newton.condensed), set()
     for depth, travel in WAY:
         before = course.step(before, depth, travel)
-        state = newton.settle(state, Pull(depth, law.mu, law.tau_max, travel=-travel))
+        state = newton.settle(state, LoadState(depth, law.mu, law.tau_max, travel=-travel))
         agree(state, before)
         met |= set(state.state.tolist())
     assert law.frictionless or (met >= {STICK, SLIP} and (SHEAR_LIMITED in met) == np.isfinite(law.tau_max))
@@ -71,20 +71,23 @@ def test_a_course_of_stick_slip_and_turning_round_is_the_plain_one(newton, plain
 @pytest.mark.parametrize("tau", [np.inf, 0.004])
 def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, tau):
     mu = 0.4
-    state, before = replace(EquilibriumState.undeformed(newton.condensed), pull=Pull(0.0, mu, tau)), untouched(plain)
+    state, before = (
+        replace(EquilibriumState.undeformed(newton.condensed), load=LoadState(0.0, mu, tau)),
+        untouched(plain),
+    )
     for n in range(1, 41):
         normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
         course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))
         before = course.step(lowered_plain(course.law, before), 0.0, 0.0)
         state = balanced(newton, lowered(newton.condensed, state), Given(normal, drag))
         agree(state, before)
-        np.testing.assert_allclose([-state.pull.depth, -state.pull.travel], before.motion, atol=1e-10)
+        np.testing.assert_allclose([-state.load.depth, -state.load.travel], before.motion, atol=1e-10)
     assert (state.state == SHEAR_LIMITED).any() == (tau < np.inf)
 
 
 def test_a_way_under_given_forces_ends_with_them(newton):
     loading = Loading(normal_force=0.1, tangential_force=0.02)
-    last = march(newton, Pull(0.0, 0.5, 0.01), loading)[-1].state
+    last = march(newton, LoadState(0.0, 0.5, 0.01), loading)[-1].state
     np.testing.assert_allclose(last.force, [-0.02, 0.1], rtol=1e-9)
     assert (last.state == STICK).any()
 
@@ -92,6 +95,6 @@ def test_a_way_under_given_forces_ends_with_them(newton):
 def test_a_search_that_may_not_go_on_says_so(newton):
     nowhere = np.full(len(newton.skin_x), OPEN)
     with pytest.raises(ContactLost, match="after 2 systems"):
-        slide_beside(newton, Pull(1.5, 0.5, sense=-1), nowhere, rounds=2)
+        slide_beside(newton, LoadState(1.5, 0.5, sense=-1), nowhere, rounds=2)
     with pytest.raises(ContactLost, match="no unique forces"):
-        slide_beside(newton, Pull(0.0, 0.5, sense=-1), nowhere, force=0.1)
+        slide_beside(newton, LoadState(0.0, 0.5, sense=-1), nowhere, force=0.1)

@@ -8,7 +8,7 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, energy, stress
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import LoadState
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
 from solver.verification.published.bodies import distorted
@@ -74,12 +74,12 @@ def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
     newton, _, _ = finger(5)
 
     def stored(depth):
-        return oracle.energy(newton.body, settled(newton, Pull(depth, 0.0, sense=1), tolerance=1e-12).u)
+        return oracle.energy(newton.body, settled(newton, LoadState(depth, 0.0, sense=1), tolerance=1e-12).u)
 
     def slope(step):
         return (stored(1.5 + step) - stored(1.5 - step)) / (2.0 * step)
 
-    force = settled(newton, Pull(1.5, 0.0, sense=1), tolerance=1e-12).force[1]
+    force = settled(newton, LoadState(1.5, 0.0, sense=1), tolerance=1e-12).force[1]
     assert (4.0 * slope(5e-4) - slope(1e-3)) / 3.0 == pytest.approx(force, rel=1e-6)
 
 

@@ -75,7 +75,7 @@ def test_below_a_sliding_cylinder_the_stresses_are_those_of_smith_and_liu(mu):
     """The surface drags the body along +x. The block is 600 half-widths wide; what that leaves out is 0.3 % of p0."""
     light = contacts.light(wide=300.0)
     table = np.array(BELOW[mu])
-    got = light.stress(light.slid(FrictionLaw(mu, np.inf), -1), table[:, :2])
+    got = light.stress(light.slip(FrictionLaw(mu, np.inf), -1), table[:, :2])
     assert np.abs(got[:, 0, 0] - table[:, 2]).max() < 0.005
     assert np.abs(got[:, 1, 1] - table[:, 3]).max() < 0.005
     assert np.abs(got[:, 0, 1] - table[:, 4]).max() < 0.005
@@ -87,7 +87,7 @@ def test_below_a_sliding_cylinder_the_stresses_are_those_of_smith_and_liu(mu):
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_the_contact(mu):
     light = contacts.light(wide=300.0)
-    state = light.slid(FrictionLaw(mu, np.inf), -1)
+    state = light.slip(FrictionLaw(mu, np.inf), -1)
     inside, outside = np.linspace(-0.9, 0.9, 7), np.array([-2.0, -1.5, -1.2, 1.2, 1.5, 2.0])
     x = np.concatenate([inside, outside])
     # Johnson 1985, sections 4.1 and 7.1: sigma_x by p0 along a surface pulled along +x, behind which it is stretched
@@ -122,7 +122,7 @@ def test_a_bound_on_a_hertz_pressure_carries_the_elementary_integral(light, k, f
     """Q/(mu P) for k = tau_max/(mu p0); the bound acts for |x| < sqrt(1 - k^2)."""
     mu = 0.3
     law = FrictionLaw(mu, k * mu * light.peak)
-    found = light.slid(law)
+    found = light.slip(law)
     assert -found.tangential.sum() / (mu * light.load) == pytest.approx(force, rel=0.005)
     assert contacts.capped_width(light, found, law) == pytest.approx(
         np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT if k == 1.0 else 0.0

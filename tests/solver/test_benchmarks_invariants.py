@@ -8,11 +8,11 @@ import pytest
 from solver import Friction, Loading, Material, Materials, Scene
 from solver._kernels import SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import march
-from solver.equilibrium.loads import sliding_pull
-from solver.equilibrium.newton import EquilibriumState, Pull
+from solver.equilibrium.loads import sliding_load
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
@@ -22,17 +22,17 @@ WAYS = [("no bound", 1), ("no bound", -1), ("bound", 1), ("bound", -1)]
 
 @pytest.fixture(scope="module")
 def finger():
-    return FingerModel.of(scene(STICKINESS[1]), Sizing(8, 1.5))
+    return LinearFinger.of(scene(STICKINESS[1]), Sizing(8, 1.5))
 
 
 @pytest.fixture(scope="module")
 def ways(finger):
     loadings = {1: Loading(1.5, "+x"), -1: Loading(1.5, "-x")}
-    return {(law, way): march(finger.newton, pull_of(LAWS[law]), loadings[way]) for law, way in WAYS}
+    return {(law, way): march(finger.newton, load_of(LAWS[law]), loadings[way]) for law, way in WAYS}
 
 
-def pull_of(law):
-    return Pull(0.0, law.mu, law.tau_max)
+def load_of(law):
+    return LoadState(0.0, law.mu, law.tau_max)
 
 
 def bone_force(finger, contact: EquilibriumState):
@@ -102,8 +102,8 @@ def test_in_steady_sliding_all_the_bone_s_work_is_the_drag_s(ways, way):
 
 
 def test_speed_only_rescales_time(finger):
-    pull = pull_of(LAWS["bound"])
-    slow, fast = (march(finger.newton, pull, Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
+    load = load_of(LAWS["bound"])
+    slow, fast = (march(finger.newton, load, Loading(1.5, "+x", speed)) for speed in (1.0, 40.0))
     for one, other in zip(slow, fast, strict=True):
         assert one.travel == other.travel
         assert np.array_equal(one.state.normal, other.state.normal)
@@ -111,9 +111,9 @@ def test_speed_only_rescales_time(finger):
 
 
 def test_without_friction_either_way_is_the_static_answer(finger):
-    there, back = (settled(finger.newton, Pull(1.5, 0.0, sense=way)) for way in (-1, 1))
+    there, back = (settled(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
     assert np.array_equal(there.normal, back.normal)
-    static = march(finger.newton, Pull(0.0, 0.0), Loading(1.5, "none"))[-1].state
+    static = march(finger.newton, LoadState(0.0, 0.0), Loading(1.5, "none"))[-1].state
     assert np.abs(static.normal - there.normal).max() < 1e-13 * there.normal.max()
 
 
@@ -122,9 +122,9 @@ def test_stiffer_everything_scales_forces_and_energy_and_moves_nothing(finger, f
     m = Materials()
     stiff = Materials(*(Material(factor * t.E, t.nu) for t in (m.epidermis, m.dermis, m.fat, m.bone)))
     asked = Scene(friction=Friction(0.0), loading=Loading(1.5), materials=stiff)
-    other = FingerModel.of(asked, Sizing(8, 1.5))
-    pull = pull_of(LAWS["bound"])._replace(depth=1.5, sense=-1)
-    one, two = settled(finger.newton, pull), settled(other.newton, pull._replace(tau=factor * pull.tau))
+    other = LinearFinger.of(asked, Sizing(8, 1.5))
+    load = load_of(LAWS["bound"])._replace(depth=1.5, sense=-1)
+    one, two = settled(finger.newton, load), settled(other.newton, load._replace(tau=factor * load.tau))
     assert np.array_equal(one.state, two.state)
     assert np.abs(two.normal / factor - one.normal).max() < 1e-11 * one.normal.max()
     moved, same = finger.displacement(one), other.displacement(two)
@@ -138,8 +138,8 @@ def test_three_meshes_come_closer_and_closer_to_one_answer(surface):
     asked = scene(surface)
     seds = []
     for fineness in (6, 12, 24):
-        model = FingerModel.of(asked, Sizing(fineness, asked.loading.indentation))
-        contact = settled(model.newton, sliding_pull(asked))
+        model = LinearFinger.of(asked, Sizing(fineness, asked.loading.indentation))
+        contact = settled(model.newton, sliding_load(asked))
         seds.append(model.sed_ending(model.displacement(contact)))
     first, last = abs(seds[1] - seds[0]), abs(seds[2] - seds[1])
     assert last < 0.003 * seds[2]

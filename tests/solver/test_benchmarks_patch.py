@@ -11,7 +11,7 @@ from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import EquilibriumState, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.grid import quality
@@ -70,7 +70,7 @@ def pressed(nu: float, shear: float, seed: int):
 def test_a_uniform_pressure_comes_through_a_distorted_block_unchanged(seed, nu, round_off):
     mesh, loads = pressed(nu, 0.0, seed)
     body = LinearBody.of(mesh, [Hooke(0.08, nu)], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), Pull(0.0, 0.0, np.inf, -1))
+    found = settled(Newton(body.condensed), LoadState(0.0, 0.0, np.inf, -1))
     assert np.abs(found.normal / body.condensed.fixed_length / 1e-3 - 1.0).max() < round_off
 
 
@@ -81,7 +81,7 @@ def test_a_block_sheared_below_mu_p_sticks_at_every_point(part):
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
     still = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
-    found = newton.solved(still, Pull(0.0, mu), newton.skin_x)
+    found = newton.solved(still, LoadState(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
     assert np.abs(found.tangential / body.condensed.fixed_length + part * mu * 1e-3).max() < 1e-15
 
@@ -93,7 +93,7 @@ def test_a_uniform_patch_drags_by_the_smaller_of_mu_p_and_the_bound_exactly(boun
     shear = min(mu * 1e-3, bound)
     mesh, loads = pressed(0.48, shear, 1)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), Pull(0.0, mu, bound, -1))
+    found = settled(Newton(body.condensed), LoadState(0.0, mu, bound, -1))
     assert (found.state == (SLIP if bound > mu * 1e-3 else SHEAR_LIMITED)).all()
     assert np.abs(found.tangential / body.condensed.fixed_length + shear).max() < 1e-15
     assert -found.tangential.sum() == pytest.approx(min(mu * 2e-3, bound * 2.0), rel=1e-12, abs=1e-18)

@@ -6,12 +6,12 @@ import pytest
 from solver import Finger, Receptor
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import LoadState
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 
-PULL = Pull(1.0, 0.28, 0.008033, -1)
+PULL = LoadState(1.0, 0.28, 0.008033, -1)
 
 
 def places(fineness):

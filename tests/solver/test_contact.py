@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.mesh.blocks import block
 
 RADIUS = 5.0
@@ -34,7 +34,7 @@ def cylinder(half_width: float, finest: float, nu: float = 0.48, zone: float = 0
 def pressed():
     """P = 0.01 N/mm on R = 5, E = 0.08, nu = 0.48: a = 0.782578 mm, p0 = 0.008135 MPa (Johnson 1985, ch. 4)."""
     body = cylinder(4.5, 0.06)
-    return body, slide_under(Newton(body.condensed), Pull(0.0, 0.0, sense=-1), 0.01)
+    return body, slide_under(Newton(body.condensed), LoadState(0.0, 0.0, sense=-1), 0.01)
 
 
 def start_state(body, half_width=0.7):
@@ -59,8 +59,8 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     """t = min(mu p, tau_max), k = tau_max/(mu p0): Q/(mu P) = 0.895912, 0.715243, 0.495368."""
     body, frictionless = pressed
     mu = 0.02  # so small that the drag does not move the pressure
-    pull = Pull(0.0, mu, k * mu * 0.008135, -1)
-    found = slide_beside(Newton(body.condensed), pull, frictionless.state, 0.01)
+    load = LoadState(0.0, mu, k * mu * 0.008135, -1)
+    found = slide_beside(Newton(body.condensed), load, frictionless.state, 0.01)
     exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
     assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
     x = body.mesh.nodes[body.mesh.skin, 0]
@@ -70,9 +70,9 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
 
 @pytest.mark.parametrize("tau_max", [np.inf, 1e-4, 0.0])
 def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
-    newton, pull = Newton(pressed[0].condensed), Pull(0.01, 0.4, tau_max, -1)
+    newton, load = Newton(pressed[0].condensed), LoadState(0.01, 0.4, tau_max, -1)
     far = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
-    short, long = settled(newton, pull), slide_beside(newton, pull, far)
+    short, long = settled(newton, load), slide_beside(newton, load, far)
     assert np.array_equal(short.state, long.state)
     assert (short.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
     for name in ("normal", "tangential", "u"):
@@ -83,14 +83,14 @@ def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
     body = cylinder(4.5, 0.2)
-    found = settled(Newton(body.condensed), Pull(0.1, mu, sense=-1))
+    found = settled(Newton(body.condensed), LoadState(0.1, mu, sense=-1))
     assert -found.tangential.sum() / found.normal.sum() == pytest.approx(mu, rel=1e-13)
 
 
 def test_sliding_the_other_way_mirrors_the_forces_of_a_mirrored_body():
     body = cylinder(4.5, 0.2)
-    one = settled(Newton(body.condensed), Pull(0.1, 0.3, sense=-1))
-    other = settled(Newton(body.condensed), Pull(0.1, 0.3, sense=1))
+    one = settled(Newton(body.condensed), LoadState(0.1, 0.3, sense=-1))
+    other = settled(Newton(body.condensed), LoadState(0.1, 0.3, sense=1))
     assert np.allclose(one.normal, other.normal[::-1], atol=1e-15)
     assert np.allclose(one.tangential, -other.tangential[::-1], atol=1e-15)
 
@@ -107,9 +107,9 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
     p0 = 2 * load / (np.pi * a)
     body = cylinder(4.5, 0.02, nu, zone=0.3)
     newton = Newton(body.condensed)
-    now = slide_beside(newton, Pull(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
+    now = slide_beside(newton, LoadState(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
     # all that touches sticks where it is; then the drive moves along until the drag is the part asked for
-    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int32), pull=Pull(now.pull.depth, mu))
+    now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int32), load=LoadState(now.load.depth, mu))
     travel = 0.0
     while -now.force[0] < part * mu * load:
         travel -= 2e-6
@@ -124,11 +124,11 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
 def test_a_tyre_that_cannot_slide_is_reported_lost():
     body = cylinder(4.5, 0.4)
     with pytest.raises(ContactLost):
-        settled(Newton(body.condensed), Pull(0.2, 50.0, sense=-1))
+        settled(Newton(body.condensed), LoadState(0.2, 50.0, sense=-1))
 
 
 def test_before_first_touch_nothing_is_felt():
     body = cylinder(4.5, 0.4)
-    before = Newton(body.condensed).settle(EquilibriumState.undeformed(body.condensed), Pull(-0.01, 0.3))
+    before = Newton(body.condensed).settle(EquilibriumState.undeformed(body.condensed), LoadState(-0.01, 0.3))
     assert not before.normal.any()
     assert before.place(body.condensed)[:, 1].min() == pytest.approx(0.0, abs=1e-12)

@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.hyperelastic import NeoHooke, stress
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.dead_loads import loaded
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)
@@ -37,7 +37,7 @@ def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_s
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 1], 1.0))
     top = top[np.argsort(mesh.nodes[top, 0])]
     pressed = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, nominal]])
-    found = loaded(newton, pressed, pull=Pull(0.0, 0.0, sense=1), start=start)
+    found = loaded(newton, pressed, load=LoadState(0.0, 0.0, sense=1), start=start)
     exact = (mesh.nodes - [1.0, 0.0]) * [across - 1.0, stretch - 1.0]
     np.testing.assert_allclose(found.u, exact, atol=3e-5)  # the traction is given to five figures
     # the held corner of two of the four edges takes a sixth of each
@@ -50,7 +50,7 @@ def test_a_prescribed_affine_boundary_is_affine_inside():
     boundary = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
     newton = FiniteNewton(FiniteBody.of(replace(mesh, held=boundary), [DERMIS]))
     gradient = np.array([[0.2, 0.3], [-0.1, -0.1]])
-    found = loaded(newton, prescribed=mesh.nodes @ gradient.T * newton.body.mesh.driven, pull=Pull(-1e3, 0.0))
+    found = loaded(newton, prescribed=mesh.nodes @ gradient.T * newton.body.mesh.driven, load=LoadState(-1e3, 0.0))
     np.testing.assert_allclose(found.u, mesh.nodes @ gradient.T, atol=1e-9)
 
 
@@ -58,7 +58,7 @@ def test_a_hanging_bar_carries_its_dead_traction_far_from_the_clamp():
     mesh = block(columns=2, rows=6, width=0.5, height=3.0)
     newton = FiniteNewton(FiniteBody.of(mesh, [DERMIS]))
     pulled = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[0.0, -0.01]])
-    place = mesh.nodes + loaded(newton, pulled, pull=Pull(-1e3, 0.0)).u
+    place = mesh.nodes + loaded(newton, pulled, load=LoadState(-1e3, 0.0)).u
     low, next_up = (np.isclose(mesh.nodes[:, 1], height) for height in (0.0, 0.5))
     stretches = np.ptp(place[low, 0]) / 0.5, (place[next_up, 1].mean() - place[low, 1].mean()) / 0.5
     P = stress(DERMIS, np.diag(stretches))  # noqa: N806
@@ -69,7 +69,7 @@ def test_small_loads_give_the_small_strain_answer():
     mesh = block(columns=4, rows=3, distortion=0.1, seed=2)
     right = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[1e-5, -2e-5]])
     newton = FiniteNewton(FiniteBody.of(mesh, [NeoHooke(1.0, 0.3)]))
-    finite = loaded(newton, right, pull=Pull(-1e3, 0.0), steps=1)
+    finite = loaded(newton, right, load=LoadState(-1e3, 0.0), steps=1)
     body = LinearBody.of(mesh, [Hooke(1.0, 0.3)], right)
     small = body.displacement(body.condensed.untouched())
     np.testing.assert_allclose(finite.u, small, rtol=1e-3, atol=1e-4 * np.abs(small).max())

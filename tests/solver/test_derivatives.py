@@ -8,7 +8,7 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.body.finite import FiniteBody, FiniteProbes
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
@@ -18,9 +18,9 @@ from solver.constitutive.linear import Hooke
 from solver.continuation.small_states import settled
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import Newton, Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.newton import LoadState, Newton
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
 from solver.response.derivatives import of_skin, of_slide, slope
@@ -68,14 +68,14 @@ def assert_alike(found, expected, scale):
 
 @pytest.fixture(scope="module")
 def small():
-    return FingerModel.of(scene(0.0, None, Loading(2.0)), Sizing(5.0, 2.0))
+    return LinearFinger.of(scene(0.0, None, Loading(2.0)), Sizing(5.0, 2.0))
 
 
 def small_numbers(finger, scene, states):
     """Return SED, normal force, drag, depth and each quantity of a settled slide, which must have these states."""
     contact = settled(scene, finger)
     assert (contact.state == states).all()
-    depth = contact.pull.depth
+    depth = contact.load.depth
     sed, normal, tangential, *rest = finger.all_numbers([contact])[0]
     return np.array([sed, normal, -scene.loading.direction * tangential, depth, *rest[-len(QUANTITIES) :]])
 
@@ -129,12 +129,12 @@ def springs(coupling):
 def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
-    newton, pull = springs(b), Pull(d, mu, sense=-1)
-    along, up = newton.follows(of_skin(newton, sliding.settled(newton, pull)))
+    newton, load = springs(b), LoadState(d, mu, sense=-1)
+    along, up = newton.follows(of_skin(newton, sliding.settled(newton, load)))
     soft = 3.0 - mu * b
     assert up == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
     assert along == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
-    capped = sliding.settled(newton, pull._replace(tau=tau))
+    capped = sliding.settled(newton, load._replace(tau=tau))
     assert capped.state.tolist() == [SHEAR_LIMITED, OPEN]
     along, up = newton.follows(of_skin(newton, capped))
     assert up == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
@@ -181,23 +181,23 @@ def finite():
     return FiniteFinger.of(scene(0.0, None, Loading(1.2), "finite"), Sizing(5.0, 1.2, margin=3.0))
 
 
-def pull_of(scene, depth):
-    return Pull(depth, scene.friction.mu, scene.friction.cap, -scene.loading.direction)
+def load_of(scene, depth):
+    return LoadState(depth, scene.friction.mu, scene.friction.cap, -scene.loading.direction)
 
 
-def slid(finger, scene, start=None):
+def slip(finger, scene, start=None):
     depth = scene.loading.indentation or 0.6
-    shape = sliding.settled(finger.newton, pull_of(scene, depth), start, 1e-12)
+    shape = sliding.settled(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
         return shape
     return finite_forced.balanced(finger.newton, shape, finite_forced.Given(scene.normal_force, None), 1e-12)
 
 
 def finite_numbers(finger, scene, here):
-    shape = slid(finger, scene, replace(here, pull=pull_of(scene, here.pull.depth)))
+    shape = slip(finger, scene, replace(here, load=load_of(scene, here.load.depth)))
     assert (shape.state == here.state).all()
     sed, normal, tangential, *rest = finger.all_numbers([shape])[0]
-    return np.array([sed, normal, -scene.loading.direction * tangential, shape.pull.depth, *rest[-len(QUANTITIES) :]])
+    return np.array([sed, normal, -scene.loading.direction * tangential, shape.load.depth, *rest[-len(QUANTITIES) :]])
 
 
 FINITE = {
@@ -210,7 +210,7 @@ FINITE = {
 @pytest.mark.parametrize("name", FINITE)
 def test_at_finite_strain_they_are_the_differences_of_solves_within_one_set_of_states(finite, name):
     here = FINITE[name]
-    shape = slid(finite, here)
+    shape = slip(finite, here)
     assert ("at the bound" in name) == (shape.state == SHEAR_LIMITED).any()
 
     def numbers(one):
@@ -229,20 +229,20 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     local = np.random.default_rng(1).uniform(-0.9, 0.9, (len(elements), 2))
     places = Probes.at(mesh, Elastic.of(mesh, [Hooke(0.08, 0.48)]), elements, local)
     count = len(elements)
-    probes = FiniteProbes.of(
+    probes = FinitePatches.of(
         body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1)))
     )
     draw = np.random.default_rng(2)
     u, steps = draw.uniform(-0.015, 0.015, mesh.nodes.shape), draw.normal(size=(*mesh.nodes.shape, 2))
-    found = slope(lambda moved: probes.responses(body, moved)[0].T, u, steps)
+    found = slope(probes, u, steps)[0]
     for column in range(2):
         expected = average(body, probes, u + 1e-30j * steps[..., column])
-        assert np.real(expected) == pytest.approx(probes.average(body, u), rel=1e-12)
+        assert np.real(expected) == pytest.approx(probes.average(u), rel=1e-12)
         assert found[:, column] == pytest.approx(np.imag(expected) / 1e-30, rel=1e-12)
 
 
 def average(body, probes, u):
-    """Return the SED of patches as `FiniteProbes.average` does, of displacements that may be complex."""
+    """Return the SED of patches as `FinitePatches.average` does, of displacements that may be complex."""
     inside = np.stack([body.grad_x, body.grad_y], axis=-1)
     log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.nodes], inside)))
     volume = np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
@@ -262,6 +262,6 @@ def determinant(f):
 
 def test_a_state_that_is_no_slide_has_no_derivatives_of_its_own(finite):
     here = FINITE["without a bound"]
-    shape = slid(finite, here)
+    shape = slip(finite, here)
     with pytest.raises(ValueError, match="depends on the way"):
-        of_slide(finite, here, replace(shape, pull=shape.pull._replace(sense=0)))
+        of_slide(finite, here, replace(shape, load=shape.load._replace(sense=0)))

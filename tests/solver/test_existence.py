@@ -7,7 +7,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.accuracy.adaptivity import nested_solution
 from solver.continuation.existence import steady
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import LoadState
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1
@@ -29,27 +29,29 @@ def test_four_surfaces_have_no_settled_sliding_at_two_millimetres_and_the_refusa
     mu, tau, deepest
 ):
     with pytest.raises(NoSteadyState, match="folds") as refusal:
-        steady(published(8), Pull(2.0, mu, tau, TOWARDS_TIP))
+        steady(published(8), LoadState(2.0, mu, tau, TOWARDS_TIP))
     assert refusal.value.limit_mu == pytest.approx(0.373, rel=0.03)
     assert refusal.value.limit_indentation == pytest.approx(deepest, rel=0.03)
 
 
 def test_a_sound_state_is_the_direct_one():
     finger = published(5)
-    pull = Pull(1.5, 0.44, 0.03009, 1)
-    shape = steady(finger, pull)
-    np.testing.assert_array_equal(shape.u, settled(finger.newton, pull).u)
+    load = LoadState(1.5, 0.44, 0.03009, 1)
+    shape = steady(finger, load)
+    np.testing.assert_array_equal(shape.u, settled(finger.newton, load).u)
 
 
 def test_friction_without_measure_is_the_bound_alone():
     finger = published(6)
-    sed = [finger.sed_ending(steady(finger, Pull(1.0, mu, 0.005, 1))) for mu in (50.0, 1000.0)]
+    sed = [finger.sed_ending(steady(finger, LoadState(1.0, mu, 0.005, 1)).u) for mu in (50.0, 1000.0)]
     assert sed[0] == pytest.approx(sed[1], rel=1e-3)
 
 
 def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coefficient():
     finger = published(5)
-    sed = [finger.sed_ending(steady(finger, Pull(1.0, mu, tau, 1))) for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))]
+    sed = [
+        finger.sed_ending(steady(finger, LoadState(1.0, mu, tau, 1)).u) for mu, tau in ((0.0, np.inf), (1000.0, 1e-9))
+    ]
     assert sed[0] == pytest.approx(sed[1], rel=1e-6)
 
 
@@ -57,7 +59,7 @@ def test_a_bound_next_to_nothing_leaves_the_frictionless_state_whatever_the_coef
 @pytest.mark.parametrize(("depth", "tau", "sense"), [(0.01, 0.003, -1), (1e-6, 0.005, -1), (0.1, 0.01, 1)])
 def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_that_touches(depth, tau, sense, fineness):
     finger = published(fineness, depth)
-    shape = steady(finger, Pull(depth, 1000.0, tau, sense))
+    shape = steady(finger, LoadState(depth, 1000.0, tau, sense))
     on = np.flatnonzero(shape.touching)
     x = shape.place(finger.newton.body)[:, 0]
     widest = x[min(on[-1] + 1, len(x) - 1)] - x[max(on[0] - 1, 0)]  # to the neighbours that do not touch
@@ -66,7 +68,7 @@ def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_tha
 
 @pytest.mark.parametrize("depth", [1e-6, 1e-4, 1e-2])
 def test_a_finger_that_barely_touches_has_an_answer(depth):
-    shape = steady(published(5), Pull(depth, 0.5, 0.01, 1))
+    shape = steady(published(5), LoadState(depth, 0.5, 0.01, 1))
     assert shape.touching.any()
     assert shape.force[1] > 0.0
 
@@ -93,7 +95,7 @@ def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu
 @SLOW
 def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
     found = [nested_solution(drawn(0.71), 1.8, fineness, lambda: False).top for fineness in (7.0, 10.0, 14.0, 20.0)]
-    np.testing.assert_allclose([top.finger.sed_ending(top.shape) for top in found], 0.00286, rtol=0.01)
+    np.testing.assert_allclose([top.finger.sed_ending(top.shape.u) for top in found], 0.00286, rtol=0.01)
 
 
 @SLOW

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from solver import Materials, Relaxation, Solve, solve
-from solver.accuracy.finite_audits import course_audits
+from solver.accuracy.audits import course_audits
 from solver.body.finite import FiniteBody
 from solver.constitutive import overstress
 from solver.constitutive.hyperelastic import NeoHooke
@@ -18,7 +18,7 @@ from solver.constitutive.hyperelastic import tangent as relaxed_tangent
 from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
 from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.newton import EquilibriumState, Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
@@ -226,7 +226,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     pushes = []
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.ready(step)
-        shape = newton.settle(shape, Pull(depth, 0.3), 1e-9)
+        shape = newton.settle(shape, LoadState(depth, 0.3), 1e-9)
         force, _ = oracle.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
         total = np.zeros(body.mesh.nodes.shape)
         np.add.at(total, body.nodes, (force + newton.excess(shape)).reshape(-1, 9, 2))
@@ -246,7 +246,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     shape, way, rates, steps, time = EquilibriumState.undeformed(body), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
         newton.ready(time / steps)
-        shape = newton.settle(shape, Pull(0.2 * number / steps, 0.3), 1e-9)
+        shape = newton.settle(shape, LoadState(0.2 * number / steps, 0.3), 1e-9)
         newton.took(shape, time / steps)
         way.append(shape)
         whole_of = [
@@ -261,8 +261,8 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
         )
         rates.append(float(rate @ weight))
     lost = float(np.trapezoid(rates, dx=time / steps))
-    found = course_audits(newton, way)
-    push, depth = np.array([0.0, *(s.force[1] for s in way)]), np.array([0.0, *(s.pull.depth for s in way)])
+    found = course_audits(newton, [EquilibriumState.undeformed(newton.condensed), *way], relaxing=True)
+    push, depth = np.array([0.0, *(s.force[1] for s in way)]), np.array([0.0, *(s.load.depth for s in way)])
     work = float(np.trapezoid(push, depth))
     assert found["course_viscous_work"] == pytest.approx(lost / work, rel=0.02)
     assert lost > 0.02 * work

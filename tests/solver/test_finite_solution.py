@@ -8,11 +8,10 @@ import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy.adaptivity import coarse_solution, refine
-from solver.accuracy.audits import refuse_unsound, rounding
-from solver.accuracy.finite_audits import audits
+from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import LoadState
 from solver.response import finite_solution
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
@@ -60,9 +59,9 @@ def test_forces_balance_and_nothing_is_exceeded(four, name):
 def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wrong, left):
     asked = finite(STICKINESS[0])
     finger = published(4)
-    shape = settled(finger.newton, Pull(2.0, float(asked.friction.mu), asked.friction.cap, -1))
-    told = audits(asked, finger, shape, finger.newton)["work_balance"]
-    planted = audits(asked, finger, replace(shape, reaction=np.array(wrong) * shape.reaction), finger.newton)
+    shape = settled(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    told = audits(finger, shape, shape.u)["work_balance"]
+    planted = audits(finger, replace(shape, reaction=np.array(wrong) * shape.reaction), shape.u)
     assert told < 1e-9
     assert left < planted["work_balance"] < 0.01
 
@@ -70,13 +69,13 @@ def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wro
 def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     asked = finite(STICKINESS[0])
     finger = published(4)
-    shape = settled(finger.newton, Pull(2.0, float(asked.friction.mu), asked.friction.cap, -1))
-    told = audits(asked, finger, shape, finger.newton)
+    shape = settled(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    told = audits(finger, shape, shape.u)
     reaction, middle = shape.reaction.copy(), int(np.argmax(shape.reaction[:, 1]))
     moved = 0.2 * reaction[middle]
     reaction[middle] -= moved
     reaction[middle + 1] += moved
-    planted = audits(asked, finger, replace(shape, reaction=reaction), finger.newton)
+    planted = audits(finger, replace(shape, reaction=reaction), shape.u)
     assert planted["equilibrium_y"] < 1e-9
     assert told["inner_forces"] < 1e-9
     assert planted["inner_forces"] == pytest.approx(float(np.abs(moved).max()) / shape.force[1], rel=1e-6)
@@ -91,9 +90,9 @@ DIFFERENT = 0.05  # part of the range of several surfaces that differences betwe
 
 @pytest.mark.parametrize("number", [0, 1, 2], ids=["SED", "normal force", "tangential force"])
 def test_differences_between_surfaces_solved_together_are_good_to_5_percent_of_their_range(four, number):
-    slid = [name for name in REFERENCE if name.startswith("slip")]
-    found = [(four[name].sed_ending, four[name].normal_force, four[name].tangential_force)[number] for name in slid]
-    true = [REFERENCE[name][number] for name in slid]
+    slip = [name for name in REFERENCE if name.startswith("slip")]
+    found = [(four[name].sed_ending, four[name].normal_force, four[name].tangential_force)[number] for name in slip]
+    true = [REFERENCE[name][number] for name in slip]
     apart = np.subtract.outer(found, found) - np.subtract.outer(true, true)
     assert np.abs(apart).max() < DIFFERENT * np.ptp(true)
 

@@ -284,9 +284,9 @@ def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(mo
     given = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
     whole, followed, grown = solve(given), reach.of_depth, finite_forced.march
 
-    def ends_too_early(scene, pull, stop=lambda: False):
+    def ends_too_early(scene, load, stop=lambda: False):
         depth = whole.indentation / 1.5
-        return replace(followed(scene, pull._replace(depth=depth), stop), value=depth, limited=True, lost=False)
+        return replace(followed(scene, load._replace(depth=depth), stop), value=depth, limited=True, lost=False)
 
     def lost_on_its_way(newton, start, begin, course, stop=lambda: False):
         yield from grown(newton, start, begin, course[:3], stop)

@@ -7,14 +7,22 @@ import numpy as np
 import pytest
 
 from solver import _kernels as kernels
-from solver._kernels.arguments import ContactStates, LoadState
+from solver._kernels.arguments import ContactStates, LoadArguments
 from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
 from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, BY_TRAVEL, EquilibriumState, FiniteNewton, Newton, Pull
+from solver.equilibrium.newton import (
+    BY_DEPTH,
+    BY_FRICTION,
+    BY_TRAVEL,
+    EquilibriumState,
+    FiniteNewton,
+    LoadState,
+    Newton,
+)
 from solver.mesh.blocks import block
 from solver.response.small_stepper import Condensed, SmallStepper
 from tests.solver.oracle import finite as oracle
@@ -43,7 +51,7 @@ class Told:
     normal: np.ndarray
     tangential: np.ndarray
     gap: np.ndarray
-    slid: np.ndarray  # over the surface along +x within the step
+    slip: np.ndarray  # over the surface along +x within the step
     length: np.ndarray
 
 
@@ -56,17 +64,17 @@ def springs(across=COMPLIANCE[1]):
 
 
 def told(body, now, before):
-    place, moved = now.place(body), now.pull.travel - before.pull.travel
-    slid = place[:, 0] - before.place(body)[:, 0] - moved
-    gap = place[:, 1] - now.pull.depth
-    return Told(now.state, now.sense.astype(float), now.normal, now.tangential, gap, slid, LENGTH)
+    place, moved = now.place(body), now.load.travel - before.load.travel
+    slip = place[:, 0] - before.place(body)[:, 0] - moved
+    gap = place[:, 1] - now.load.depth
+    return Told(now.state, now.sense.astype(float), now.normal, now.tangential, gap, slip, LENGTH)
 
 
 def driven(law):
     body = springs()
     newton, states = Newton(body), [EquilibriumState.undeformed(body)]
     for depth, travel in DRIVES:
-        states.append(newton.settle(states[-1], Pull(depth, law.mu, law.tau_max, travel=-travel)))
+        states.append(newton.settle(states[-1], LoadState(depth, law.mu, law.tau_max, travel=-travel)))
     return [told(body, now, before) for before, now in pairwise(states)]
 
 
@@ -85,8 +93,8 @@ def slid_at_once(law):
     """Settled slides either way, which know no way there: what slips does so against its force."""
     body, rubbed = springs(), []
     for direction in (1, -1):
-        found = settled(Newton(body), Pull(0.3, law.mu, law.tau_max, -direction))
-        rubbed.append(replace(told(body, found, found), slid=np.full(5, 100.0 * direction)))
+        found = settled(Newton(body), LoadState(0.3, law.mu, law.tau_max, -direction))
+        rubbed.append(replace(told(body, found, found), slip=np.full(5, 100.0 * direction)))
     return rubbed
 
 
@@ -104,7 +112,7 @@ def pressed_by_forces(law):
         now = told(finger.skin, points.state, before)
         # what slides does so against its force, and how far forces do not tell
         sliding = STICK not in points.state.state
-        out.append(replace(now, slid=np.full(5, -np.sign(now.tangential.sum()))) if sliding else now)
+        out.append(replace(now, slip=np.full(5, -np.sign(now.tangential.sum()))) if sliding else now)
     return out
 
 
@@ -120,20 +128,20 @@ def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06,
                                  (0.06, 0.05), (0.03, 0.05), (-0.1, 0.05))):  # fmt: skip
     shapes = [EquilibriumState.undeformed(newton.body)]
     for depth, travel in drives:
-        shapes.append(newton.settle(shapes[-1], Pull(depth, law.mu, law.tau_max, 0, travel), 1e-13))
+        shapes.append(newton.settle(shapes[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), 1e-13))
     return shapes
 
 
 def finite(law, newton):
     out, shapes = [], dragged(newton, law)
     for before, now in pairwise(shapes):
-        place, moved = now.place(newton.body), now.pull.travel - before.pull.travel
+        place, moved = now.place(newton.body), now.load.travel - before.load.travel
         length = np.maximum(oracle.rubbed(place[:, 0], now.touching, law.mu), 0.0)
-        slid = place[:, 0] - before.place(newton.body)[:, 0] - moved
+        slip = place[:, 0] - before.place(newton.body)[:, 0] - moved
         drag, push = now.reaction.T
         touching = now.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations
         drag, push = np.where(touching, drag, 0.0), np.where(touching, push, 0.0)
-        out.append(Told(now.state, now.sense, push, drag, place[:, 1] - now.pull.depth, slid, length))
+        out.append(Told(now.state, now.sense, push, drag, place[:, 1] - now.load.depth, slip, length))
     return out
 
 
@@ -160,15 +168,15 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
         push = max(at.normal.max(), 1e-3)
         close = 1e-9 * push
         limit = np.minimum(law.mu * at.normal, np.inf if law.tau_max == np.inf else law.tau_max * at.length)
-        lifted, rubbed = push / np.abs(at.gap).max(), push / max(np.abs(at.slid).max(), 1e-6)
+        lifted, rubbed = push / np.abs(at.gap).max(), push / max(np.abs(at.slip).max(), 1e-6)
         assert np.abs(at.normal - np.maximum(at.normal - lifted * at.gap, 0.0)).max() < close
-        projected = np.clip(at.tangential - rubbed * at.slid, -limit, limit)
+        projected = np.clip(at.tangential - rubbed * at.slip, -limit, limit)
         stays = at.state == OPEN  # skin in the air has no traction, wherever it goes
         assert np.abs(np.where(stays, at.tangential, at.tangential - projected)).max() < close
         # and so: it only pushes, keeps within cone and bound, takes work, and pulls against the slip
         assert at.normal.min() >= -close
         assert (np.abs(at.tangential) - limit).max() < close
-        assert (at.tangential * at.slid).max() < close * np.abs(at.slid).max() + 1e-300
+        assert (at.tangential * at.slip).max() < close * np.abs(at.slip).max() + 1e-300
         slips = at.state >= SLIP
         assert (at.tangential * at.sense)[slips].min(initial=0.0) >= -close
         for state, force in ((SLIP, law.mu * at.normal), (SHEAR_LIMITED, law.tau_max * at.length)):
@@ -206,8 +214,8 @@ def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
     for depth, travel in DRIVES:
         normal = np.maximum(depth - body.rest[:, 1], 0.0) / COMPLIANCE[0]
         limit = np.minimum(law.mu * normal, law.tau_max * LENGTH if law.tau_max < np.inf else np.inf)
-        drag = np.clip((before.u[:, 0] - before.pull.travel - travel) / COMPLIANCE[2], -limit, limit)
-        before = newton.settle(before, Pull(depth, law.mu, law.tau_max, travel=-travel))
+        drag = np.clip((before.u[:, 0] - before.load.travel - travel) / COMPLIANCE[2], -limit, limit)
+        before = newton.settle(before, LoadState(depth, law.mu, law.tau_max, travel=-travel))
         np.testing.assert_allclose(before.normal, normal, atol=1e-11 * 0.1)  # round-off, by the largest force
         np.testing.assert_allclose(before.tangential, drag, atol=1e-11 * 0.1)
 
@@ -229,11 +237,11 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         push, above = draw.normal(0.5, 1.0, 9), np.where(state == OPEN, draw.normal(size=9), 0.0)
         length = draw.uniform(-0.2, 3.0, 9)
         drag = draw.normal(size=9) * law.limit(np.abs(push), np.abs(length))
-        reaction, slid, direction = np.stack([drag, push], axis=1), draw.normal(size=9), number % 3 - 1
-        expected = oracle.restated(state, sense, reaction, above, slid, length, law, direction)
+        reaction, slip, direction = np.stack([drag, push], axis=1), draw.normal(size=9), number % 3 - 1
+        expected = oracle.restated(state, sense, reaction, above, slip, length, law, direction)
         found, turned = state.copy(), sense.copy()
-        states, load = ContactStates(found, turned, reaction), LoadState(0.0, law.mu, law.tau_max, direction)
-        changed = kernels.update_contact_states(states, above, slid, length, load)
+        states, load = ContactStates(found, turned, reaction), LoadArguments(0.0, law.mu, law.tau_max, direction)
+        changed = kernels.update_contact_states(states, above, slip, length, load)
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))
@@ -259,10 +267,10 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     """By depth, friction and travel, against differences of whole solutions."""
     law = BOUND_OF_CUSHION
     start = dragged(cushion, law, ((0.06, 0.0), (0.06, 0.004)))[-1]
-    here = Pull(0.06, law.mu, law.tau_max, 0, 0.015)
+    here = LoadState(0.06, law.mu, law.tau_max, 0, 0.015)
     now = cushion.settle(start, here, 1e-13)
     assert set(now.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
-    anchor = start.place(cushion.body)[:, 0] + here.travel - start.pull.travel
+    anchor = start.place(cushion.body)[:, 0] + here.travel - start.load.travel
     assert cushion.linearise(now, here, anchor)
     tangent, skin = cushion.steps.copy(), cushion.body.mesh.skin
     for column, name in ((BY_DEPTH, "depth"), (BY_FRICTION, "mu"), (BY_TRAVEL, "travel")):

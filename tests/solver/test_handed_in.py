@@ -14,7 +14,7 @@ from solver.equilibrium.finite_relaxation import RelaxingNewton
 from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Given, Newton, Pull
+from solver.equilibrium.newton import FiniteNewton, Given, LoadState, Newton
 from solver.equilibrium.relaxation import RelaxingBody
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
@@ -98,17 +98,26 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: RelaxingBody(MESH, [relaxes(-0.1, 1.0)]), "terms that cannot relax"),
         (lambda: RelaxingBody(MESH, [relaxes(0.3, -1.0)]), "terms that cannot relax"),
         (lambda: RelaxingNewton(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, -1.0, sense=-1)), "mu = -1.0"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, -1.0, sense=-1)), "tau_max = -1.0"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(np.nan, 0.3, sense=-1)), "depth = nan"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), Pull(0.1, 0.3, sense=2)), "sense = 2"),
-        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [Pull(np.inf, 0.3)])), "depth = inf"),
-        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [Pull(0.1, 0.3, travel=np.nan)])), "travel = nan"),
-        (lambda: loaded(FiniteNewton(FiniteBody.of(MESH, SKIN)), pull=Pull(0.0, -0.3)), "mu = -0.3"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, -1.0, sense=-1)), "mu = -1.0"),
+        (
+            lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, 0.3, -1.0, sense=-1)),
+            "tau_max = -1.0",
+        ),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(np.nan, 0.3, sense=-1)), "depth = nan"),
+        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, 0.3, sense=2)), "sense = 2"),
+        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [LoadState(np.inf, 0.3)])), "depth = inf"),
+        (
+            lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [LoadState(0.1, 0.3, travel=np.nan)])),
+            "travel = nan",
+        ),
+        (lambda: loaded(FiniteNewton(FiniteBody.of(MESH, SKIN)), load=LoadState(0.0, -0.3)), "mu = -0.3"),
         (lambda: untouched(FiniteNewton(FiniteBody.of(MESH, SKIN)), -0.3, np.inf), "mu = -0.3"),
         (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
-        (lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), Pull(np.nan, 0.3, sense=1)), "depth = nan"),
-        (lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), Pull(0.1, 0.3)), "sense = 0"),
+        (
+            lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), LoadState(np.nan, 0.3, sense=1)),
+            "depth = nan",
+        ),
+        (lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), LoadState(0.1, 0.3)), "sense = 0"),
         (lambda: FrictionLaw(-0.3, np.inf), "mu = -0.3"),
         (lambda: FrictionLaw(np.nan, np.inf), "mu = nan"),
         (lambda: FrictionLaw(0.3, np.nan), "tau_max = nan"),
@@ -134,14 +143,14 @@ def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(whol
     top, middle = MESH.held, np.flatnonzero(MESH.nodes[:, 0] == 0.0)
     rolls = replace(MESH, held=top[:0], held_y=top, held_x=middle)
     mesh = as_handed_in(rolls, whole, lengths)
-    found = settled(Newton(LinearBody.of(mesh, TISSUE).condensed), Pull(np.float32(0.125), 0, sense=1))
+    found = settled(Newton(LinearBody.of(mesh, TISSUE).condensed), LoadState(np.float32(0.125), 0, sense=1))
     assert found.force[1] == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
-    force = settled(FiniteNewton(FiniteBody.of(mesh, SKIN)), Pull(0.1, 0, sense=1)).force
+    force = settled(FiniteNewton(FiniteBody.of(mesh, SKIN)), LoadState(0.1, 0, sense=1)).force
     assert force[1] == pytest.approx(2.0 * 0.012098, rel=1e-4)
 
 
 def test_pulls_and_forces_of_whole_numbers_reach_the_loops_as_the_floats_they_are_made_for():
-    assert [type(number) for number in Pull(1, 0, 2, np.int64(-1), np.float32(3.0)).checked()] == [
+    assert [type(number) for number in LoadState(1, 0, 2, np.int64(-1), np.float32(3.0)).checked()] == [
         *(float, float, float, int, float)
     ]
     assert Given(1, None, 2).checked() == (1.0, None, 2.0)

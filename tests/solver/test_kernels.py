@@ -14,7 +14,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -143,12 +143,12 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     start = EquilibriumState.undeformed(body)
     state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
     sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)
-    pull = Pull(0.05, 0.4, 0.01, 0)
+    load = LoadState(0.05, 0.4, 0.01, 0)
     anchor = newton.skin_x + 0.01
 
     def conditions(u):
         pressure = newton_pressure(body, u)
-        at = EquilibriumState(u, pressure, state, sense, start.reaction, pull, 0)
+        at = EquilibriumState(u, pressure, state, sense, start.reaction, load, 0)
         force = oracle.system(body, u, pressure)[0]
         place = at.place(body)
         length = oracle.tributary(place[:, 0])
@@ -157,22 +157,22 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
             x = body.size - 2 * len(body.skin) + 2 * i
             y = x + 1
             if state[i] != OPEN:
-                out[y] = place[i, 1] - pull.depth
+                out[y] = place[i, 1] - load.depth
             if state[i] == STICK:
                 out[x] = place[i, 0] - anchor[i]
             elif state[i] == SLIP:
-                out[x] = force[x] - sense[i] * pull.mu * force[y]
+                out[x] = force[x] - sense[i] * load.mu * force[y]
             elif state[i] == SHEAR_LIMITED:
-                out[x] = force[x] - sense[i] * pull.tau * length[i]
+                out[x] = force[x] - sense[i] * load.tau * length[i]
         return out, at
 
     # the centres must be in equilibrium, since the condensed force is that of a body whose centres are
     u = equilibrated(body, u)
     here, shape = conditions(u)
-    assert newton.linearise(shape, pull, anchor)
+    assert newton.linearise(shape, load, anchor)
     found = []
     for part in (1e-4, -1e-4):
-        moved, largest, _ = newton.moved(shape, pull, newton.steps[:, 0], anchor, part)
+        moved, largest, _ = newton.moved(shape, load, newton.steps[:, 0], anchor, part)
         assert largest == pytest.approx(np.abs(moved.u - u).max() / abs(part), rel=1e-6)
         found.append(conditions(equilibrated(body, moved.u))[0])
     ahead, behind = found

@@ -15,7 +15,7 @@ from solver.continuation.arc_length import follow
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, Pull
+from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, LoadState
 from solver.mesh import mesher
 from solver.mesh.grid import grid_mesh
 from tests.solver.finite_examples import published
@@ -42,7 +42,7 @@ def squeezed(depth, angle, tissues):
 )
 def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_found(depth, largest):
     found = reach.of_friction(
-        Scene(friction=Friction(0.0), loading=Loading(depth)), Pull(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
+        Scene(friction=Friction(0.0), loading=Loading(depth)), LoadState(depth, 0.0, np.inf, TOWARDS_TIP), 2.0
     )
     assert found.limited
     assert found.value == pytest.approx(largest, rel=0.03)
@@ -58,7 +58,7 @@ def test_friction_has_the_limit_that_several_meshes_and_orders_of_another_code_f
     ],
 )
 def test_depth_has_the_limit_that_another_code_found(mu, tau, largest):
-    found = reach.of_depth(Scene(friction=Friction(mu), loading=Loading(2.0)), Pull(2.0, mu, tau, TOWARDS_TIP))
+    found = reach.of_depth(Scene(friction=Friction(mu), loading=Loading(2.0)), LoadState(2.0, mu, tau, TOWARDS_TIP))
     assert found.limited
     assert found.value == pytest.approx(largest, rel=0.03)
 
@@ -69,26 +69,26 @@ def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_t
     depth, angle, tissues, monkeypatch
 ):
     scene = squeezed(depth, angle, tissues)
-    pull = Pull(depth, 0.85, np.inf, TOWARDS_TIP)
-    mu, deepest = reach.of_friction(scene, pull, 2.0), reach.of_depth(scene, pull)
+    load = LoadState(depth, 0.85, np.inf, TOWARDS_TIP)
+    mu, deepest = reach.of_friction(scene, load, 2.0), reach.of_depth(scene, load)
     monkeypatch.setattr(reach, "FINENESS", 2.0 * reach.FINENESS)
     monkeypatch.setattr(mesher, "FOLD", tuple(size / 2.0 for size in mesher.FOLD))
     finer = squeezed(depth + 1e-9, angle, tissues)  # what was answered is not asked again
-    pull = pull._replace(depth=depth + 1e-9)
-    assert mu.value == pytest.approx(reach.of_friction(finer, pull, 2.0).value, rel=0.015)
-    assert deepest.value == pytest.approx(reach.of_depth(finer, pull).value, rel=0.01)
+    load = load._replace(depth=depth + 1e-9)
+    assert mu.value == pytest.approx(reach.of_friction(finer, load, 2.0).value, rel=0.015)
+    assert deepest.value == pytest.approx(reach.of_depth(finer, load).value, rel=0.01)
 
 
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     finger = published(5)
-    pull = Pull(1.0, 0.5, 0.03, TOWARDS_TIP)
-    start = settled(finger.newton, pull._replace(mu=0.0))
-    branch = follow(finger, start, BY_FRICTION, pull.mu, 0.54)
-    again = follow(finger, branch.last, BY_FRICTION, pull.mu, 0.54)  # nothing is left to follow
+    load = LoadState(1.0, 0.5, 0.03, TOWARDS_TIP)
+    start = settled(finger.newton, load._replace(mu=0.0))
+    branch = follow(finger, start, BY_FRICTION, load.mu, 0.54)
+    again = follow(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
     assert again.states == (branch.last,)
     assert not again.limited
     assert not branch.limited
-    np.testing.assert_allclose(branch.last.u, settled(finger.newton, pull).u, atol=1e-6)
+    np.testing.assert_allclose(branch.last.u, settled(finger.newton, load).u, atol=1e-6)
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -110,12 +110,12 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
     laws = finite_laws(scene.materials)
     mesh = FiniteFinger.of(scene, mesher.Sizing(11.0, 2.0, margin=6.0)).geometry.mesh
     newton = FiniteNewton(FiniteBody.of(mesh, laws))
-    pull = Pull(2.0, 0.5, np.inf, TOWARDS_TIP)
+    load = LoadState(2.0, 0.5, np.inf, TOWARDS_TIP)
     with pytest.raises(NoSteadyState) as refused:
-        own_existence.steady(newton, pull, laws[mesher.EPIDERMIS])
+        own_existence.steady(newton, load, laws[mesher.EPIDERMIS])
     assert refused.value.limit_mu == pytest.approx(0.373, rel=0.03)
-    below = own_existence.steady(newton, pull._replace(mu=0.3), laws[mesher.EPIDERMIS])
-    np.testing.assert_allclose(below.u, settled(newton, pull._replace(mu=0.3)).u, atol=1e-6)
+    below = own_existence.steady(newton, load._replace(mu=0.3), laws[mesher.EPIDERMIS])
+    np.testing.assert_allclose(below.u, settled(newton, load._replace(mu=0.3)).u, atol=1e-6)
 
 
 @SLOW
@@ -129,23 +129,23 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
     mesh = grid_mesh(5.0 * np.stack([x, y], axis=-1), np.zeros(layers, np.int64), slice(0, len(angle)), core)
     newton = FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
     with pytest.raises(NotConverged, match="is not known"):
-        own_existence.steady(newton, Pull(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
+        own_existence.steady(newton, LoadState(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
 
 
 def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monkeypatch):
     scene = Scene(friction=Friction(0.6), loading=Loading(2.0, "-x"), solve=Solve("finite"))
-    pull = Pull(2.0, 0.6, np.inf, TOWARDS_TIP)
+    load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
     ends = reach.Reach(0.373, limited=True, lost=False, least=0.55, folds=0.54, numbers=np.ones(3))
 
     def by_depth(_scene, asked, _stop):
-        return replace(ends, value=1.5, limited=asked.mu == pull.mu)  # with a little less friction 2 mm are reached
+        return replace(ends, value=1.5, limited=asked.mu == load.mu)  # with a little less friction 2 mm are reached
 
     monkeypatch.setattr(existence, "_tried", lambda *_: iter(()))
     monkeypatch.setattr(reach, "of_friction", lambda *_: ends)
     monkeypatch.setattr(reach, "of_depth", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):
-        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), pull)
+        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     monkeypatch.setattr(reach, "of_depth", lambda *_: replace(ends, value=1.5))
     with pytest.raises(NoSteadyState) as refused:
-        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), pull)
+        existence.steady(FiniteFinger.of(scene, mesher.Sizing(5.0, 2.0)), load)
     assert (refused.value.limit_mu, refused.value.limit_indentation) == (0.373, 1.5)

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene
-from solver.equilibrium.finger import FingerModel
-from solver.equilibrium.newton import EquilibriumState, Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.response.live_picture import SmallPicture
 
 
 @pytest.fixture(scope="module")
 def finger():
-    return FingerModel.of(Scene(friction=Friction(0.5), loading=Loading(2.0)), Sizing(4.0, 2.0))
+    return LinearFinger.of(Scene(friction=Friction(0.5), loading=Loading(2.0)), Sizing(4.0, 2.0))
 
 
 @pytest.fixture(scope="module")
 def state(finger):
     rest = EquilibriumState.undeformed(finger.body.condensed)
-    return replace(rest, u=np.random.default_rng(1).normal(size=rest.u.shape) * 1e-3, pull=Pull(1.5, 0.5))
+    return replace(rest, u=np.random.default_rng(1).normal(size=rest.u.shape) * 1e-3, load=LoadState(1.5, 0.5))
 
 
 def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(finger, state):

@@ -7,7 +7,7 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.continuation.small_states import end
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.step_error import Steps
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
@@ -32,7 +32,7 @@ def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_s
 
 def finely(asked, fineness, shift):
     """Return the numbers of a scene at small strain in 8 times the usual steps."""
-    finger = FingerModel.of(asked, Sizing(fineness, 1.5, shift, margin=4.0))
+    finger = LinearFinger.of(asked, Sizing(fineness, 1.5, shift, margin=4.0))
     return finger.all_numbers([end(asked, finger, 8.0)])[0]
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from solver._kernels import SLIP, STICK
-from solver.accuracy.finite_audits import course_audits
+from solver.accuracy.audits import course_audits
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march, press_and_slide
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 
@@ -20,8 +20,8 @@ from tests.solver.oracle import finite as oracle
 def test_sliding_far_ends_in_the_state_that_is_solved_directly(depth, mu, tau, direction):
     newton, probes, _ = finger(5)
     *_, last = march(newton, press_and_slide(depth, mu, tau, direction, press=5, slides=15, distance=8.0))
-    direct = settled(newton, Pull(depth, mu, tau, -direction))
-    assert probes.average(newton.body, last.u)[0] == pytest.approx(probes.average(newton.body, direct.u)[0], rel=1e-10)
+    direct = settled(newton, LoadState(depth, mu, tau, -direction))
+    assert probes.average(last.u)[0] == pytest.approx(probes.average(direct.u)[0], rel=1e-10)
 
 
 @pytest.fixture(scope="module")
@@ -37,28 +37,28 @@ def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(
     body, before, work, lost = newton.body, fine[0], 0.0, 0.0
     for shape in fine[1:]:
         push = (shape.reaction + before.reaction) / 2.0
-        work += push[:, 1].sum() * (shape.pull.depth - before.pull.depth)
-        work += push[:, 0].sum() * (shape.pull.travel - before.pull.travel)
-        slid = np.diff([s.place(body)[:, 0] - s.pull.travel for s in (before, shape)], axis=0)[0]
-        assert (shape.reaction[:, 0] * slid).max() < 1e-12
-        lost -= float(push[:, 0] @ slid)
+        work += push[:, 1].sum() * (shape.load.depth - before.load.depth)
+        work += push[:, 0].sum() * (shape.load.travel - before.load.travel)
+        slip = np.diff([s.place(body)[:, 0] - s.load.travel for s in (before, shape)], axis=0)[0]
+        assert (shape.reaction[:, 0] * slip).max() < 1e-12
+        lost -= float(push[:, 0] @ slip)
         before = shape
     stored = [oracle.energy(body, shape.u) for shape in (fine[0], fine[-1])]
     assert lost > 0.1 * work
     assert work == pytest.approx(stored[1] - stored[0] + lost, rel=3e-3)
-    assert course_audits(newton, fine)["course_least_dissipation"] > -1e-14
+    assert course_audits(newton, from_rest(newton, fine))["course_least_dissipation"] > -1e-14
 
 
 def test_shorter_steps_leave_less_of_the_bones_work_over_and_simpsons_rule_next_to_nothing(marched):
     newton, ways = marched
-    coarse, fine = (course_audits(newton, way) for way in ways)
+    coarse, fine = (course_audits(newton, from_rest(newton, way)) for way in ways)
     assert fine["course_step_work"] < coarse["course_step_work"] / 2.0 < 0.005
     assert fine["course_work_balance"] < coarse["course_work_balance"] / 8.0 < 1e-4
 
 
 def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_stored(marched):
     newton, (_, fine) = marched
-    wrong = course_audits(newton, [replace(shape, reaction=1.01 * shape.reaction) for shape in fine])
+    wrong = course_audits(newton, from_rest(newton, [replace(shape, reaction=1.01 * shape.reaction) for shape in fine]))
     assert wrong["course_step_work"] > 0.005
     assert wrong["course_work_balance"] > 0.002
 
@@ -66,12 +66,16 @@ def test_forces_told_one_percent_too_large_are_out_of_balance_with_what_is_store
 def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
     newton, probes, _ = finger(5)
     there = press_and_slide(1.5, 0.44, 0.03009, -1, press=6, slides=20, distance=6.0)
-    back = [pull._replace(travel=6.0 - 0.5 * i) for i, pull in enumerate([there[-1]] * 22, start=1)]
+    back = [load._replace(travel=6.0 - 0.5 * i) for i, load in enumerate([there[-1]] * 22, start=1)]
     shapes = list(march(newton, there + back))
     early, settled_one, last = shapes[5], shapes[25], shapes[-1]
     assert (early.state == STICK).any()
     assert (settled_one.state[settled_one.touching] >= SLIP).all()
     assert (settled_one.sense[settled_one.touching] == 1).all()
     assert (last.sense[last.touching] == -1).all()
-    opposite = settled(newton, Pull(1.5, 0.44, 0.03009, -1))
-    assert probes.average(newton.body, last.u)[0] == pytest.approx(probes.average(newton.body, opposite.u)[0], rel=1e-9)
+    opposite = settled(newton, LoadState(1.5, 0.44, 0.03009, -1))
+    assert probes.average(last.u)[0] == pytest.approx(probes.average(opposite.u)[0], rel=1e-9)
+
+
+def from_rest(newton, states):
+    return [EquilibriumState.undeformed(newton.condensed), *states]

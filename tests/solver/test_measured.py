@@ -82,8 +82,8 @@ def test_evidence_of_another_kind_is_refused():
 
 def still_held(settled, marched):
     """Return what a whole course has at the ending above the settled SED, when a settled answer says that it looks."""
-    course, slid = marched.history, entry(settled, "viscosity")["from"]["slide_s"]
-    return np.interp(1.0 + slid, course.time, course.sed_ending) / settled.sed_ending - 1.0
+    course, slip = marched.history, entry(settled, "viscosity")["from"]["slide_s"]
+    return np.interp(1.0 + slip, course.time, course.sed_ending) / settled.sed_ending - 1.0
 
 
 def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one_marched_holds_nothing():

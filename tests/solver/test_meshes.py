@@ -73,9 +73,9 @@ def test_an_even_stress_on_distorted_quadrilaterals_leaves_no_force_on_nodes_ins
             jacobian = np.einsum("ia,qib->qab", nodes, gradients)
             true = gradients @ np.linalg.inv(jacobian)
             force = np.einsum("q,q,qia->ia", element.weights, np.linalg.det(jacobian), true)
-            for place, pull, (a, b) in zip(nodes.round(9).tolist(), force, element.positions, strict=True):
+            for place, load, (a, b) in zip(nodes.round(9).tolist(), force, element.positions, strict=True):
                 if 0 < i + (a + 1) / 2 < 2 and 0 < j + (b + 1) / 2 < 2:
-                    left[tuple(place)] = left.get(tuple(place), np.zeros(2)) + pull
+                    left[tuple(place)] = left.get(tuple(place), np.zeros(2)) + load
     np.testing.assert_allclose(list(left.values()), 0.0, atol=1e-13)
 
 

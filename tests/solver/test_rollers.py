@@ -12,7 +12,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.dead_loads import loaded
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Newton, Pull
+from solver.equilibrium.newton import FiniteNewton, LoadState, Newton
 from solver.mesh import Mesh
 from solver.mesh.blocks import block as round_block
 from solver.verification.published.bodies import ring
@@ -20,7 +20,7 @@ from solver.verification.published.locking import INNER, OUTER, YOUNG, widening
 from tests.solver.finite_examples import block
 
 NO_SKIN = np.zeros((0, 2))
-CLEAR = Pull(-1e3, 0.0)
+CLEAR = LoadState(-1e3, 0.0)
 
 
 def at(mesh, axis, value):
@@ -70,7 +70,7 @@ def test_one_component_prescribed_leaves_the_other_free_at_finite_strain():
     mesh = replace(mesh, skin=skin, held_y=np.union1d(mesh.held_y, at(mesh, 1, 1.0)))
     moved = np.zeros(mesh.nodes.shape)
     moved[at(mesh, 1, 1.0), 1] = -0.2
-    found = loaded(FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])), prescribed=moved, pull=CLEAR)
+    found = loaded(FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)])), prescribed=moved, load=CLEAR)
     np.testing.assert_allclose(found.u, mesh.nodes * [0.224285, -0.2], atol=1e-6)
     across = found.u[right, 0]
     assert np.ptp(across) < 1e-9
@@ -89,7 +89,7 @@ def test_half_a_body_at_its_plane_of_symmetry_is_the_whole_to_round_off_at_small
 
     def pressed(mesh):
         body = LinearBody.of(mesh, [Hooke(0.08, 0.48)])
-        *_, state = march(Newton(body.condensed), [Pull(depth, mu) for depth in (0.05, 0.1, 0.15)])
+        *_, state = march(Newton(body.condensed), [LoadState(depth, mu) for depth in (0.05, 0.1, 0.15)])
         return state.force[1], body.displacement(state.u)
 
     (force, both), (part_of_it, one) = pressed(whole), pressed(half)
@@ -103,7 +103,7 @@ def test_half_a_body_at_its_plane_of_symmetry_is_the_whole_to_round_off_at_finit
 
     def pressed(mesh):
         newton = FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
-        *_, shape = march(newton, [Pull(depth, mu) for depth in (0.1, 0.2, 0.3)], None, 1e-13)
+        *_, shape = march(newton, [LoadState(depth, mu) for depth in (0.1, 0.2, 0.3)], None, 1e-13)
         return shape.force[1], shape.u
 
     (force, both), (part_of_it, one) = pressed(whole), pressed(half)
@@ -140,7 +140,7 @@ def test_a_quarter_of_a_thick_cylinder_on_rollers_widens_as_the_closed_form_says
 def test_a_quarter_of_a_thick_cylinder_widens_so_at_finite_strain_under_a_small_pressure():
     mesh, hole = quarter()
     loads = 1e-4 * edge_load(mesh, hole, mesh.nodes[hole] / INNER)
-    found = loaded(FiniteNewton(FiniteBody.of(mesh, [NeoHooke(YOUNG, 0.49)])), loads, pull=CLEAR, steps=1)
+    found = loaded(FiniteNewton(FiniteBody.of(mesh, [NeoHooke(YOUNG, 0.49)])), loads, load=CLEAR, steps=1)
     widened = np.sum(found.u[hole] * mesh.nodes[hole], axis=1)[::2] / INNER
     np.testing.assert_allclose(widened, 1e-4 * widening(0.49), rtol=2e-4)
 

@@ -25,10 +25,9 @@ from solver import (
 )
 from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
-from solver.contact.law import FrictionLaw
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import Pull
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.newton import LoadState
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
@@ -115,17 +114,16 @@ def test_the_estimate_lies_above_the_error_and_below_one_per_cent(ten):
 
 def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     asked = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
-    finger = FingerModel.of(asked, Sizing(5, 1.0, margin=3.0))
-    law = FrictionLaw(0.44, 0.02)
-    contact = settled(finger.newton, Pull(1.0, 0.44, 0.02, 1))
+    finger = LinearFinger.of(asked, Sizing(5, 1.0, margin=3.0))
+    contact = settled(finger.newton, LoadState(1.0, 0.44, 0.02, 1))
     displacement = finger.displacement(contact)
     reaction, middle = contact.reaction.copy(), int(np.argmax(contact.normal))
     normal = reaction[:, 1]
     moved = 0.2 * normal[middle]
     normal[middle] -= moved
     normal[middle + 1] += moved
-    told = audits(finger, law, contact, 1.0, displacement)
-    planted = audits(finger, law, replace(contact, reaction=reaction), 1.0, displacement)
+    told = audits(finger, contact, displacement)
+    planted = audits(finger, replace(contact, reaction=reaction), displacement)
     assert max(told["inner_forces"], planted["equilibrium_y"]) < 1e-10
     assert planted["inner_forces"] == pytest.approx(moved / normal.sum(), rel=1e-6)
 
@@ -159,8 +157,8 @@ def test_the_course_presses_within_a_second_then_slides_at_the_scene_s_speed(mar
         pressed = course.time <= 1.0
         assert np.allclose(course.bone_y[pressed], -loading.indentation * course.time[pressed])
         assert not course.bone_x[pressed].any()
-        slid = loading.direction * loading.speed * (course.time[~pressed] - 1.0)
-        assert np.allclose(course.bone_x[~pressed], slid)
+        slip = loading.direction * loading.speed * (course.time[~pressed] - 1.0)
+        assert np.allclose(course.bone_x[~pressed], slip)
         assert course.sed_ending[0] == 0.0
         assert np.all(np.diff(course.time) > 0)
         assert course.slipping[-1] == 1.0

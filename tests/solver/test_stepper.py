@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve, stepper
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.force_control import march as forced_march
 from solver.equilibrium.force_control import untouched as at_rest
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.march import march, press_and_slide
 from solver.equilibrium.newton import Given
 from solver.mesh.mesher import Sizing
@@ -26,7 +26,7 @@ KINEMATICS = ("small", "finite")
 @cache
 def meshed(kinematics, fineness):
     scene = Scene(friction=Friction(0.3), loading=Loading(2.0), solve=Solve(kinematics=kinematics))
-    made = FingerModel if kinematics == "small" else FiniteFinger
+    made = LinearFinger if kinematics == "small" else FiniteFinger
     return made.of(scene, Sizing(fineness, 2.0, margin=4.0))
 
 
@@ -45,7 +45,7 @@ def readings(kinematics, depth, mu, direction):
         fine = meshed("finite", 8)
         course = press_and_slide(depth, mu, np.inf, direction, press=200, slides=60, distance=6.0)
         for shape in march(fine.newton, course, tolerance=1e-6):
-            yield shape.force[1], shape.force[0], fine.sed_ending(shape)
+            yield shape.force[1], shape.force[0], fine.sed_ending(shape.u)
         return
     fine = meshed("small", 12)
     course = press_and_slide(depth, mu, np.inf, direction, press=200, slides=60, distance=6.0)
@@ -172,7 +172,7 @@ def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
     course += [Given(0.1, -0.0399 * p) for p in np.linspace(0.05, 1.0, 30)]
     course += [Given(0.1 * p, -0.0399 * p) for p in lift.tolist()]
     balanced = forced_march(finger.newton, at_rest(finger.newton, mu, np.inf), Given(0.0, 0.0), course)
-    truth = np.array([finger.sed_ending(shape) for shape in balanced])
+    truth = np.array([finger.sed_ending(shape.u) for shape in balanced])
     told = np.array([follows.step(given.normal, given.tangential) for given in course])
     assert np.abs(told - truth).max() < 0.02 * truth.max()
 
@@ -193,7 +193,7 @@ def test_the_condensed_finger_gives_the_energies_and_the_outline_of_the_meshed_o
         sed = follows.step(0.004 * n, -0.001 * n)
     displacement = finger.displacement(follows.state)
     assert sed == pytest.approx(finger.sed_ending(displacement), rel=1e-10)
-    np.testing.assert_allclose(follows.row(), finger.sed_row(displacement), rtol=1e-8)
+    np.testing.assert_allclose(follows.row(), finger.row.average(displacement), rtol=1e-8)
     whole = finger.geometry.whole
     lowered = finger.geometry.mesh.nodes[whole] + displacement[whole] - [0.0, follows.depth]
     np.testing.assert_allclose(follows.outline(), lowered, atol=1e-12)

@@ -8,7 +8,7 @@ import pytest
 from solver._kernels import STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.newton import EquilibriumState, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh.grid import grid_mesh
 
 RADIUS, YOUNG, NU, MU = 5.0, 0.08, 0.4999, 0.3  # nearly incompressible: normal and shear do not couple
@@ -60,7 +60,7 @@ def test_dead_loads_below_the_friction_limit_leave_the_stick_zone_of_cattaneo_an
     mesh, loads = round_foot(part, held=held)
     free = () if held else ("x", "y", "turn")
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-5, 0.3)], loads, free=free).condensed
-    now = Newton(body).settle(EquilibriumState.undeformed(body), Pull(0.0, MU))
+    now = Newton(body).settle(EquilibriumState.undeformed(body), LoadState(0.0, MU))
     load, drag = now.normal.sum(), -now.tangential.sum()
     assert load == pytest.approx(LOAD, rel=0.01 if held else 1e-9)
     assert drag == pytest.approx(part * MU * LOAD, rel=0.01 if held else 1e-9)
@@ -76,8 +76,8 @@ def test_skin_that_dead_loads_leave_clear_of_the_surface_sticks_where_they_have_
     mesh, loads = round_foot(0.5, held=True)
     body = LinearBody.of(mesh, [Hooke(YOUNG, NU), Hooke(1e-4, 0.3)], loads).condensed
     high = -2.0  # mm: the loads lower the foot by a third of one
-    before = replace(EquilibriumState.undeformed(body), u=body.untouched(), pull=Pull(high, MU))
+    before = replace(EquilibriumState.undeformed(body), u=body.untouched(), load=LoadState(high, MU))
     assert (before.place(body)[:, 1] - high).min() > 0.0
-    pressed = Newton(body).settle(before, Pull(0.0, MU))
+    pressed = Newton(body).settle(before, LoadState(0.0, MU))
     assert pressed.normal.sum() > 0.9 * LOAD
     assert abs(pressed.tangential.sum()) < 0.05 * MU * LOAD  # the pad carries the drag

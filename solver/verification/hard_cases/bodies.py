@@ -9,11 +9,11 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.finger import FingerModel
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState, Newton
 from solver.mesh import Mesh
 from solver.mesh.blocks import block
 from solver.mesh.mesher import Sizing
@@ -25,7 +25,7 @@ from solver.verification.published.bodies import distorted
 
 DEPTH = 1.5  # [mm]
 TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
-Finger = FingerModel | FiniteFinger
+Finger = LinearFinger | FiniteFinger
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Bodies:
     fineness: float
     sense: int  # of the surface, where it first goes
     back_and_forth: tuple[float, int, int, float]  # bound [MPa], steps of the press and of a leg, and their length [mm]
-    path: Callable[[int], list[Pull]]  # that begins in steps of this part of the way
+    path: Callable[[int], list[LoadState]]  # that begins in steps of this part of the way
     path_words: str
     meshes: int  # that are distorted
     agreement: float  # of states that are one, relative
@@ -54,30 +54,32 @@ def _finite(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
 
 
 def _sed(finger: Finger, state: EquilibriumState) -> float:
-    if isinstance(finger, FingerModel):
-        return finger.sed_ending(finger.displacement(state))
-    return finger.sed_ending(state)
+    return finger.sed_ending(finger.displacement(state))
 
 
-def _whole_path(count: int) -> list[Pull]:
+def _whole_path(count: int) -> list[LoadState]:
     """Return a press of `count` even steps, and a slide of as many, ten at least."""
-    press = [Pull(depth, 0.3, 0.01) for depth in np.linspace(0.0, DEPTH, count + 1)[1:].tolist()]
-    slide = [Pull(DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()]
+    press = [LoadState(depth, 0.3, 0.01) for depth in np.linspace(0.0, DEPTH, count + 1)[1:].tolist()]
+    slide = [
+        LoadState(DEPTH, 0.3, 0.01, travel=-far) for far in np.linspace(0.0, 10.0, max(count, 10) + 1)[1:].tolist()
+    ]
     return press + slide
 
 
-def _beginning(count: int) -> list[Pull]:
+def _beginning(count: int) -> list[LoadState]:
     """Return a press and a slide that begin in up to twenty steps of 1/`count` of the way and go on in long ones."""
     down = [DEPTH * (i + 1) / count for i in range(min(count, 20))]
     along = [8.0 * (i + 1) / count for i in range(min(count, 20))]
     down += [DEPTH * part for part in (0.25, 0.5, 0.75, 1.0) if DEPTH * part > down[-1]]
     along += [8.0 * part for part in np.linspace(0.05, 1.0, 20).tolist() if 8.0 * part > along[-1]]
-    return [Pull(depth, 0.3, 0.01) for depth in down] + [Pull(DEPTH, 0.3, 0.01, travel=travel) for travel in along]
+    return [LoadState(depth, 0.3, 0.01) for depth in down] + [
+        LoadState(DEPTH, 0.3, 0.01, travel=travel) for travel in along
+    ]
 
 
 BODIES: dict[Kinematics, Bodies] = {
     "small": Bodies(
-        _linear, lambda fineness: FingerModel.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0)),
+        _linear, lambda fineness: LinearFinger.of(scene(STICKINESS[0]), Sizing(fineness, DEPTH, margin=4.0)),
         8.0, -1, (0.005, 25, 200, 0.05), _whole_path, "1 to 10,000 steps", 5, 1e-10, 1e-9, 1e-12,
     ),
     "finite": Bodies(
@@ -87,25 +89,25 @@ BODIES: dict[Kinematics, Bodies] = {
 }  # fmt: skip
 
 
-def _last(newton: Newton, path: Iterable[Pull]) -> EquilibriumState:
+def _last(newton: Newton, path: Iterable[LoadState]) -> EquilibriumState:
     *_, last = march(newton, path)
     return last
 
 
 def _force(newton: Newton, depth: float, sense: int = -1) -> float:
-    return float(settled(newton, Pull(depth, 0.3, sense=sense)).force[1])
+    return float(settled(newton, LoadState(depth, 0.3, sense=sense)).force[1])
 
 
 def reversal(bodies: Bodies) -> Outcome:
     """Slide forth, back and forth again: full slip must return, and full slip the other way be met."""
     tau, press, leg, step = bodies.back_and_forth
-    finger, pull = bodies.finger(bodies.fineness), Pull(DEPTH, 0.44, tau)
+    finger, load = bodies.finger(bodies.fineness), LoadState(DEPTH, 0.44, tau)
     senses = [bodies.sense, -bodies.sense, bodies.sense]
-    down = [pull._replace(depth=DEPTH * (i + 1) / press) for i in range(press)]
+    down = [load._replace(depth=DEPTH * (i + 1) / press) for i in range(press)]
     travels = np.cumsum(np.repeat(step * np.array(senses), leg)).tolist()
-    states = list(march(finger.newton, down + [pull._replace(travel=travel) for travel in travels]))
+    states = list(march(finger.newton, down + [load._replace(travel=travel) for travel in travels]))
     seds = [_sed(finger, state) for state in states[press + leg - 1 :: leg]]
-    direct = [_sed(finger, settled(finger.newton, pull._replace(sense=sense))) for sense in senses[:2]]
+    direct = [_sed(finger, settled(finger.newton, load._replace(sense=sense))) for sense in senses[:2]]
     spread = max(abs(seds[0] / seds[2] - 1), abs(seds[0] / direct[0] - 1), abs(seds[1] / direct[1] - 1))
     flaw = "" if spread < bodies.agreement else f"differs from the direct states by {spread:.1g}"
     summary = f"SED {seds[0]:.4g} forth, {seds[1]:.4g} back; equal to the direct states to {power(spread)}"
@@ -124,7 +126,7 @@ def edge_at_node(bodies: Bodies) -> Outcome:
     finger = bodies.finger(bodies.fineness)
 
     def at(depth: float) -> EquilibriumState:
-        return settled(finger.newton, Pull(float(depth), 0.3, sense=bodies.sense))
+        return settled(finger.newton, LoadState(float(depth), 0.3, sense=bodies.sense))
 
     low, high = 1.4, 1.5
     fewest = int(at(low).touching.sum())
@@ -152,7 +154,7 @@ def distorted_finger(bodies: Bodies) -> Outcome:
 def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
     """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
     whole, alone = two_parts()
-    found = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), Pull(0.3, 0.3, sense=-1))
+    found = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
     force, rigid = float(found.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
     drag, off = -float(found.force[0]) / force, abs(force / rigid - 1)
     good = off < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
@@ -164,7 +166,7 @@ def one_node(bodies: Bodies) -> Outcome:
     """Press so lightly that one node touches: its force is its depth by its compliance at small strain."""
     mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
     depth, mu = 1e-5, 0.3
-    found = settled(bodies.newton(mesh, layers), Pull(depth, mu, sense=-1))
+    found = settled(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
     compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
     up = 2 * (len(mesh.skin) // 2) + 1  # the unknown of the node in the middle
     force, exact = float(found.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])

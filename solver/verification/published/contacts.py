@@ -15,7 +15,7 @@ from solver.constitutive.linear import Hooke
 from solver.contact.law import OPEN, STICK, FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
-from solver.equilibrium.newton import EquilibriumState, Given, Newton, Pull
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.verification.published.bodies import (
     chain,
     disc,
@@ -29,7 +29,7 @@ from solver.verification.published.zones import half_above, half_width
 
 ELEMENT = 1 / 30  # of the half-width
 RADIUS = 1000.0  # in half-widths: the theory's limit of light loads
-NONE = Pull(0.0, 0.0, sense=-1)
+NONE = LoadState(0.0, 0.0, sense=-1)
 
 
 def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0) -> LinearBody:
@@ -127,13 +127,13 @@ class Light:
     def sheared(self, law: FrictionLaw, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
         stuck = np.where(self.found.touching, STICK, OPEN).astype(np.int32)
-        before = replace(self.found, state=stuck, pull=Pull(self.found.pull.depth, law.mu, law.tau_max))
+        before = replace(self.found, state=stuck, load=LoadState(self.found.load.depth, law.mu, law.tau_max))
         return balanced(self.newton, before, Given(self.load, -part * law.mu * self.load))
 
-    def slid(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
+    def slip(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
         """Return the state of full slip; the body moves along `direction` x."""
-        pull = Pull(0.0, law.mu, law.tau_max, -direction)
-        return slide_beside(self.newton, pull, self.found.state, self.load)
+        load = LoadState(0.0, law.mu, law.tau_max, -direction)
+        return slide_beside(self.newton, load, self.found.state, self.load)
 
 
 @cache

@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Pull
+from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
 from solver.verification.published.bodies import graded, mirrored, mound
 from solver.verification.published.zones import half_above, half_width
 
@@ -68,8 +68,8 @@ class LightFinite:
 
     def capped(self, mu: float, k: float) -> tuple[float, float]:
         """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
-        pull = self.pressed.pull._replace(mu=mu, tau=k * mu * self.peak, sense=1)
-        state = settled(self.newton, pull)
+        load = self.pressed.load._replace(mu=mu, tau=k * mu * self.peak, sense=1)
+        state = settled(self.newton, load)
         drag = float(state.force[0]) / (mu * float(state.force[1]))
         width = half_above(self.x, state.reaction[:, 1] / self.length - k * self.peak)
         return drag, width / self.half_width
@@ -79,12 +79,12 @@ class LightFinite:
 
         What friction could carry and does not, mu p - q, falls to nothing at the ends of the stick.
         """
-        pull = self.pressed.pull._replace(mu=mu, sense=0)
-        (state,) = march(self.newton, [pull])
+        load = self.pressed.load._replace(mu=mu, sense=0)
+        (state,) = march(self.newton, [load])
         travel = 0.0
         while float(state.force[0]) < part * mu * float(state.force[1]):
             travel += STEP
-            (state,) = march(self.newton, [pull._replace(travel=travel)], state)
+            (state,) = march(self.newton, [load._replace(travel=travel)], state)
         spare, middle = mu * state.reaction[:, 1] - state.reaction[:, 0], len(self.x) // 2
         sticks = half_width(self.x, spare, state.state == STICK)
         traction = float(state.reaction[middle, 0] / self.length[middle]) / (mu * self.peak)
@@ -98,5 +98,5 @@ def light_finite() -> LightFinite:
     x = mirrored(graded(ELEMENT, 0.3, 1.2, WIDE))
     y = graded(ELEMENT, 0.3, 0.0, WIDE)
     newton = FiniteNewton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]))
-    pressed = settled(newton, Pull(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
+    pressed = settled(newton, LoadState(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
     return LightFinite(newton, pressed, float(pressed.force[1]))

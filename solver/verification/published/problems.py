@@ -135,7 +135,7 @@ def below() -> Iterator[Problem]:
         begun = clock()
         light = contacts.light(wide=300.0)
         rows = np.array(table)
-        got = light.stress(light.slid(FrictionLaw(mu, math.inf), -1), rows[:, :2])
+        got = light.stress(light.slip(FrictionLaw(mu, math.inf), -1), rows[:, :2])
         parts = np.stack([got[:, 0, 0], got[:, 1, 1], got[:, 0, 1]], axis=1)
         worst = float(np.abs(parts - rows[:, 2:]).max())
         yield Problem(
@@ -164,7 +164,7 @@ def capped() -> Iterator[Problem]:
     for k, force in CAPPED:
         begun = clock()
         law = FrictionLaw(mu, k * mu * light.peak)
-        found = light.slid(law)
+        found = light.slip(law)
         drag, width = -float(found.tangential.sum()) / (mu * light.load), contacts.capped_width(light, found, law)
         yield from _bounded(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, begun)
 

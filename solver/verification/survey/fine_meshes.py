@@ -9,7 +9,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.continuation.small_states import settled
 from solver.continuation.wedging import WIDE
-from solver.equilibrium.finger import FingerModel
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -30,7 +30,7 @@ def numbers_on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool) -> Ar
         return mesh.numbers_together([mesh.solve(scene) for scene in scenes])
     depth = scenes[0].loading.depth
     for margin in (1.0, 4.0, WIDE):
-        finger = FingerModel.of(scenes[0], Sizing(fineness, depth, shift, margin))
+        finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, margin))
         states = [settled(scene, finger) for scene in scenes]
         if not any(finger.reaches_out(state, finger.displacement(state), depth) for state in states):
             break

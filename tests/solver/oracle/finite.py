@@ -182,7 +182,7 @@ def restated(
     sense: Indices,
     reaction: Array,
     above: Array,
-    slid: Array,
+    slip: Array,
     length: Array,
     law: FrictionLaw,
     direction: int,
@@ -202,7 +202,7 @@ def restated(
         over = np.abs(drag) > most + slack
         turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
         now = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), now)
-        now = np.where(slips & (slid * sense > small) & (most > 0.0), STICK, now)
+        now = np.where(slips & (slip * sense > small) & (most > 0.0), STICK, now)
         entering = SLIP if law.frictionless else STICK
     else:
         turned = np.where(was_open | (push < -slack), sense, direction)

@@ -1,0 +1,118 @@
+"""From a state of a finger to its prediction: numbers with errors, skin, history, and what was left out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver import _kernels as kernels
+from solver.accuracy.audits import rounding
+from solver.accuracy.error_estimate import errors, responses, row_errors
+from solver.accuracy.omitted_effects import model, warnings
+from solver.arrays import Array
+from solver.body.receptor import Patches
+from solver.contact.law import NAMES
+from solver.equilibrium.finger import Finger
+from solver.equilibrium.load_path import Instant
+from solver.equilibrium.newton import EquilibriumState
+from solver.equilibrium.step_error import Steps
+from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
+from solver.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """The state of a scene on one mesh."""
+
+    scene: Scene
+    state: EquilibriumState
+    displacement: Array  # (nodes, 2) [mm]
+    audits: dict[str, float]
+    steps: Steps | None  # of a course, where the state depends on its way
+    history: History | None
+    warnings: tuple[str, ...]  # of this kinematics alone
+    wall_s: float
+    setup_s: float
+
+
+def prediction(
+    solved: Solved, finger: Finger[Patches], numbers: Array, row: Array, nested: NestedNumbers | None, estimate_s: float
+) -> Prediction:
+    """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
+    scene, state = solved.scene, solved.state
+    sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
+    driven = scene.driven(depth)
+    left = model(driven, finger, state, solved.displacement, width)
+    held = holds(scene, state)
+    numbers[4] = shift if held else 0.0
+    off = errors(scene, numbers, nested, solved.steps)
+    return Prediction(
+        scene=scene,
+        sed_ending=sed,
+        sed_point=point,
+        normal_force=normal,
+        tangential_force=drag(scene, tangential),
+        contact_width=width,
+        indentation=depth,
+        shift=shift if held else None,
+        error_estimate=off.sed,
+        normal_force_error=off.normal,
+        tangential_force_error=off.tangential,
+        indentation_error=off.indentation,
+        shift_error=off.shift if held else None,
+        contact_width_error=off.width,
+        nested=nested,
+        sed_point_error=off.point,
+        dofs=finger.dofs,
+        newton_iterations=state.iterations,
+        wall_s=solved.wall_s,
+        setup_s=solved.setup_s,
+        estimate_s=estimate_s,
+        row=Row(ROW, row, row_errors(row, nested)),
+        responses=responses(numbers, off),
+        model=left,
+        audits=solved.audits,
+        skin=skin_of(finger, state),
+        geometry=finger.geometry,
+        displacement=solved.displacement,
+        history=solved.history,
+        warnings=(*warnings(driven, left["left_out"]), *solved.warnings, *rounding(solved.audits)),
+    )
+
+
+def holds(scene: Scene, state: EquilibriumState) -> bool:
+    """Return whether a given drag holds the bone at a shift; a finger that slides may have shifted by anything."""
+    return scene.loading.dragged and state.load.sense == 0 and not state.load.frictionless
+
+
+def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
+    """Return the skin that may touch in a state of contact."""
+    condensed, touching = finger.newton.condensed, state.touching
+    place, length = state.place(condensed), np.empty(len(state.state))
+    kernels.tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
+    length = np.where(touching, length + condensed.fixed_length, 1.0)
+    return Skin(
+        x=place[:, 0],
+        gap=np.where(touching, 0.0, place[:, 1] - state.load.depth),
+        pressure=state.normal / length,
+        traction=state.tangential / length,
+        state=tuple(NAMES[int(s)] for s in state.state),
+    )
+
+
+def history(scene: Scene, finger: Finger[Patches], way: Sequence[Instant], over_time: Array | None) -> History:
+    """Return a course as arrays; `over_time` (m, 2) is its SED of ending and point where tissues relax [MPa]."""
+    states = [instant.state for instant in way]
+    sed = finger.seds(states) if over_time is None else over_time
+    return History(
+        time=np.array([i.time for i in way]),
+        bone_x=np.array([i.travel for i in way]),
+        bone_y=np.array([-i.depth for i in way]),
+        sed_ending=sed[:, 0],
+        sed_point=sed[:, 1],
+        normal_force=np.array([s.normal.sum() for s in states]),
+        tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
+        contact_width=np.array([finger.contact_width(s) for s in states]),
+        slipping=np.array([1.0 - s.sticking if s.touching.any() else 0.0 for s in states]),
+        responses=finger.responses(states) if over_time is None else sed_alone(sed[:, 0]),
+    )
