@@ -21,6 +21,7 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, FiniteNewton, Newton, load_state
 from solver.quantities import NAMES, SED
 from solver.scene import Scene
+from solver.scene.tables import TISSUES
 
 MU, TAU_MAX, DEPTH = range(3)
 
@@ -99,6 +100,22 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     out[:, DEPTH] = newton.steps[:, BY_DEPTH]
     out[free] = np.linalg.solve(system.matrix[: count * count].reshape(count, count), by)
     return out
+
+
+def by_stiffness(finger: FingerModel, state: EquilibriumState) -> Array:
+    """Return how the normal force of a frictionless press follows each tissue's stiffness (r,): d log N / d log E.
+
+    Regions stand in the order of the mesh; a rigid bone has 0. With u the displacements, w their derivative by the
+    depth and K the stiffness of one tissue, dN / d log E is w K u: without friction the contact's forces do no work on
+    w but by the depth. The sum is 1, since N is linear in all stiffnesses together. Raises ValueError with friction.
+    """
+    if state.pull.mu != 0.0:
+        raise ValueError("with friction the normal force is no derivative of an energy")
+    mesh = finger.geometry.mesh
+    by_depth = finger.body.displacement(of_skin(finger.newton, state)[:, DEPTH].reshape(-1, 2))
+    moved, slope = (field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth))
+    work = np.einsum("ei,eij,ej->e", slope, finger.body.elastic.stiffness, moved)
+    return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
 
 
 def _of_responses(finger: FingerModel, state: EquilibriumState, skin: Array) -> Array:

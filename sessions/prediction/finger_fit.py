@@ -1,0 +1,325 @@
+"""The stiffness of a subject's own finger from presses, whose force and depth were recorded: a posterior.
+
+Each layer's log stiffness has a normal prior about the published one; noise of the force is Gaussian of unknown size
+(Jeffreys' prior). Where the stage touches the skin is not known either, for each press. Given the two contrasts
+between the layers, the rest is almost linear and integrated in closed form (Laplace; Student's t for unknown noise:
+Gelman et al. 2013, Bayesian Data Analysis, sections 3.2 and 14.2). What is left has two dimensions, and a grid does it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+from scipy.special import ndtri
+
+from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, forces_of
+from solver import Scene
+
+Array = NDArray[np.float64]
+
+SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 % within a factor of 3.9 either way
+CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
+DRAWS = 20_000  # of the posterior: quantiles at 2.5 % are then known to a hundredth of a deviation or two
+FEWEST = 6  # points of depth and force beyond the numbers that are looked for
+GRID = 41  # contrasts along each axis
+FINE = 200.0  # nodes of the grid that carry the posterior (inverse Simpson index); with fewer the grid is drawn closer
+CLOSER = 4  # grids at most
+RIM = 0.95  # of the model's reach: an end of a profile that lies there is bounded by the model, not by the data
+QUANTILES = (0.025, 0.975)
+TOLD = 0.8  # of the prior's width: a narrower interval says that the data told something of a layer
+AGREE = 0.02  # the solver's own forces at the answer may differ so much from the model that was fitted [-]
+
+
+class Loaded(NamedTuple):
+    """One press as it is loaded: n points."""
+
+    displacement: Array  # (n,) of the stage or bone, positive into the finger [mm]
+    force: Array  # (n,) normal [N]
+    touch: float  # displacement at which the force leaves its zero [mm]
+
+
+class Interval(NamedTuple):
+    """A number with the ends of its 95 % interval; None where the data do not bound it within the model's range."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LayerFit:
+    """What is known of one layer's stiffness [MPa]."""
+
+    name: str
+    stiffness: Interval  # at the maximum of the posterior, with its 95 % credible interval
+    profile: Interval  # at the maximum of the likelihood, with the 95 % interval of its profile
+    prior: Interval
+    ratio: float  # of the credible interval to the prior's, of log stiffness [-]
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerFit:
+    """The posterior of a finger's stiffnesses."""
+
+    scene: Scene  # with the finger at the maximum of the posterior
+    layers: tuple[LayerFit, ...]
+    overall: Interval  # force over that of the published stiffnesses, mean of the logs over the depths pressed [-]
+    touch: tuple[float, ...]  # displacement at which each press touches [mm]
+    noise: float  # standard deviation of the points' forces [N]
+    points: int
+    deepest: float  # [mm]
+    checked: float  # the solver's forces at the answer differ from the fitted model's by, at most [-]
+    shares: tuple[float, ...]  # d log N / d log E of each layer there, at the deepest press, without friction [-]
+    draws: Array  # (m, 3) of the posterior of the stiffnesses [MPa]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, without draws."""
+        return {
+            "layers": [
+                {**asdict(one), **{name: getattr(one, name)._asdict() for name in ("stiffness", "profile", "prior")}}
+                for one in self.layers
+            ],
+            "overall": self.overall._asdict(),
+            "touch": list(self.touch),
+            "noise": self.noise,
+            "points": self.points,
+            "deepest": self.deepest,
+            "checked": self.checked,
+            "shares": dict(zip(LAYERS, self.shares, strict=True)),
+        }
+
+
+class _Grid(NamedTuple):
+    """What the data say at contrasts; g of them."""
+
+    contrast: Array  # (g, 2) in deviations of the prior
+    mean: Array  # (g,) mean log factor of the stiffnesses that fits best
+    touch: Array  # (g, presses) [mm]
+    misfit: Array  # (g,) sum of squares [N2]
+    variance: Array  # (g,) of the mean by the noise's variance [1/N2]
+    weight: Array  # (g,) of the posterior, their sum 1
+
+
+class Fit:
+    """Presses and the model that they are compared with."""
+
+    def __init__(self, model: PressModel, presses: Sequence[Loaded]) -> None:
+        """Take presses. Raises FitError where they are too few."""
+        self.model, self.presses = model, presses
+        self.force = np.concatenate([one.force for one in presses])
+        self.displacement = np.concatenate([one.displacement for one in presses])
+        self.which = np.repeat(np.arange(len(presses)), [len(one.force) for one in presses])
+        self.free = len(self.force) - 1 - len(presses)
+        if self.free < FEWEST:
+            raise FitError(
+                f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
+            )
+        # What the model's own forces are off by is no smaller where the noise is.
+        self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
+
+    def grid(self, contrast: Array, start: Array) -> _Grid:
+        """Return the best mean and touch at each contrast (g, 2), from touches `start` (presses,) [mm]."""
+        width = self.model.scene.finger.width
+        spline = CubicSpline(np.log(self.model.depth), self.model.log_force(contrast) + np.log(width), axis=1)
+        touch = np.tile(start, (len(contrast), 1))
+        mean, misfit, jacobian = self._linear(spline, touch)
+        damping = np.full(len(contrast), 1e-3)
+        for _ in range(12):  # Levenberg and Marquardt, all contrasts at once
+            step = _steps(jacobian, self._residual(spline, mean, touch), damping)
+            moved = touch + step[:, 1:]
+            found, less, other = self._linear(spline, moved)
+            better = less < misfit
+            converged = bool(np.all(np.abs(misfit - less) <= 1e-9 * (misfit + self.floor)))
+            touch[better], mean[better], misfit[better], jacobian[better] = (
+                moved[better], found[better], less[better], other[better]
+            )  # fmt: skip
+            damping = np.where(better, damping / 5.0, damping * 5.0)
+            if converged:
+                break
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        variance = np.linalg.inv(normal)[:, 0, 0]
+        prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
+        log = -(prior + self.free * np.log(misfit + self.floor) + np.linalg.slogdet(normal)[1]) / 2.0
+        log[(contrast**2).sum(axis=1) > REACH**2] = -np.inf
+        weight = np.exp(log - log.max())
+        return _Grid(contrast, mean, touch, misfit, variance, weight / weight.sum())
+
+    def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array]:
+        """Return mean, misfit and Jacobian (g, n, 1 + presses) at touches, the mean the best for them."""
+        shape, slope = _evaluated(spline, self.displacement - touch[:, self.which])
+        factor = (shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30)
+        factor = np.maximum(factor, 1e-6)
+        force = factor[:, None] * shape
+        jacobian = np.zeros((*force.shape, 1 + len(self.presses)))
+        jacobian[:, :, 0] = force
+        by_touch = -factor[:, None] * slope
+        for press in range(len(self.presses)):
+            jacobian[:, self.which == press, 1 + press] = by_touch[:, self.which == press]
+        return np.log(factor), ((force - self.force) ** 2).sum(axis=1), jacobian
+
+    def _residual(self, spline: CubicSpline, mean: Array, touch: Array) -> Array:
+        shape, _ = _evaluated(spline, self.displacement - touch[:, self.which])
+        return np.exp(mean)[:, None] * shape - self.force
+
+    def maximum(self, grid: _Grid) -> tuple[Array, Array, float]:
+        """Return contrast (2,), touches and mean of the posterior's maximum, by the model's derivatives."""
+        best = int(np.argmax(grid.weight))
+        sigma = np.sqrt((grid.misfit[best] + self.floor) / self.free)
+        spread, width = self.model.spread, self.model.scene.finger.width
+
+        def parts(at: Array) -> tuple[CubicSpline, Array]:
+            contrast = at[None, :2]
+            log = self.model.log_force(contrast)[0] + np.log(width)
+            slopes = self.model.slopes(contrast)[0]
+            curves = CubicSpline(np.log(self.model.depth), np.vstack([log, slopes]), axis=1)
+            return curves, self.displacement - at[3:][self.which]
+
+        def residual(at: Array) -> Array:
+            curves, depth = parts(at)
+            shape = _evaluated(curves, np.tile(depth, (3, 1)))[0][0]
+            prior = np.array([at[0], at[1], np.sqrt(3.0) * at[2] / spread])
+            return np.concatenate([(np.exp(at[2]) * shape - self.force) / sigma, prior])
+
+        def jacobian(at: Array) -> Array:
+            curves, depth = parts(at)
+            shape, slope = (one[0] for one in _evaluated(curves, np.tile(depth, (3, 1))))
+            by_contrast = curves(np.log(np.maximum(depth, self.model.depth[0])))[1:]
+            out = np.zeros((len(depth) + 3, len(at)))
+            factor = np.exp(at[2]) / sigma
+            out[: len(depth), :2] = (factor * shape * by_contrast).T
+            out[: len(depth), 2] = factor * shape
+            out[np.arange(len(depth)), 3 + self.which] = -factor * slope
+            out[len(depth) :, :3] = np.diag([1.0, 1.0, np.sqrt(3.0) / spread])
+            return out
+
+        start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
+        found = least_squares(residual, start, jacobian, x_scale="jac").x
+        return found[:2], found[3:], float(found[2])
+
+    def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
+        """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""
+        contrast, mean, misfit, variance = (
+            np.concatenate([getattr(one, name) for one in grids]) for name in ("contrast", "mean", "misfit", "variance")
+        )
+        inside = np.hypot(*contrast.T) <= REACH
+        contrast, mean, misfit, variance = contrast[inside], mean[inside], misfit[inside] + self.floor, variance[inside]
+        log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
+        tried = np.linspace(log.min(), log.max(), 400)
+        whole = misfit[:, None] + (tried - log[:, None]) ** 2 / variance[:, None]
+        best = whole.argmin(axis=0)
+        least = whole[best, np.arange(len(tried))]
+        accepted = np.flatnonzero(self.free * np.log(least / misfit.min()) <= CHI_SQUARED)
+        ends = [accepted[0], accepted[-1]] if len(accepted) else [int(least.argmin())] * 2
+        rim = np.hypot(*contrast[best[ends]].T) > RIM * REACH
+        low, high = (None if out else float(tried[at]) for at, out in zip(ends, rim, strict=True))
+        return Interval(float(log[misfit.argmin()]), low, high)
+
+
+def fit(
+    model: PressModel, presses: Sequence[Loaded], mu: float = 0.0, gain_error: float = 0.0, seed: int = 0
+) -> FingerFit:
+    """Return the posterior of the stiffnesses of a finger, given presses on a surface of friction `mu`.
+
+    `gain_error` is the standard uncertainty of the force's calibration [-]. Raises FitError where points are too few.
+    """
+    told = Fit(model, presses)
+    start = np.array([one.touch for one in presses])
+    grids = [told.grid(_nodes(np.zeros(2), np.full(2, REACH)), start)]
+    while 1.0 / float((grids[-1].weight ** 2).sum()) < FINE and len(grids) < CLOSER:
+        grids.append(told.grid(_closer(grids[-1], len(grids)), grids[-1].touch[int(grids[-1].weight.argmax())]))
+    last = grids[-1]
+    at, touch, mean = told.maximum(last)
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(len(last.weight), DRAWS, p=last.weight)
+    scale = np.sqrt((last.misfit + told.floor) / told.free * last.variance)
+    means = last.mean[chosen] + scale[chosen] * rng.standard_t(told.free, DRAWS)
+    means += gain_error * rng.standard_normal(DRAWS)
+    best = model.stiffnesses(np.array([mean]), at[None])[0]
+    draws = model.stiffnesses(means, last.contrast[chosen])
+    depth = told.displacement - touch[told.which]
+    used = (model.depth >= depth.min()) & (model.depth <= depth.max())
+    used[np.argmin(np.abs(model.depth - np.median(depth)))] = True
+    relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, used]
+    ratio = relative.mean(axis=1)
+    low, high = np.exp(np.quantile(means + ratio[1:][chosen], QUANTILES))
+    force, shares = forces_of(model, best, model.depth[used], mu)
+    fitted = model.log_force(at[None])[0, used] + mean
+    misfit = float(last.misfit.min())
+    return FingerFit(
+        scene=model.finger(best),
+        layers=tuple(_layer(told, grids, number, best, draws) for number in range(len(LAYERS))),
+        overall=Interval(float(np.exp(mean + ratio[0])), float(low), float(high)),
+        touch=tuple(touch.tolist()),
+        noise=float(np.sqrt(misfit / told.free)),
+        points=len(told.force),
+        deepest=float(depth.max()),
+        checked=float(np.abs(np.exp(fitted) / force - 1.0).max()),
+        shares=tuple(shares[-1].tolist()),
+        draws=draws,
+    )
+
+
+def _layer(told: Fit, grids: Sequence[_Grid], number: int, best: Array, draws: Array) -> LayerFit:
+    """Return what is known of one layer, and say it in a sentence."""
+    name, spread = LAYERS[number], told.model.spread
+    published = told.model.scene.materials.of(name).E
+    low, high = np.quantile(draws[:, number], QUANTILES).tolist()
+    half = float(ndtri(QUANTILES[1])) * spread
+    ratio = float(np.log(high / low)) / (2.0 * half)
+    share = f"its 95 % interval is {100 * ratio:.0f} % as wide as the prior's, on the scale of logarithms"
+    sentence = (
+        f"The presses narrow the stiffness of the {name}: {share}."
+        if ratio < TOLD
+        else f"The presses cannot tell the stiffness of the {name} from that of the other layers: {share}."
+    )
+    profile = told.profile(grids, number)
+    ends = Interval(*(None if one is None else published * float(np.exp(one)) for one in profile))  # type: ignore
+    prior = Interval(published, published * float(np.exp(-half)), published * float(np.exp(half)))
+    return LayerFit(name, Interval(float(best[number]), low, high), ends, prior, ratio, sentence)
+
+
+def _nodes(centre: Array, half: Array) -> Array:
+    """Return contrasts (g, 2) of a grid within the model's reach."""
+    x, y = (np.linspace(middle - wide, middle + wide, GRID) for middle, wide in zip(centre, half, strict=True))
+    nodes = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    kept = nodes[(nodes**2).sum(axis=1) <= REACH**2]
+    return kept if len(kept) else nodes[len(nodes) // 2 :][:1]
+
+
+def _closer(grid: _Grid, closer: int) -> Array:
+    """Return a grid about the nodes that carry the posterior, drawn closer than one that was drawn before."""
+    carry = grid.contrast[grid.weight > 1e-4 * grid.weight.max()]
+    step = 2.0 * REACH / (GRID - 1) / 4.0 ** (closer - 1)
+    low, high = carry.min(axis=0) - step, carry.max(axis=0) + step
+    return _nodes((low + high) / 2.0, (high - low) / 2.0)
+
+
+def _evaluated(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
+    """Return exp of a spline (g) of log depth at depths (g, n) [mm], and its derivative by depth.
+
+    Beyond its knots the logarithm goes on straight: a power law.
+    """
+    depth = np.maximum(depth, 1e-9)  # above the skin nothing presses
+    knots, log = spline.x, np.log(depth)
+    inside = np.clip(log, knots[0], knots[-1])
+    piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    cubic, square, line, constant = spline.c[:, piece, np.arange(len(depth))[:, None]]
+    by = inside - knots[piece]
+    slope = (3.0 * cubic * by + 2.0 * square) * by + line
+    value = np.exp(((cubic * by + square) * by + line) * by + constant + slope * (log - inside))
+    return value, value * slope / depth
+
+
+def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:
+    """Return the damped steps (g, p) that lessen residuals (g, n), each number on its own scale."""
+    across = np.swapaxes(jacobian, 1, 2)
+    normal = across @ jacobian
+    diagonal = np.einsum("gii->gi", normal)
+    diagonal *= 1.0 + damping[:, None]
+    diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True)
+    return np.linalg.solve(normal, -(across @ residual[:, :, None]))[:, :, 0]

@@ -1,0 +1,165 @@
+"""The model's force of a press for any stiffnesses of the layers, from few solves.
+
+At small strain N is linear in all stiffnesses together, so only two contrasts between the three layers are left, and
+the depth. Over them log N is a polynomial through solved forces and their exact derivatives by each stiffness.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from sessions.prediction.solving import settled
+from solver import Cancelled, Friction, Loading, Prediction, Scene, Slide, Solve
+from solver.response.nearby import stiffness_shares
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], bool]
+
+LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
+# Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
+CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
+REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
+DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
+RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
+DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 3 to 13 % over contrasts and depths
+RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
+DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
+SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
+
+
+class FitError(Exception):
+    """The finger cannot be fitted: why, and what to do."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PressModel:
+    """log N over depth and stiffness contrasts; k depths."""
+
+    scene: Scene  # whose finger and stiffnesses the contrasts are counted from
+    spread: float  # of the prior of each log stiffness, its standard deviation [-]
+    depth: Array  # (k,) [mm]
+    coefficients: Array  # (c, k) of log N [N/mm]
+    error: float  # of the solved forces as the solver estimates it, and of the polynomial between them, relative [-]
+
+    def log_force(self, contrast: Array) -> Array:
+        """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, the mean log stiffness kept."""
+        return _basis(contrast, DEGREE)[0] @ self.coefficients
+
+    def slopes(self, contrast: Array) -> Array:
+        """Return how that changes with both contrasts (g, 2, k)."""
+        return np.stack([part @ self.coefficients for part in _basis(contrast, DEGREE)[1:]], axis=1)
+
+    def stiffnesses(self, mean: Array, contrast: Array) -> Array:
+        """Return each layer's stiffness (g, 3) [MPa] for mean log factors (g,) and contrasts (g, 2)."""
+        reference = [self.scene.materials.of(name).E for name in LAYERS]
+        return np.array(reference) * np.exp(mean[:, None] + self.spread * contrast @ CONTRASTS)
+
+    def fingers(self, contrast: Array) -> Iterator[Scene]:
+        """Yield the scene with layers of each `contrast` (g, 2)."""
+        for stiffness in self.stiffnesses(np.zeros(len(contrast)), contrast):
+            yield self.finger(stiffness)
+
+    def finger(self, stiffness: Array) -> Scene:
+        """Return the scene with layers of a `stiffness` (3,) [MPa]."""
+        made = self.scene.materials
+        layers = {name: replace(made.of(name), E=float(one)) for name, one in zip(LAYERS, stiffness, strict=True)}
+        return replace(self.scene, materials=replace(made, **layers))
+
+
+def press_model(
+    scene: Scene, spread: float, deepest: float, mu: float = 0.0, progress: Progress | None = None
+) -> PressModel:
+    """Return the model of presses up to a depth [mm] of the finger of a scene, on a surface of friction `mu`.
+
+    `spread` is the standard deviation of each log stiffness in the prior. Raises FitError where a press has no state,
+    Cancelled where `progress` returns False.
+    """
+    depth = np.geomspace(SHALLOWEST * deepest, deepest, DEPTHS)
+    contrast = _design(RINGS)
+    rubbed = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
+    count = len(contrast) + len(rubbed)
+    force, slope, error = np.empty((len(contrast), DEPTHS)), np.empty((len(contrast), 2, DEPTHS)), 0.0
+    blank = PressModel(scene, spread, depth, np.empty((0, 0)), 0.0)
+    for at, finger in enumerate(blank.fingers(contrast)):
+        _report(progress, at / count)
+        found = _pressed(finger, depth, 0.0)
+        force[at] = np.log([one.normal_force for one in found])
+        shares = stiffness_shares(found)[:, : len(LAYERS)]
+        slope[at] = spread * CONTRASTS @ shares.T
+        error += float(np.mean([one.normal_force_error or 0.0 for one in found])) / len(contrast)
+    basis = np.vstack(_basis(contrast, DEGREE))
+    known = np.vstack([force, slope[:, 0], slope[:, 1]])
+    coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
+    missed = basis[: len(contrast)] @ coefficients - force
+    if mu:
+        more = np.empty((len(rubbed), DEPTHS))
+        for at, finger in enumerate(blank.fingers(rubbed)):
+            _report(progress, (len(contrast) + at) / count)
+            more[at] = np.log([one.normal_force for one in _pressed(finger, depth, mu)])
+        more -= _basis(rubbed, DEGREE)[0] @ coefficients
+        basis = _basis(rubbed, DEGREE_OF_FRICTION)[0]
+        friction = np.linalg.lstsq(basis, more, rcond=None)[0]
+        missed = np.vstack([missed, basis @ friction - more])
+        coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
+    error = float(np.hypot(error, np.sqrt(np.mean(missed**2))))
+    return replace(blank, coefficients=coefficients, error=error)
+
+
+def forces_of(model: PressModel, stiffness: Array, depth: Array, mu: float) -> tuple[Array, Array]:
+    """Return the solver's own N (n,) [N/mm] at depths (n,) [mm], and d log N / d log E (n, 3) without friction."""
+    finger = model.finger(stiffness)
+    rubbed = _pressed(finger, depth, mu)
+    shares = stiffness_shares(_pressed(finger, depth, 0.0))
+    return np.array([one.normal_force for one in rubbed]), shares[:, : len(LAYERS)]
+
+
+def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
+    """Return presses with friction; without it those of a slide, which are the same states."""
+    slide: Slide = "none" if mu else "+x"
+    scenes = [
+        replace(finger, friction=Friction(mu), loading=Loading(float(one), slide), solve=Solve(evidence="quick"))
+        for one in depth
+    ]
+    found = [one for one in settled(scenes) if one is not None]
+    if len(found) < len(scenes):
+        raise FitError(
+            f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "
+            "the finger's own dimensions in a scene file."
+        )
+    return found
+
+
+def _report(progress: Progress | None, part: float) -> None:
+    if progress is not None and not progress(part):
+        raise Cancelled
+
+
+def _design(rings: Sequence[int]) -> Array:
+    """Return contrasts (g, 2) on rings of so many points, whose radii lie like Chebyshev's, in deviations."""
+    radii = REACH * np.sin(np.linspace(0.0, np.pi / 2.0, len(rings)))
+    points = [
+        radius * np.array([np.cos(angle), np.sin(angle)])
+        for number, (radius, count) in enumerate(zip(radii, rings, strict=True))
+        for angle in 2.0 * np.pi * (np.arange(count) + 0.5 * (number % 2)) / count
+    ]
+    return np.array(points)
+
+
+def _orders(degree: int) -> NDArray[np.int64]:
+    """Return the orders (c, 2) of the Chebyshev products up to a total degree."""
+    return np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def _basis(contrast: Array, degree: int) -> tuple[Array, Array, Array]:
+    """Return Chebyshev products (g, c) up to a total degree at contrasts (g, 2), and their derivatives by both."""
+    value = [chebyshev.chebvander(contrast[:, axis] / REACH, degree) for axis in (0, 1)]
+    by = np.zeros((degree + 1, degree + 1))
+    for order in range(1, degree + 1):
+        slope = chebyshev.chebder(np.eye(degree + 1)[order])
+        by[: len(slope), order] = slope / REACH
+    slope = [one @ by for one in value]
+    i, j = _orders(degree).T
+    return value[0][:, i] * value[1][:, j], slope[0][:, i] * value[1][:, j], value[0][:, i] * slope[1][:, j]
