@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.special import ndtri
 
-from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, forces_of
+from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel
 from solver import Scene
 
 Array = NDArray[np.float64]
@@ -25,13 +25,11 @@ SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 %
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 DRAWS = 20_000  # of the posterior: quantiles at 2.5 % are then known to a hundredth of a deviation or two
 FEWEST = 6  # points of depth and force beyond the numbers that are looked for
-GRID = 41  # contrasts along each axis
+GRID = 31  # contrasts along each axis
 FINE = 200.0  # nodes of the grid that carry the posterior (inverse Simpson index); with fewer the grid is drawn closer
 CLOSER = 4  # grids at most
-RIM = 0.95  # of the model's reach: an end of a profile that lies there is bounded by the model, not by the data
 QUANTILES = (0.025, 0.975)
 TOLD = 0.8  # of the prior's width: a narrower interval says that the data told something of a layer
-AGREE = 0.02  # the solver's own forces at the answer may differ so much from the model that was fitted [-]
 
 
 class Loaded(NamedTuple):
@@ -73,8 +71,6 @@ class FingerFit:
     noise: float  # standard deviation of the points' forces [N]
     points: int
     deepest: float  # [mm]
-    checked: float  # the solver's forces at the answer differ from the fitted model's by, at most [-]
-    shares: tuple[float, ...]  # d log N / d log E of each layer there, at the deepest press, without friction [-]
     draws: Array  # (m, 3) of the posterior of the stiffnesses [MPa]
 
     def to_dict(self) -> dict[str, Any]:
@@ -89,8 +85,6 @@ class FingerFit:
             "noise": self.noise,
             "points": self.points,
             "deepest": self.deepest,
-            "checked": self.checked,
-            "shares": dict(zip(LAYERS, self.shares, strict=True)),
         }
 
 
@@ -103,6 +97,8 @@ class _Grid(NamedTuple):
     misfit: Array  # (g,) sum of squares [N2]
     variance: Array  # (g,) of the mean by the noise's variance [1/N2]
     weight: Array  # (g,) of the posterior, their sum 1
+    likelihood: Array  # (g,) the same without the prior
+    step: float  # greatest distance between neighbours, in deviations
 
 
 class Fit:
@@ -122,16 +118,16 @@ class Fit:
         # What the model's own forces are off by is no smaller where the noise is.
         self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
 
-    def grid(self, contrast: Array, start: Array) -> _Grid:
-        """Return the best mean and touch at each contrast (g, 2), from touches `start` (presses,) [mm]."""
+    def grid(self, contrast: Array, step: float, start: Array) -> _Grid:
+        """Return the best mean and touch at contrasts (g, 2) that lie a `step` apart, from touches (presses,) [mm]."""
         width = self.model.scene.finger.width
         spline = CubicSpline(np.log(self.model.depth), self.model.log_force(contrast) + np.log(width), axis=1)
         touch = np.tile(start, (len(contrast), 1))
         mean, misfit, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
         for _ in range(12):  # Levenberg and Marquardt, all contrasts at once
-            step = _steps(jacobian, self._residual(spline, mean, touch), damping)
-            moved = touch + step[:, 1:]
+            change = _steps(jacobian, self._residual(spline, mean, touch), damping)
+            moved = touch + change[:, 1:]
             found, less, other = self._linear(spline, moved)
             better = less < misfit
             converged = bool(np.all(np.abs(misfit - less) <= 1e-9 * (misfit + self.floor)))
@@ -142,12 +138,11 @@ class Fit:
             if converged:
                 break
         normal = np.swapaxes(jacobian, 1, 2) @ jacobian
-        variance = np.linalg.inv(normal)[:, 0, 0]
+        variance = np.asarray(np.linalg.inv(normal)[:, 0, 0], np.float64)
         prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
-        log = -(prior + self.free * np.log(misfit + self.floor) + np.linalg.slogdet(normal)[1]) / 2.0
-        log[(contrast**2).sum(axis=1) > REACH**2] = -np.inf
-        weight = np.exp(log - log.max())
-        return _Grid(contrast, mean, touch, misfit, variance, weight / weight.sum())
+        fits = -self.free * np.log(misfit + self.floor) / 2.0
+        log = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
+        return _Grid(contrast, mean, touch, misfit, variance, _weights(log), _weights(fits), step)
 
     def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array]:
         """Return mean, misfit and Jacobian (g, n, 1 + presses) at touches, the mean the best for them."""
@@ -206,33 +201,33 @@ class Fit:
         contrast, mean, misfit, variance = (
             np.concatenate([getattr(one, name) for one in grids]) for name in ("contrast", "mean", "misfit", "variance")
         )
-        inside = np.hypot(*contrast.T) <= REACH
-        contrast, mean, misfit, variance = contrast[inside], mean[inside], misfit[inside] + self.floor, variance[inside]
+        step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
+        misfit += self.floor
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
-        tried = np.linspace(log.min(), log.max(), 400)
-        whole = misfit[:, None] + (tried - log[:, None]) ** 2 / variance[:, None]
-        best = whole.argmin(axis=0)
-        least = whole[best, np.arange(len(tried))]
-        accepted = np.flatnonzero(self.free * np.log(least / misfit.min()) <= CHI_SQUARED)
-        ends = [accepted[0], accepted[-1]] if len(accepted) else [int(least.argmin())] * 2
-        rim = np.hypot(*contrast[best[ends]].T) > RIM * REACH
-        low, high = (None if out else float(tried[at]) for at, out in zip(ends, rim, strict=True))
-        return Interval(float(log[misfit.argmin()]), low, high)
+        allowed = float(misfit.min()) * float(np.exp(CHI_SQUARED / self.free))
+        half = np.where(misfit <= allowed, np.sqrt(variance * np.maximum(allowed - misfit, 0.0)), -np.inf)
+        ends = [int((log - half).argmin()), int((log + half).argmax())]
+        rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
+        low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
+        return Interval(float(log[misfit.argmin()]), None if rim[0] else low, None if rim[1] else high)
 
 
-def fit(
-    model: PressModel, presses: Sequence[Loaded], mu: float = 0.0, gain_error: float = 0.0, seed: int = 0
-) -> FingerFit:
-    """Return the posterior of the stiffnesses of a finger, given presses on a surface of friction `mu`.
+def _weights(log: Array) -> Array:
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum(), np.float64)
 
-    `gain_error` is the standard uncertainty of the force's calibration [-]. Raises FitError where points are too few.
+
+def fit(model: PressModel, presses: Sequence[Loaded], gain_error: float = 0.0, seed: int = 0) -> FingerFit:
+    """Return the posterior of the stiffnesses of a finger, given presses.
+
+    `gain_error` is the standard uncertainty of the force's calibration [-], `seed` that of the draws. Raises FitError
+    where points are too few.
     """
     told = Fit(model, presses)
     start = np.array([one.touch for one in presses])
-    grids = [told.grid(_nodes(np.zeros(2), np.full(2, REACH)), start)]
-    while 1.0 / float((grids[-1].weight ** 2).sum()) < FINE and len(grids) < CLOSER:
-        grids.append(told.grid(_closer(grids[-1], len(grids)), grids[-1].touch[int(grids[-1].weight.argmax())]))
-    last = grids[-1]
+    first = told.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
+    last = _closer(told, first, "weight")
+    likely = [first, last, _closer(told, first, "likelihood")]
     at, touch, mean = told.maximum(last)
     rng = np.random.default_rng(seed)
     chosen = rng.choice(len(last.weight), DRAWS, p=last.weight)
@@ -247,19 +242,14 @@ def fit(
     relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, used]
     ratio = relative.mean(axis=1)
     low, high = np.exp(np.quantile(means + ratio[1:][chosen], QUANTILES))
-    force, shares = forces_of(model, best, model.depth[used], mu)
-    fitted = model.log_force(at[None])[0, used] + mean
-    misfit = float(last.misfit.min())
     return FingerFit(
         scene=model.finger(best),
-        layers=tuple(_layer(told, grids, number, best, draws) for number in range(len(LAYERS))),
+        layers=tuple(_layer(told, likely, number, best, draws) for number in range(len(LAYERS))),
         overall=Interval(float(np.exp(mean + ratio[0])), float(low), float(high)),
         touch=tuple(touch.tolist()),
-        noise=float(np.sqrt(misfit / told.free)),
+        noise=float(np.sqrt(last.misfit.min() / told.free)),
         points=len(told.force),
         deepest=float(depth.max()),
-        checked=float(np.abs(np.exp(fitted) / force - 1.0).max()),
-        shares=tuple(shares[-1].tolist()),
         draws=draws,
     )
 
@@ -278,25 +268,36 @@ def _layer(told: Fit, grids: Sequence[_Grid], number: int, best: Array, draws: A
         else f"The presses cannot tell the stiffness of the {name} from that of the other layers: {share}."
     )
     profile = told.profile(grids, number)
-    ends = Interval(*(None if one is None else published * float(np.exp(one)) for one in profile))  # type: ignore
+    low_end, high_end = (None if one is None else published * float(np.exp(one)) for one in profile[1:])
+    ends = Interval(published * float(np.exp(profile.value)), low_end, high_end)
     prior = Interval(published, published * float(np.exp(-half)), published * float(np.exp(half)))
     return LayerFit(name, Interval(float(best[number]), low, high), ends, prior, ratio, sentence)
 
 
-def _nodes(centre: Array, half: Array) -> Array:
-    """Return contrasts (g, 2) of a grid within the model's reach."""
-    x, y = (np.linspace(middle - wide, middle + wide, GRID) for middle, wide in zip(centre, half, strict=True))
-    nodes = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    kept = nodes[(nodes**2).sum(axis=1) <= REACH**2]
-    return kept if len(kept) else nodes[len(nodes) // 2 :][:1]
+def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
+    """Return contrasts (g, 2) of a grid within the model's reach, and their step; `axes` (2, 2) are its half widths."""
+    line: Array = np.linspace(-1.0, 1.0, GRID)
+    nodes = centre + np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2) @ axes
+    step = float(np.hypot(*axes.T).max()) * 2.0 / (GRID - 1)
+    return nodes[(nodes**2).sum(axis=1) <= REACH**2], step
 
 
-def _closer(grid: _Grid, closer: int) -> Array:
-    """Return a grid about the nodes that carry the posterior, drawn closer than one that was drawn before."""
-    carry = grid.contrast[grid.weight > 1e-4 * grid.weight.max()]
-    step = 2.0 * REACH / (GRID - 1) / 4.0 ** (closer - 1)
-    low, high = carry.min(axis=0) - step, carry.max(axis=0) + step
-    return _nodes((low + high) / 2.0, (high - low) / 2.0)
+def _closer(told: Fit, grid: _Grid, name: str) -> _Grid:
+    """Return a grid along the main axes of what carries the weights of a `name`, drawn closer until enough do."""
+    for _ in range(CLOSER):
+        weight: Array = getattr(grid, name)
+        if 1.0 / float((weight**2).sum()) >= FINE:
+            break
+        carry = weight > 1e-4 * weight.max()
+        nodes = grid.contrast[carry]
+        centre = np.average(nodes, axis=0, weights=weight[carry])
+        spread = (nodes - centre).T @ ((nodes - centre) * weight[carry, None]) / weight[carry].sum()
+        turned = np.linalg.eigh(spread)[1].T
+        along = (nodes - centre) @ turned.T
+        low, high = along.min(axis=0) - grid.step, along.max(axis=0) + grid.step
+        middle, half = (low + high) / 2.0 @ turned, (high - low) / 2.0
+        grid = told.grid(*_nodes(centre + middle, half[:, None] * turned), grid.touch[int(weight.argmax())])
+    return grid
 
 
 def _evaluated(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
@@ -322,4 +323,4 @@ def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:
     diagonal = np.einsum("gii->gi", normal)
     diagonal *= 1.0 + damping[:, None]
     diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True)
-    return np.linalg.solve(normal, -(across @ residual[:, :, None]))[:, :, 0]
+    return np.asarray(np.linalg.solve(normal, -(across @ residual[:, :, None]))[:, :, 0], np.float64)

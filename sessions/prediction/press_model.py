@@ -6,13 +6,14 @@ the depth. Over them log N is a polynomial through solved forces and their exact
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
 from sessions.prediction.solving import settled
-from solver import Cancelled, Friction, Loading, Prediction, Scene, Slide, Solve
+from solver import Cancelled, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
 from solver.response.nearby import stiffness_shares
 
 Array = NDArray[np.float64]
@@ -27,6 +28,7 @@ RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes fo
 DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 3 to 13 % over contrasts and depths
 RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
+CHECKED = 4  # depths at which a fitted finger is solved
 SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
 
 
@@ -42,6 +44,7 @@ class PressModel:
     spread: float  # of the prior of each log stiffness, its standard deviation [-]
     depth: Array  # (k,) [mm]
     coefficients: Array  # (c, k) of log N [N/mm]
+    mu: float  # friction of the surface that is pressed [-]
     error: float  # of the solved forces as the solver estimates it, and of the polynomial between them, relative [-]
 
     def log_force(self, contrast: Array) -> Array:
@@ -82,7 +85,7 @@ def press_model(
     rubbed = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
     count = len(contrast) + len(rubbed)
     force, slope, error = np.empty((len(contrast), DEPTHS)), np.empty((len(contrast), 2, DEPTHS)), 0.0
-    blank = PressModel(scene, spread, depth, np.empty((0, 0)), 0.0)
+    blank = PressModel(scene, spread, depth, np.empty((0, 0)), mu, 0.0)
     for at, finger in enumerate(blank.fingers(contrast)):
         _report(progress, at / count)
         found = _pressed(finger, depth, 0.0)
@@ -108,26 +111,42 @@ def press_model(
     return replace(blank, coefficients=coefficients, error=error)
 
 
-def forces_of(model: PressModel, stiffness: Array, depth: Array, mu: float) -> tuple[Array, Array]:
-    """Return the solver's own N (n,) [N/mm] at depths (n,) [mm], and d log N / d log E (n, 3) without friction."""
+class Check(NamedTuple):
+    """What the solver itself says of a finger that was fitted."""
+
+    missed: float  # the fitted model's forces differ from the solver's own by, at most [-]
+    shares: Array  # (3,) d log N / d log E of each layer at the deepest press, without friction [-]
+
+
+def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
+    """Solve presses up to a depth [mm] of the finger with layers of a `stiffness` (3,) [MPa] and compare forces.
+
+    Raises FitError.
+    """
     finger = model.finger(stiffness)
-    rubbed = _pressed(finger, depth, mu)
-    shares = stiffness_shares(_pressed(finger, depth, 0.0))
-    return np.array([one.normal_force for one in rubbed]), shares[:, : len(LAYERS)]
+    log = np.log(stiffness) - np.log([model.scene.materials.of(name).E for name in LAYERS])
+    upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]
+    depth = model.depth[upto]
+    fitted = model.log_force((CONTRASTS @ log / model.spread)[None])[0, upto] + log.mean()
+    free = _pressed(finger, depth, 0.0)
+    rubbed = _pressed(finger, depth, model.mu) if model.mu else free
+    missed = np.abs(np.exp(fitted) / np.array([one.normal_force for one in rubbed]) - 1.0)
+    return Check(float(missed.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
 
 
 def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
     """Return presses with friction; without it those of a slide, which are the same states."""
     slide: Slide = "none" if mu else "+x"
-    scenes = [
-        replace(finger, friction=Friction(mu), loading=Loading(float(one), slide), solve=Solve(evidence="quick"))
-        for one in depth
-    ]
+    loads = [Loading(float(one), slide) for one in depth]
+    try:
+        scenes = [replace(finger, friction=Friction(mu), loading=one, solve=Solve(evidence="quick")) for one in loads]
+    except SceneError as unfit:
+        raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
     found = [one for one in settled(scenes) if one is not None]
     if len(found) < len(scenes):
         raise FitError(
             f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "
-            "the finger's own dimensions in a scene file."
+            "the finger's own dimensions with --finger."
         )
     return found
 
@@ -158,8 +177,7 @@ def _basis(contrast: Array, degree: int) -> tuple[Array, Array, Array]:
     value = [chebyshev.chebvander(contrast[:, axis] / REACH, degree) for axis in (0, 1)]
     by = np.zeros((degree + 1, degree + 1))
     for order in range(1, degree + 1):
-        slope = chebyshev.chebder(np.eye(degree + 1)[order])
-        by[: len(slope), order] = slope / REACH
+        by[:degree, order] = np.asarray(chebyshev.chebder(np.eye(degree + 1)[order]), np.float64) / REACH
     slope = [one @ by for one in value]
     i, j = _orders(degree).T
     return value[0][:, i] * value[1][:, j], slope[0][:, i] * value[1][:, j], value[0][:, i] * slope[1][:, j]

@@ -113,7 +113,9 @@ def by_stiffness(finger: FingerModel, state: EquilibriumState) -> Array:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
     by_depth = finger.body.displacement(of_skin(finger.newton, state)[:, DEPTH].reshape(-1, 2))
-    moved, slope = (field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth))
+    moved, slope = (
+        field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth)
+    )
     work = np.einsum("ei,eij,ej->e", slope, finger.body.elastic.stiffness, moved)
     return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
 

@@ -1,0 +1,109 @@
+"""Presses of a recording as force over displacement: what a finger's stiffness is fitted to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction.finger_fit import Loaded
+from sessions.recording import Recording
+from sessions.strokes import AnalysisSettings, Stroke
+from sessions.strokes.analysis import analyse_blocks
+
+Array = NDArray[np.float64]
+
+POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
+LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
+LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
+
+
+@dataclass(frozen=True, slots=True)
+class LoadingCurves:
+    """The presses that a log follows, and why others are left out."""
+
+    presses: tuple[Loaded, ...]
+    names: tuple[str, ...]  # of each press, for people
+    left_out: tuple[str, ...]  # a sentence each
+
+
+def loading_curves(
+    recording: Recording, clock: str, at: Array, displacement: Array, settings: AnalysisSettings
+) -> LoadingCurves:
+    """Return the loading part of each press without a slide, in trials of every phase.
+
+    `displacement` (n,) [mm] is that of the bone, positive into the finger, `at` (n,) on a `clock` of the readings:
+    "time_s" [s], "received_ns" [ns] or "sequence".
+    """
+    if recording.info is None:
+        return LoadingCurves((), (), ("No forces were recorded.",))
+    held = [record for record in recording.trials if record.take]
+    parts = (
+        [(record.trial, recording.readings(record.trial.number)) for record in held]
+        if recording.plan.blocks
+        else [(None, recording.readings())]
+    )
+    presses: list[Loaded] = []
+    names: list[str] = []
+    left_out: list[str] = []
+    for trial, block in parts:
+        found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
+        clocks: Mapping[str, Array] = {
+            "time_s": block.time,
+            "received_ns": block.received_ns.astype(np.float64),
+            "sequence": block.sequence.astype(np.float64),
+        }
+        for stroke in found.strokes:
+            if not any(_holds(stroke, press.start) for press in found.presses):
+                continue
+            name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
+            when = np.interp(at, clocks[clock], block.time, left=-np.inf, right=np.inf)
+            loaded = _loaded(stroke, when, displacement)
+            if isinstance(loaded, str):
+                left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loaded}.")
+            else:
+                presses.append(loaded)
+                names.append(name)
+    return LoadingCurves(tuple(presses), tuple(names), tuple(left_out))
+
+
+def _holds(stroke: Stroke, instant: float) -> bool:
+    return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
+
+
+def _loaded(stroke: Stroke, when: Array, displacement: Array) -> Loaded | str:
+    """Return the loading of a press whose stage was at `displacement` at instants `when` (n,) [s]; or why not."""
+    curve = stroke.curve
+    assert curve is not None
+    assert stroke.onset is not None
+    last = float(curve.time[int(np.nanargmax(curve.normal))])
+    finite = np.isfinite(when)
+    when, displacement = when[finite], displacement[finite]
+    inside = np.flatnonzero((when >= stroke.onset) & (when <= last))
+    if not len(when) or when[0] > stroke.onset or when[-1] < last:
+        return "the log does not follow it from its onset to its greatest force"
+    around = when[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else when[:0]
+    if not len(inside) or float(np.diff(around).max(initial=0.0)) > LONGEST_GAP:
+        return f"the log has a gap of more than {LONGEST_GAP:g} s in it"
+    loading = (curve.time >= stroke.onset) & (curve.time <= last) & np.isfinite(curve.normal)
+    travel = np.interp(curve.time[loading], when, displacement)
+    force = curve.normal[loading]
+    # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
+    arrived = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
+    travel, force = travel[:arrived], force[:arrived]
+    if travel[-1] - travel[0] < LEAST_TRAVEL:
+        return (
+            f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
+            "mm is no press: displacement must be positive into the finger, on the session's clock"
+        )
+    edges: Array = np.linspace(float(travel[0]), float(travel[-1]), POINTS + 1)
+    which = np.clip(np.searchsorted(edges, travel, side="right") - 1, 0, POINTS - 1)
+    count = np.bincount(which, minlength=POINTS)
+    some = count > 0
+    means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force)]
+    return Loaded(means[0], means[1], float(travel[0]))
+
+
+def deepest(curves: LoadingCurves) -> float:
+    """Return the greatest travel of any press [mm]."""
+    return max(float(one.displacement.max() - one.touch) for one in curves.presses)
