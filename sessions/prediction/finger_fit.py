@@ -25,7 +25,8 @@ SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 %
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 DRAWS = 20_000  # of the posterior: quantiles at 2.5 % are then known to a hundredth of a deviation or two
 FEWEST = 6  # points of depth and force beyond the numbers that are looked for
-GRID = 31  # contrasts along each axis
+GRID = 25  # contrasts along each axis; 49 changes no end of an interval by more than draws do
+ROUNDS, SETTLED = 12, 1e-5  # of the search for touches; it ends where no sum of squares falls by more than a share
 FINE = 200.0  # nodes of the grid that carry the posterior (inverse Simpson index); with fewer the grid is drawn closer
 CLOSER = 4  # grids at most
 QUANTILES = (0.025, 0.975)
@@ -38,6 +39,7 @@ class Loaded(NamedTuple):
     displacement: Array  # (n,) of the stage or bone, positive into the finger [mm]
     force: Array  # (n,) normal [N]
     touch: float  # displacement at which the force leaves its zero [mm]
+    width: Array  # (n,) length of the contact along the finger [mm]; nan where nobody measured it
 
 
 class Interval(NamedTuple):
@@ -69,6 +71,7 @@ class FingerFit:
     overall: Interval  # force over that of the published stiffnesses, mean of the logs over the depths pressed [-]
     touch: tuple[float, ...]  # displacement at which each press touches [mm]
     noise: float  # standard deviation of the points' forces [N]
+    widths: int  # points with a length of contact
     points: int
     deepest: float  # [mm]
     draws: Array  # (m, 3) of the posterior of the stiffnesses [MPa]
@@ -84,6 +87,7 @@ class FingerFit:
             "touch": list(self.touch),
             "noise": self.noise,
             "points": self.points,
+            "widths": self.widths,
             "deepest": self.deepest,
         }
 
@@ -94,122 +98,134 @@ class _Grid(NamedTuple):
     contrast: Array  # (g, 2) in deviations of the prior
     mean: Array  # (g,) mean log factor of the stiffnesses that fits best
     touch: Array  # (g, presses) [mm]
-    misfit: Array  # (g,) sum of squares [N2]
+    misfit: Array  # (g,) of the forces, sum of squares [N2]
     variance: Array  # (g,) of the mean by the noise's variance [1/N2]
+    fits: Array  # (g,) log likelihood
     weight: Array  # (g,) of the posterior, their sum 1
     likelihood: Array  # (g,) the same without the prior
     step: float  # greatest distance between neighbours, in deviations
 
 
-class Fit:
-    """Presses and the model that they are compared with."""
+class Likelihood:
+    """What presses say of a finger, by a model of them."""
 
     def __init__(self, model: PressModel, presses: Sequence[Loaded]) -> None:
         """Take presses. Raises FitError where they are too few."""
-        self.model, self.presses = model, presses
-        self.force = np.concatenate([one.force for one in presses])
-        self.displacement = np.concatenate([one.displacement for one in presses])
+        self.model = model
+        self.force, self.displacement, width = (
+            np.concatenate([getattr(one, name) for one in presses]) for name in ("force", "displacement", "width")
+        )
         self.which = np.repeat(np.arange(len(presses)), [len(one.force) for one in presses])
+        self.presses = self.which == np.arange(len(presses))[:, None]
         self.free = len(self.force) - 1 - len(presses)
         if self.free < FEWEST:
             raise FitError(
                 f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
             )
-        # What the model's own forces are off by is no smaller where the noise is.
+        # What the model itself is off by is no smaller where the noise is.
         self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
+        self.wide = np.flatnonzero(np.isfinite(width))
+        self.width = width[self.wide]
+        depth = self.displacement - np.array([one.touch for one in presses])[self.which]
+        off = np.interp(depth[self.wide], model.depth, model.width_error)
+        self.width_floor = float(np.sum((off * self.width) ** 2))
 
     def grid(self, contrast: Array, step: float, start: Array) -> _Grid:
         """Return the best mean and touch at contrasts (g, 2) that lie a `step` apart, from touches (presses,) [mm]."""
-        width = self.model.scene.finger.width
-        spline = CubicSpline(np.log(self.model.depth), self.model.log_force(contrast) + np.log(width), axis=1)
+        forces = self.model.log_force(contrast) + np.log(self.model.scene.finger.width)
+        spline = CubicSpline(np.log(self.model.depth), forces, axis=1)
         touch = np.tile(start, (len(contrast), 1))
-        mean, misfit, jacobian = self._linear(spline, touch)
+        mean, misfit, residual, jacobian = self._linear(spline, touch)
         damping = np.full(len(contrast), 1e-3)
-        for _ in range(12):  # Levenberg and Marquardt, all contrasts at once
-            change = _steps(jacobian, self._residual(spline, mean, touch), damping)
-            moved = touch + change[:, 1:]
-            found, less, other = self._linear(spline, moved)
-            better = less < misfit
-            converged = bool(np.all(np.abs(misfit - less) <= 1e-9 * (misfit + self.floor)))
-            touch[better], mean[better], misfit[better], jacobian[better] = (
-                moved[better], found[better], less[better], other[better]
-            )  # fmt: skip
+        for _ in range(ROUNDS):  # Levenberg and Marquardt, all contrasts at once
+            moved = touch + _steps(jacobian, residual, damping)[:, 1:]
+            found = self._linear(spline, moved)
+            better = found[1] < misfit
+            gain = float(np.max(np.where(better, misfit - found[1], 0.0) / (misfit + self.floor)))
+            for old, new in zip((touch, mean, misfit, residual, jacobian), (moved, *found), strict=True):
+                old[better] = new[better]
             damping = np.where(better, damping / 5.0, damping * 5.0)
-            if converged:
+            if gain < SETTLED:
                 break
         normal = np.swapaxes(jacobian, 1, 2) @ jacobian
         variance = np.asarray(np.linalg.inv(normal)[:, 0, 0], np.float64)
         prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
-        fits = -self.free * np.log(misfit + self.floor) / 2.0
+        fits = -(self.free * np.log(misfit + self.floor) + self._of_width(contrast, touch)) / 2.0
         log = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
-        return _Grid(contrast, mean, touch, misfit, variance, _weights(log), _weights(fits), step)
+        return _Grid(contrast, mean, touch, misfit, variance, fits, _weights(log), _weights(fits), step)
 
-    def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array]:
-        """Return mean, misfit and Jacobian (g, n, 1 + presses) at touches, the mean the best for them."""
+    def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the best mean (g,) at touches, its misfit (g,), residual (g, n) and Jacobian (g, n, 1 + presses)."""
         shape, slope = _evaluated(spline, self.displacement - touch[:, self.which])
-        factor = (shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30)
-        factor = np.maximum(factor, 1e-6)
+        factor = np.maximum((shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30), 1e-6)
         force = factor[:, None] * shape
-        jacobian = np.zeros((*force.shape, 1 + len(self.presses)))
-        jacobian[:, :, 0] = force
-        by_touch = -factor[:, None] * slope
-        for press in range(len(self.presses)):
-            jacobian[:, self.which == press, 1 + press] = by_touch[:, self.which == press]
-        return np.log(factor), ((force - self.force) ** 2).sum(axis=1), jacobian
+        by_touch = (-factor[:, None] * slope)[:, :, None] * self.presses.T
+        residual = force - self.force
+        return np.log(factor), (residual**2).sum(axis=1), residual, np.dstack([force, by_touch])
 
-    def _residual(self, spline: CubicSpline, mean: Array, touch: Array) -> Array:
-        shape, _ = _evaluated(spline, self.displacement - touch[:, self.which])
-        return np.exp(mean)[:, None] * shape - self.force
+    def _of_width(self, contrast: Array, touch: Array) -> Array:
+        """Return minus twice the log likelihood (g,) of the contacts' lengths, 0 where there are none."""
+        if not len(self.wide):
+            return np.zeros(len(contrast))
+        spline = CubicSpline(np.log(self.model.depth), self.model.log_width(contrast), axis=1)
+        width, _ = _evaluated(spline, self.displacement[self.wide] - touch[:, self.which[self.wide]])
+        misfit = ((width - self.width) ** 2).sum(axis=1) + self.width_floor
+        return np.asarray(len(self.wide) * np.log(misfit), np.float64)
 
     def maximum(self, grid: _Grid) -> tuple[Array, Array, float]:
         """Return contrast (2,), touches and mean of the posterior's maximum, by the model's derivatives."""
         best = int(np.argmax(grid.weight))
-        sigma = np.sqrt((grid.misfit[best] + self.floor) / self.free)
-        spread, width = self.model.spread, self.model.scene.finger.width
-
-        def parts(at: Array) -> tuple[CubicSpline, Array]:
-            contrast = at[None, :2]
-            log = self.model.log_force(contrast)[0] + np.log(width)
-            slopes = self.model.slopes(contrast)[0]
-            curves = CubicSpline(np.log(self.model.depth), np.vstack([log, slopes]), axis=1)
-            return curves, self.displacement - at[3:][self.which]
+        sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.free))
+        start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
+        of_width = float(self._of_width(grid.contrast[best][None], grid.touch[best][None])[0])
+        width_sigma = float(np.exp(of_width / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
+        scale = np.concatenate([np.full(len(self.force), sigma), np.full(len(self.wide), width_sigma), np.ones(3)])
 
         def residual(at: Array) -> Array:
-            curves, depth = parts(at)
-            shape = _evaluated(curves, np.tile(depth, (3, 1)))[0][0]
-            prior = np.array([at[0], at[1], np.sqrt(3.0) * at[2] / spread])
-            return np.concatenate([(np.exp(at[2]) * shape - self.force) / sigma, prior])
+            return self._at(at)[0] / scale
 
         def jacobian(at: Array) -> Array:
-            curves, depth = parts(at)
-            shape, slope = (one[0] for one in _evaluated(curves, np.tile(depth, (3, 1))))
-            by_contrast = curves(np.log(np.maximum(depth, self.model.depth[0])))[1:]
-            out = np.zeros((len(depth) + 3, len(at)))
-            factor = np.exp(at[2]) / sigma
-            out[: len(depth), :2] = (factor * shape * by_contrast).T
-            out[: len(depth), 2] = factor * shape
-            out[np.arange(len(depth)), 3 + self.which] = -factor * slope
-            out[len(depth) :, :3] = np.diag([1.0, 1.0, np.sqrt(3.0) / spread])
-            return out
+            return self._at(at)[1] / scale[:, None]
 
-        start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
         found = least_squares(residual, start, jacobian, x_scale="jac").x
         return found[:2], found[3:], float(found[2])
 
+    def _at(self, at: Array) -> tuple[Array, Array]:
+        """Return residuals of forces, contacts and prior, and their Jacobian by both contrasts, mean and touches."""
+        model, contrast, knots = self.model, at[None, :2], np.log(self.model.depth)
+        depth = self.displacement - at[3:][self.which]
+        log = model.log_force(contrast) + np.log(model.scene.finger.width) + at[2]
+        parts: list[Array] = []
+        rows: list[Array] = []
+        for values, slopes, measured, only in (
+            (log, model.slopes(contrast), self.force, np.arange(len(depth))),
+            (model.log_width(contrast), model.width_slopes(contrast), self.width, self.wide),
+        ):
+            value, slope = (one[0] for one in _evaluated(CubicSpline(knots, values, axis=1), depth[only][None]))
+            by_contrast = CubicSpline(knots, slopes[0], axis=1)(np.log(np.maximum(depth[only], model.depth[0])))
+            by_mean = value if values is log else np.zeros(len(only))
+            parts.append(value - measured)
+            by_touch = -slope[:, None] * self.presses.T[only]
+            rows.append(np.column_stack([(value * by_contrast).T, by_mean, by_touch]))
+        prior = np.diag([1.0, 1.0, np.sqrt(3.0) / model.spread])
+        parts.append(prior @ at[:3])
+        rows.append(np.column_stack([prior, np.zeros((3, len(at) - 3))]))
+        return np.concatenate(parts), np.vstack(rows)
+
     def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
         """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""
-        contrast, mean, misfit, variance = (
-            np.concatenate([getattr(one, name) for one in grids]) for name in ("contrast", "mean", "misfit", "variance")
+        contrast, mean, misfit, variance, fits = (
+            np.concatenate([getattr(one, name) for one in grids]) for name in _Grid._fields[:6] if name != "touch"
         )
         step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
-        misfit += self.floor
         log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
-        allowed = float(misfit.min()) * float(np.exp(CHI_SQUARED / self.free))
-        half = np.where(misfit <= allowed, np.sqrt(variance * np.maximum(allowed - misfit, 0.0)), -np.inf)
+        left = CHI_SQUARED - 2.0 * (fits.max() - fits)  # of the likelihood's fall, for the mean beside its best
+        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(left, 0.0) / self.free))
+        half = np.where(left >= 0.0, wide, -np.inf)
         ends = [int((log - half).argmin()), int((log + half).argmax())]
         rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
         low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
-        return Interval(float(log[misfit.argmin()]), None if rim[0] else low, None if rim[1] else high)
+        return Interval(float(log[fits.argmax()]), None if rim[0] else low, None if rim[1] else high)
 
 
 def _weights(log: Array) -> Array:
@@ -223,7 +239,7 @@ def fit(model: PressModel, presses: Sequence[Loaded], gain_error: float = 0.0, s
     `gain_error` is the standard uncertainty of the force's calibration [-], `seed` that of the draws. Raises FitError
     where points are too few.
     """
-    told = Fit(model, presses)
+    told = Likelihood(model, presses)
     start = np.array([one.touch for one in presses])
     first = told.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
     last = _closer(told, first, "weight")
@@ -249,12 +265,13 @@ def fit(model: PressModel, presses: Sequence[Loaded], gain_error: float = 0.0, s
         touch=tuple(touch.tolist()),
         noise=float(np.sqrt(last.misfit.min() / told.free)),
         points=len(told.force),
+        widths=len(told.width),
         deepest=float(depth.max()),
         draws=draws,
     )
 
 
-def _layer(told: Fit, grids: Sequence[_Grid], number: int, best: Array, draws: Array) -> LayerFit:
+def _layer(told: Likelihood, grids: Sequence[_Grid], number: int, best: Array, draws: Array) -> LayerFit:
     """Return what is known of one layer, and say it in a sentence."""
     name, spread = LAYERS[number], told.model.spread
     published = told.model.scene.materials.of(name).E
@@ -282,7 +299,7 @@ def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
     return nodes[(nodes**2).sum(axis=1) <= REACH**2], step
 
 
-def _closer(told: Fit, grid: _Grid, name: str) -> _Grid:
+def _closer(told: Likelihood, grid: _Grid, name: str) -> _Grid:
     """Return a grid along the main axes of what carries the weights of a `name`, drawn closer until enough do."""
     for _ in range(CLOSER):
         weight: Array = getattr(grid, name)

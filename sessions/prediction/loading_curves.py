@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,30 @@ LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so
 LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
 
 
+class StageLog(Protocol):
+    """Where the bone or the stage stood; n rows in order of time."""
+
+    @property
+    def clock(self) -> str:
+        """What `at` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings."""
+        ...
+
+    @property
+    def at(self) -> Array:
+        """Instants (n,), growing."""
+        ...
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement (n,) [mm], positive into the finger."""
+        ...
+
+    @property
+    def width(self) -> Array:
+        """Length of the contact along the finger (n,) [mm], nan where nobody measured it."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class LoadingCurves:
     """The presses that a log follows, and why others are left out."""
@@ -27,14 +52,8 @@ class LoadingCurves:
     left_out: tuple[str, ...]  # a sentence each
 
 
-def loading_curves(
-    recording: Recording, clock: str, at: Array, displacement: Array, settings: AnalysisSettings
-) -> LoadingCurves:
-    """Return the loading part of each press without a slide, in trials of every phase.
-
-    `displacement` (n,) [mm] is that of the bone, positive into the finger, `at` (n,) on a `clock` of the readings:
-    "time_s" [s], "received_ns" [ns] or "sequence".
-    """
+def loading_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> LoadingCurves:
+    """Return the loading part of each press without a slide, in trials of every phase."""
     if recording.info is None:
         return LoadingCurves((), (), ("No forces were recorded.",))
     held = [record for record in recording.trials if record.take]
@@ -57,8 +76,8 @@ def loading_curves(
             if not any(_holds(stroke, press.start) for press in found.presses):
                 continue
             name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
-            when = np.interp(at, clocks[clock], block.time, left=-np.inf, right=np.inf)
-            loaded = _loaded(stroke, when, displacement)
+            when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
+            loaded = _loaded(stroke, when, log)
             if isinstance(loaded, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loaded}.")
             else:
@@ -71,14 +90,14 @@ def _holds(stroke: Stroke, instant: float) -> bool:
     return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
 
 
-def _loaded(stroke: Stroke, when: Array, displacement: Array) -> Loaded | str:
-    """Return the loading of a press whose stage was at `displacement` at instants `when` (n,) [s]; or why not."""
+def _loaded(stroke: Stroke, when: Array, log: StageLog) -> Loaded | str:
+    """Return the loading of a press whose log has its rows at instants `when` (n,) [s]; or why there is none."""
     curve = stroke.curve
     assert curve is not None
     assert stroke.onset is not None
     last = float(curve.time[int(np.nanargmax(curve.normal))])
     finite = np.isfinite(when)
-    when, displacement = when[finite], displacement[finite]
+    when, displacement, width = when[finite], log.displacement[finite], log.width[finite]
     inside = np.flatnonzero((when >= stroke.onset) & (when <= last))
     if not len(when) or when[0] > stroke.onset or when[-1] < last:
         return "the log does not follow it from its onset to its greatest force"
@@ -100,8 +119,9 @@ def _loaded(stroke: Stroke, when: Array, displacement: Array) -> Loaded | str:
     which = np.clip(np.searchsorted(edges, travel, side="right") - 1, 0, POINTS - 1)
     count = np.bincount(which, minlength=POINTS)
     some = count > 0
-    means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force)]
-    return Loaded(means[0], means[1], float(travel[0]))
+    lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
+    means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force, lengths)]
+    return Loaded(means[0], means[1], float(travel[0]), means[2])
 
 
 def deepest(curves: LoadingCurves) -> float:

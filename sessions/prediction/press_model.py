@@ -25,6 +25,7 @@ CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.
 REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
 DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
 RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
+DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives nobody has: 15 numbers
 DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 3 to 13 % over contrasts and depths
 RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
@@ -44,8 +45,10 @@ class PressModel:
     spread: float  # of the prior of each log stiffness, its standard deviation [-]
     depth: Array  # (k,) [mm]
     coefficients: Array  # (c, k) of log N [N/mm]
+    width: Array  # (w, k) of the log of the contact's length along the finger [mm]
     mu: float  # friction of the surface that is pressed [-]
     error: float  # of the solved forces as the solver estimates it, and of the polynomial between them, relative [-]
+    width_error: Array  # (k,) likewise of the contact, which is coarse where it is short [-]
 
     def log_force(self, contrast: Array) -> Array:
         """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, the mean log stiffness kept."""
@@ -54,6 +57,14 @@ class PressModel:
     def slopes(self, contrast: Array) -> Array:
         """Return how that changes with both contrasts (g, 2, k)."""
         return np.stack([part @ self.coefficients for part in _basis(contrast, DEGREE)[1:]], axis=1)
+
+    def log_width(self, contrast: Array) -> Array:
+        """Return the log of the contact's length (g, k) [mm]; the mean log stiffness does not matter."""
+        return _basis(contrast, DEGREE_OF_WIDTH)[0] @ self.width
+
+    def width_slopes(self, contrast: Array) -> Array:
+        """Return how that changes with both contrasts (g, 2, k)."""
+        return np.stack([part @ self.width for part in _basis(contrast, DEGREE_OF_WIDTH)[1:]], axis=1)
 
     def stiffnesses(self, mean: Array, contrast: Array) -> Array:
         """Return each layer's stiffness (g, 3) [MPa] for mean log factors (g,) and contrasts (g, 2)."""
@@ -84,15 +95,19 @@ def press_model(
     contrast = _design(RINGS)
     rubbed = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
     count = len(contrast) + len(rubbed)
-    force, slope, error = np.empty((len(contrast), DEPTHS)), np.empty((len(contrast), 2, DEPTHS)), 0.0
-    blank = PressModel(scene, spread, depth, np.empty((0, 0)), mu, 0.0)
+    force, width, slope = (np.empty((len(contrast), *more, DEPTHS)) for more in ((), (), (2,)))
+    errors: list[float] = []
+    wide = np.zeros(DEPTHS)
+    blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
     for at, finger in enumerate(blank.fingers(contrast)):
         _report(progress, at / count)
         found = _pressed(finger, depth, 0.0)
         force[at] = np.log([one.normal_force for one in found])
         shares = stiffness_shares(found)[:, : len(LAYERS)]
         slope[at] = spread * CONTRASTS @ shares.T
-        error += float(np.mean([one.normal_force_error or 0.0 for one in found])) / len(contrast)
+        width[at] = np.log([one.contact_width for one in found])
+        errors += [one.normal_force_error or 0.0 for one in found]
+        wide += np.array([one.contact_width_error or 0.0 for one in found]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
     known = np.vstack([force, slope[:, 0], slope[:, 1]])
     coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
@@ -107,8 +122,11 @@ def press_model(
         friction = np.linalg.lstsq(basis, more, rcond=None)[0]
         missed = np.vstack([missed, basis @ friction - more])
         coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
-    error = float(np.hypot(error, np.sqrt(np.mean(missed**2))))
-    return replace(blank, coefficients=coefficients, error=error)
+    error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(missed**2))))
+    basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
+    of_width = np.linalg.lstsq(basis, width, rcond=None)[0]
+    wide = np.hypot(wide, np.sqrt(np.mean((basis @ of_width - width) ** 2, axis=0)))
+    return replace(blank, coefficients=coefficients, width=of_width, error=error, width_error=wide)
 
 
 class Check(NamedTuple):

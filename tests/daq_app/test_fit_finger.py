@@ -7,7 +7,7 @@ import pytest
 from planted_fingers import law
 
 from daq_app.cli.main import run
-from sessions.prediction import finger_in, press_model
+from sessions.prediction import finger_in
 from sessions.prediction.press_model import PressModel
 
 PLANTED = (0.25, 0.1, 0.025)  # [MPa]
@@ -66,9 +66,9 @@ def quick(monkeypatch):
         raise AssertionError("solved")
 
     monkeypatch.setattr("daq_app.cli.verbs.fit_finger.press_model", refuse)
-    return press_model
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(
     ("content", "words", "code", "named"),
     [
@@ -80,9 +80,7 @@ def quick(monkeypatch):
         ("time_s,displacement_mm\n0,1\n1,2\n", ["--prior", "0.5"], 2, "--prior 0.5"),
     ],
 )
-def test_a_log_or_option_that_cannot_be_taken_is_one_sentence(
-    pressed, tmp_path, quick, capsys, content, words, code, named
-):
+def test_a_log_or_option_that_cannot_be_taken_is_one_sentence(pressed, tmp_path, capsys, content, words, code, named):
     log = tmp_path / "log.csv"
     log.write_text(content)
     capsys.readouterr()
@@ -92,7 +90,8 @@ def test_a_log_or_option_that_cannot_be_taken_is_one_sentence(
     assert said.count("\n") == 1 or "left out" in said
 
 
-def test_a_stage_that_moves_the_other_way_is_named(pressed, tmp_path, quick, capsys):
+@pytest.mark.usefixtures("quick")
+def test_a_stage_that_moves_the_other_way_is_named(pressed, tmp_path, capsys):
     rows = np.loadtxt(pressed / "stage.csv", delimiter=",", skiprows=1)
     rows[:, 1] *= -1.0
     np.savetxt(tmp_path / "back.csv", rows, "%.6f", ",", header="time_s,displacement_mm", comments="")

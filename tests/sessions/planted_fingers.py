@@ -36,18 +36,24 @@ def law(stiffness, mu=0.0, depths=TAKEN):
     return lambda depth: np.where(depth > 0.01, np.exp(line(np.log(np.maximum(depth, 0.01)))), 0.0)
 
 
-POWER, BENT, LOUD = 1.4, 0.15, 0.05  # of depth; how contrasts change the power, and the force alone
+POWER, BENT, LOUD, WIDER = 1.4, 0.15, 0.05, 0.3  # of depth; how contrasts change power, force and contact
 
 
 def power_law_model(spread, error=1e-4):
-    """Return a model in closed form: N = 0.05 d^(POWER + BENT u0) exp(LOUD u1) N/mm for contrasts u."""
+    """Return a model in closed form: N = 0.05 d^(POWER + BENT u0) exp(LOUD u1) N/mm for contrasts u.
+
+    The contact is 5 d^0.5 exp(WIDER u1) mm long.
+    """
     depth = np.geomspace(0.05, 2.0, 9)
     orders = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
     coefficients = np.zeros((len(orders), len(depth)))
     coefficients[orders.index((0, 0))] = np.log(0.05) + POWER * np.log(depth)
     coefficients[orders.index((1, 0))] = REACH * BENT * np.log(depth)
     coefficients[orders.index((0, 1))] = REACH * LOUD
-    return PressModel(published(), spread, depth, coefficients, 0.0, error)
+    width = np.zeros((15, len(depth)))
+    width[0] = np.log(5.0) + 0.5 * np.log(depth)
+    width[1] = REACH * WIDER  # the second number: of order 1 in the second contrast
+    return PressModel(published(), spread, depth, coefficients, width, 0.0, error, np.full(len(depth), 0.01))
 
 
 def power_law(mean, contrast):
@@ -62,4 +68,7 @@ def presses(force, noise, rng, count=3, points=16, deep=1.6):
     depth = np.linspace(0.05, deep, points)
     spread = noise * force(np.array(deep))
     touches = rng.uniform(0.5, 2.0, count)
-    return [Loaded(depth + at, force(depth) + spread * rng.standard_normal(points), at + 0.03) for at in touches]
+    return [
+        Loaded(depth + at, force(depth) + spread * rng.standard_normal(points), at + 0.03, np.full(points, np.nan))
+        for at in touches
+    ]

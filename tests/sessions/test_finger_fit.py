@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planted_fingers import LOUD, PUBLISHED, law, power_law, power_law_model, presses, published
+from planted_fingers import LOUD, PUBLISHED, WIDER, law, power_law, power_law_model, presses, published
 
 from sessions.prediction.finger_fit import SPREAD, fit
 from sessions.prediction.press_model import CONTRASTS, FitError, check, press_model
@@ -37,6 +37,23 @@ def test_force_and_touch_of_a_power_law_come_back():
     given = presses(power_law(0.3, (0.8, 0.0)), 1e-4, np.random.default_rng(2))
     for touch, one in zip(found.touch, given, strict=True):
         assert touch == pytest.approx(one.touch - 0.03, abs=2e-3)  # the onset was seen 0.03 mm late
+
+
+def test_lengths_of_the_contact_tell_what_forces_leave_open():
+    """Of u1 forces say nothing; 16 lengths that are off by 1 % say log(5 d^0.5) + WIDER u1 to 0.01 / 4."""
+    given = presses(power_law(0.1, (0.5, 0.8)), 1e-4, np.random.default_rng(9), count=1)
+    depth = given[0].displacement - given[0].touch + 0.03
+    rng = np.random.default_rng(10)
+    width = 5.0 * np.sqrt(depth) * np.exp(WIDER * 0.8) * (1.0 + 0.01 * rng.standard_normal(len(depth)))
+    blind, seeing = (fit(power_law_model(SPREAD), [one]) for one in (given[0], given[0]._replace(width=width)))
+    true = power_law_model(SPREAD).stiffnesses(np.array([0.1]), np.array([[0.5, 0.8]]))[0]
+    assert seeing.widths == 16
+    for before, after, value in zip(blind.layers, seeing.layers, true, strict=True):
+        assert after.ratio < 0.2 * before.ratio
+        assert holds(after.stiffness, value)
+        assert holds(after.profile, value)
+        assert after.profile.low is not None
+        assert after.stiffness.value == pytest.approx(value, rel=0.03)
 
 
 def test_a_calibration_that_is_off_by_5_per_cent_widens_the_overall_stiffness_by_as_much():

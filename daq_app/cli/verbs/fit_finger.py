@@ -2,7 +2,8 @@
 
 The session holds presses without a slide; the log holds the displacement of the bone or the stage, positive into the
 finger. Its header has displacement_mm and one of time_s, received_ns or sequence, as readings.csv of an export calls
-them. Nothing in the session is changed. The scene written by --scene is taken by 'predict --scene' and 'solve'.
+them, and may have contact_width_mm. Nothing in the session is changed. The scene written by --scene is taken by
+'predict --scene' and 'solve'.
 """
 
 import argparse
@@ -118,8 +119,8 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     log = displacement_log(options.displacement)
     if options.shift and log.clock == "sequence":
         raise WrongValue("--shift is of times, and the log counts readings: leave it out")
-    at = log.at + options.shift * (1e9 if log.clock == "received_ns" else 1.0)
-    curves = loading_curves(recording, log.clock, at, log.displacement, settings)
+    shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
+    curves = loading_curves(recording, replace(log, at=log.at + shift), settings)
     if not curves.presses:
         why = curves.left_out[0] if curves.left_out else "It holds no press."
         raise FitError(
@@ -162,6 +163,7 @@ def _print(found: FingerFit, checked: Check, options: argparse.Namespace, consol
     console.say(
         f"overall stiffness: {number(overall.value)} of the published finger's, 95 % interval {span(low, high)}, from "
         f"{found.points} points of {len(found.touch)} presses up to {number(found.deepest)} mm"
+        + (f", and {found.widths} lengths of contact" if found.widths else "")
     )
     for one in found.layers:
         console.say(one.sentence)
