@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 from scipy.special import ndtri
 
-from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel
+from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
 from solver import Scene
 
 Array = NDArray[np.float64]
@@ -156,7 +156,7 @@ class Likelihood:
 
     def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array, Array]:
         """Return the best mean (g,) at touches, its misfit (g,), residual (g, n) and Jacobian (g, n, 1 + presses)."""
-        shape, slope = _evaluated(spline, self.displacement - touch[:, self.which])
+        shape, slope = at_depths(spline, self.displacement - touch[:, self.which])
         factor = np.maximum((shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30), 1e-6)
         force = factor[:, None] * shape
         by_touch = (-factor[:, None] * slope)[:, :, None] * self.presses.T
@@ -168,7 +168,7 @@ class Likelihood:
         if not len(self.wide):
             return np.zeros(len(contrast))
         spline = CubicSpline(np.log(self.model.depth), self.model.log_width(contrast), axis=1)
-        width, _ = _evaluated(spline, self.displacement[self.wide] - touch[:, self.which[self.wide]])
+        width, _ = at_depths(spline, self.displacement[self.wide] - touch[:, self.which[self.wide]])
         misfit = ((width - self.width) ** 2).sum(axis=1) + self.width_floor
         return np.asarray(len(self.wide) * np.log(misfit), np.float64)
 
@@ -201,7 +201,7 @@ class Likelihood:
             (log, model.slopes(contrast), self.force, np.arange(len(depth))),
             (model.log_width(contrast), model.width_slopes(contrast), self.width, self.wide),
         ):
-            value, slope = (one[0] for one in _evaluated(CubicSpline(knots, values, axis=1), depth[only][None]))
+            value, slope = (one[0] for one in at_depths(CubicSpline(knots, values, axis=1), depth[only][None]))
             by_contrast = CubicSpline(knots, slopes[0], axis=1)(np.log(np.maximum(depth[only], model.depth[0])))
             by_mean = value if values is log else np.zeros(len(only))
             parts.append(value - measured)
@@ -315,22 +315,6 @@ def _closer(told: Likelihood, grid: _Grid, name: str) -> _Grid:
         middle, half = (low + high) / 2.0 @ turned, (high - low) / 2.0
         grid = told.grid(*_nodes(centre + middle, half[:, None] * turned), grid.touch[int(weight.argmax())])
     return grid
-
-
-def _evaluated(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
-    """Return exp of a spline (g) of log depth at depths (g, n) [mm], and its derivative by depth.
-
-    Beyond its knots the logarithm goes on straight: a power law.
-    """
-    depth = np.maximum(depth, 1e-9)  # above the skin nothing presses
-    knots, log = spline.x, np.log(depth)
-    inside = np.clip(log, knots[0], knots[-1])
-    piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
-    cubic, square, line, constant = spline.c[:, piece, np.arange(len(depth))[:, None]]
-    by = inside - knots[piece]
-    slope = (3.0 * cubic * by + 2.0 * square) * by + line
-    value = np.exp(((cubic * by + square) * by + line) * by + constant + slope * (log - inside))
-    return value, value * slope / depth
 
 
 def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.prediction.finger_fit import Loaded
+from sessions.prediction.relaxation_fit import Held
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings, Stroke
 from sessions.strokes.analysis import analyse_blocks
@@ -16,6 +17,8 @@ Array = NDArray[np.float64]
 
 POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
+STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...
+SHORTEST_HOLD = 0.5  # ... for so long: what shortest press the analysis knows [s]
 LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
 
 
@@ -49,21 +52,23 @@ class LoadingCurves:
 
     presses: tuple[Loaded, ...]
     names: tuple[str, ...]  # of each press, for people
+    held: tuple[Held, ...]  # those whose stage stands for a while, from the touch to the end of that
     left_out: tuple[str, ...]  # a sentence each
 
 
 def loading_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> LoadingCurves:
     """Return the loading part of each press without a slide, in trials of every phase."""
     if recording.info is None:
-        return LoadingCurves((), (), ("No forces were recorded.",))
-    held = [record for record in recording.trials if record.take]
+        return LoadingCurves((), (), (), ("No forces were recorded.",))
+    taken = [record for record in recording.trials if record.take]
     parts = (
-        [(record.trial, recording.readings(record.trial.number)) for record in held]
+        [(record.trial, recording.readings(record.trial.number)) for record in taken]
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
     presses: list[Loaded] = []
     names: list[str] = []
+    holds: list[Held] = []
     left_out: list[str] = []
     for trial, block in parts:
         found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
@@ -81,9 +86,11 @@ def loading_curves(recording: Recording, log: StageLog, settings: AnalysisSettin
             if isinstance(loaded, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loaded}.")
             else:
+                held = _held(stroke, when, log.displacement, len(presses))
+                holds += [held] if held is not None else []
                 presses.append(loaded)
                 names.append(name)
-    return LoadingCurves(tuple(presses), tuple(names), tuple(left_out))
+    return LoadingCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
 
 
 def _holds(stroke: Stroke, instant: float) -> bool:
@@ -122,6 +129,22 @@ def _loaded(stroke: Stroke, when: Array, log: StageLog) -> Loaded | str:
     lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
     means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force, lengths)]
     return Loaded(means[0], means[1], float(travel[0]), means[2])
+
+
+def _held(stroke: Stroke, when: Array, displacement: Array, press: int) -> Held | None:
+    """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
+    curve = stroke.curve
+    assert curve is not None
+    assert stroke.onset is not None
+    finite = np.isfinite(when)
+    followed = (curve.time >= stroke.onset) & (curve.time <= when[finite][-1]) & np.isfinite(curve.normal)
+    time, force = curve.time[followed], curve.normal[followed]
+    travel = np.interp(time, when[finite], displacement[finite])
+    standing = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
+    if time[standing[-1]] - time[standing[0]] < SHORTEST_HOLD:
+        return None
+    upto = slice(0, int(standing[-1]) + 1)
+    return Held(time[upto], travel[upto], force[upto], press)
 
 
 def deepest(curves: LoadingCurves) -> float:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from sessions.prediction.solving import settled
 from solver import Cancelled, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
@@ -65,6 +66,17 @@ class PressModel:
     def width_slopes(self, contrast: Array) -> Array:
         """Return how that changes with both contrasts (g, 2, k)."""
         return np.stack([part @ self.width for part in _basis(contrast, DEGREE_OF_WIDTH)[1:]], axis=1)
+
+    def force(self, stiffness: Array, depth: Array) -> Array:
+        """Return N (n,) [N] of the whole finger with layers of a `stiffness` (3,) [MPa] at depths (n,) [mm]."""
+        mean, contrast = self.place(stiffness)
+        log = self.log_force(contrast[None]) + mean + np.log(self.scene.finger.width)
+        return at_depths(CubicSpline(np.log(self.depth), log, axis=1), depth[None])[0][0]
+
+    def place(self, stiffness: Array) -> tuple[float, Array]:
+        """Return the mean log factor and the contrast (2,) of a `stiffness` (3,) [MPa]."""
+        log = np.log(stiffness) - np.log([self.scene.materials.of(name).E for name in LAYERS])
+        return float(log.mean()), CONTRASTS @ log / self.spread
 
     def stiffnesses(self, mean: Array, contrast: Array) -> Array:
         """Return each layer's stiffness (g, 3) [MPa] for mean log factors (g,) and contrasts (g, 2)."""
@@ -142,14 +154,30 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     Raises FitError.
     """
     finger = model.finger(stiffness)
-    log = np.log(stiffness) - np.log([model.scene.materials.of(name).E for name in LAYERS])
+    mean, contrast = model.place(stiffness)
     upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]
     depth = model.depth[upto]
-    fitted = model.log_force((CONTRASTS @ log / model.spread)[None])[0, upto] + log.mean()
+    fitted = model.log_force(contrast[None])[0, upto] + mean
     free = _pressed(finger, depth, 0.0)
     rubbed = _pressed(finger, depth, model.mu) if model.mu else free
     missed = np.abs(np.exp(fitted) / np.array([one.normal_force for one in rubbed]) - 1.0)
     return Check(float(missed.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
+
+
+def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
+    """Return exp of a spline (g) of log depth at depths (g, n) [mm], and its derivative by depth.
+
+    Beyond its knots the logarithm goes on straight: a power law.
+    """
+    depth = np.maximum(depth, 1e-9)  # above the skin nothing presses
+    knots, log = spline.x, np.log(depth)
+    inside = np.clip(log, knots[0], knots[-1])
+    piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    cubic, square, line, constant = spline.c[:, piece, np.arange(len(depth))[:, None]]
+    by = inside - knots[piece]
+    slope = (3.0 * cubic * by + 2.0 * square) * by + line
+    value = np.exp(((cubic * by + square) * by + line) * by + constant + slope * (log - inside))
+    return value, value * slope / depth
 
 
 def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:

@@ -42,7 +42,7 @@ def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict
     out = tmp_path / "own.toml"
     words = ["fit-finger", str(pressed / "session"), "--displacement", str(pressed / "stage.csv"), "--mu", "0"]
     capsys.readouterr()
-    assert run([*words, "--scene", str(out), "--json"]) == 0
+    assert run([*words, "--relaxation", "--scene", str(out), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert len(told["presses"]) == 3
     for layer, true in zip(told["layers"], PLANTED, strict=True):
@@ -50,6 +50,7 @@ def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict
     for touch in told["touch"]:
         assert touch == pytest.approx(TOUCH, abs=0.05)
     assert told["check"]["missed"] < 0.02
+    assert told["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
     scene, _ = finger_in(out)
     depth = np.array([0.4, 0.8, 1.1])
     own = law([scene.materials.of(name).E for name in ("epidermis", "dermis", "fat")], depths=depth)

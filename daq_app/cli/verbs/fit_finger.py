@@ -9,6 +9,7 @@ them, and may have contact_width_mm. Nothing in the session is changed. The scen
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from sessions.prediction.finger_fit import FingerFit, Interval, fit
 from sessions.prediction.loading_curves import LoadingCurves, deepest, loading_curves
 from sessions.prediction.options import template
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
+from sessions.prediction.relaxation_fit import RelaxationFit, relaxation
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings
 from sessions.toml_file import toml_text
+from solver import Scene
 
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
 MU, FACTOR = 0.5, 2.0  # usual ones
@@ -56,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FACTOR",
         help=f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)",
     )
+    parser.add_argument(
+        "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of the posterior's draws (0)")
     parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
     add_calibration(parser)
@@ -74,14 +80,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     curves = _curves(options, recording, settings)
     for sentence in curves.left_out:
         console.note(sentence)
-    found, checked = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
+    found = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
     if options.scene is not None:
         head = f"# {simulated}\n" if simulated else ""
-        try:
-            write_whole(options.scene, (head + toml_text(found.scene)).encode())
-        except OSError as error:
-            raise WrongValue(f"--scene {options.scene} cannot be written ({error.strerror})") from error
+        write_whole(options.scene, (head + toml_text(found.scene)).encode())
     assumed = {
         "mu": options.mu,
         "prior_factor": options.prior,
@@ -89,21 +92,35 @@ def run(options: argparse.Namespace, console: Console) -> int:
         "width": found.scene.finger.width,
         "seed": options.seed,
     }
-    check = {"missed": checked.missed, "shares": dict(zip(LAYERS, checked.shares.tolist(), strict=True))}
+    shares = dict(zip(LAYERS, found.check.shares.tolist(), strict=True))
     console.result(
         {
             **({"simulated": "SIMULATED"} if simulated else {}),
-            **found.to_dict(),
+            **found.fit.to_dict(),
+            **({} if found.relaxation is None else {"relaxation": found.relaxation.to_dict()}),
             "presses": list(curves.names),
             "left_out": list(curves.left_out),
-            "check": check,
+            "check": {"missed": found.check.missed, "shares": shares},
             "assumed": assumed,
         }
     )
     if simulated:
         console.say(simulated)
-    _print(found, checked, options, console)
-    return FLAWED if curves.left_out or checked.missed > AGREE else DONE
+    _print(found, options, console)
+    return FLAWED if curves.left_out or found.check.missed > AGREE else DONE
+
+
+class _Found(NamedTuple):
+    """What came of the presses."""
+
+    fit: FingerFit
+    check: Check
+    relaxation: RelaxationFit | None
+
+    @property
+    def scene(self) -> Scene:
+        """The finger found."""
+        return self.fit.scene if self.relaxation is None else self.relaxation.relaxing(self.fit.scene)
 
 
 def _check_values(options: argparse.Namespace) -> None:
@@ -112,6 +129,8 @@ def _check_values(options: argparse.Namespace) -> None:
     for name, (low, high) in ranges.items():
         if not low <= getattr(options, name) <= high:
             raise WrongValue(f"--{name} {getattr(options, name)} is not allowed: {low:g} to {high:g}")
+    if options.scene is not None and not options.scene.parent.is_dir():
+        raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
 
 
 def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> LoadingCurves:
@@ -132,8 +151,10 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
 
 def _fitted(
     options: argparse.Namespace, plan: SessionPlan, curves: LoadingCurves, gain_error: float, console: Console
-) -> tuple[FingerFit, Check]:
+) -> _Found:
     """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
+    if options.relaxation and not curves.held:
+        raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
     given, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=given), plan))
 
@@ -143,10 +164,12 @@ def _fitted(
 
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, shown)
     found = fit(model, curves.presses, gain_error, options.seed)
-    return found, check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
+    own = check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
+    return _Found(found, own, relaxation(model, found, curves.held) if options.relaxation else None)
 
 
-def _print(found: FingerFit, checked: Check, options: argparse.Namespace, console: Console) -> None:
+def _print(told: _Found, options: argparse.Namespace, console: Console) -> None:
+    found, checked = told.fit, told.check
     rows = [
         [
             one.name,
@@ -167,17 +190,24 @@ def _print(found: FingerFit, checked: Check, options: argparse.Namespace, consol
     )
     for one in found.layers:
         console.say(one.sentence)
+    if told.relaxation is not None:
+        part, time = told.relaxation.part, told.relaxation.time
+        console.say(
+            f"relaxation: part {part.value:.2f} (95 % {_ends(part, 1.0)}), time {number(time.value)} s "
+            f"(95 % {_ends(time, 1.0)}); at once {number(told.relaxation.at_once)} times as stiff as above"
+        )
+        console.say(told.relaxation.sentence)
     console.say(
         f"Assumed: friction {options.mu:g}, width {found.scene.finger.width:g} mm, a prior of a factor "
         f"{options.prior:g}. Stiffness is that at the presses' own speed, and grows with the width assumed."
     )
-    told = "agree with" if checked.missed <= AGREE else "DIFFER from"
-    console.say(f"The solver's own forces {told} those fitted: by {100 * checked.missed:.1g} % at most.")
+    agree = "agree with" if checked.missed <= AGREE else "DIFFER from"
+    console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.missed:.1g} % at most.")
     if options.scene is not None:
         console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
 
 
-def _ends(one: Interval) -> str:
-    """Return an interval of stiffness in kPa."""
-    low, high = ("open" if end is None else number(1e3 * end) for end in (one.low, one.high))
+def _ends(one: Interval, unit: float = 1e-3) -> str:
+    """Return an interval in a unit, kPa for stiffness."""
+    low, high = ("open" if end is None else number(end / unit) for end in (one.low, one.high))
     return f"{low} to {high}"
