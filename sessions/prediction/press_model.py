@@ -27,7 +27,7 @@ REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-d
 DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
 RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
 DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives nobody has: 15 numbers
-DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 3 to 13 % over contrasts and depths
+DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 2 to 13 % over contrasts and depths
 RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
 DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
 CHECKED = 4  # depths at which a fitted finger is solved
@@ -89,9 +89,11 @@ class PressModel:
             yield self.finger(stiffness)
 
     def finger(self, stiffness: Array) -> Scene:
-        """Return the scene with layers of a `stiffness` (3,) [MPa]."""
+        """Return the scene with layers of a `stiffness` (3,) [MPa], that at the speed of the presses: none relaxes."""
         made = self.scene.materials
-        layers = {name: replace(made.of(name), E=float(one)) for name, one in zip(LAYERS, stiffness, strict=True)}
+        layers = {
+            name: replace(made.of(name), E=float(one), prony=()) for name, one in zip(LAYERS, stiffness, strict=True)
+        }
         return replace(self.scene, materials=replace(made, **layers))
 
 
@@ -105,8 +107,8 @@ def press_model(
     """
     depth = np.geomspace(SHALLOWEST * deepest, deepest, DEPTHS)
     contrast = _design(RINGS)
-    rubbed = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
-    count = len(contrast) + len(rubbed)
+    sticking = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
+    count = len(contrast) + len(sticking)
     force, width, slope = (np.empty((len(contrast), *more, DEPTHS)) for more in ((), (), (2,)))
     errors: list[float] = []
     wide = np.zeros(DEPTHS)
@@ -123,18 +125,18 @@ def press_model(
     basis = np.vstack(_basis(contrast, DEGREE))
     known = np.vstack([force, slope[:, 0], slope[:, 1]])
     coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
-    missed = basis[: len(contrast)] @ coefficients - force
+    residual = basis[: len(contrast)] @ coefficients - force
     if mu:
-        more = np.empty((len(rubbed), DEPTHS))
-        for at, finger in enumerate(blank.fingers(rubbed)):
+        more = np.empty((len(sticking), DEPTHS))
+        for at, finger in enumerate(blank.fingers(sticking)):
             _report(progress, (len(contrast) + at) / count)
             more[at] = np.log([one.normal_force for one in _pressed(finger, depth, mu)])
-        more -= _basis(rubbed, DEGREE)[0] @ coefficients
-        basis = _basis(rubbed, DEGREE_OF_FRICTION)[0]
+        more -= _basis(sticking, DEGREE)[0] @ coefficients
+        basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
         friction = np.linalg.lstsq(basis, more, rcond=None)[0]
-        missed = np.vstack([missed, basis @ friction - more])
+        residual = np.vstack([residual, basis @ friction - more])
         coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
-    error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(missed**2))))
+    error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(residual**2))))
     basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
     of_width = np.linalg.lstsq(basis, width, rcond=None)[0]
     wide = np.hypot(wide, np.sqrt(np.mean((basis @ of_width - width) ** 2, axis=0)))
@@ -144,7 +146,7 @@ def press_model(
 class Check(NamedTuple):
     """What the solver itself says of a finger that was fitted."""
 
-    missed: float  # the fitted model's forces differ from the solver's own by, at most [-]
+    deviation: float  # the fitted model's forces differ from the solver's own by, at most [-]
     shares: Array  # (3,) d log N / d log E of each layer at the deepest press, without friction [-]
 
 
@@ -159,9 +161,9 @@ def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
     depth = model.depth[upto]
     fitted = model.log_force(contrast[None])[0, upto] + mean
     free = _pressed(finger, depth, 0.0)
-    rubbed = _pressed(finger, depth, model.mu) if model.mu else free
-    missed = np.abs(np.exp(fitted) / np.array([one.normal_force for one in rubbed]) - 1.0)
-    return Check(float(missed.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
+    sticking = _pressed(finger, depth, model.mu) if model.mu else free
+    deviation = np.abs(np.exp(fitted) / np.array([one.normal_force for one in sticking]) - 1.0)
+    return Check(float(deviation.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
 
 
 def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:

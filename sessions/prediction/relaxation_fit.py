@@ -31,7 +31,7 @@ LONGEST = 10.0  # relaxation times are tried from a block to so many times the l
 FEWEST = 10  # blocks beyond the numbers that are looked for
 
 
-class Held(NamedTuple):
+class HoldCurve(NamedTuple):
     """One press from its touch to the end of its hold: n readings."""
 
     time: Array  # (n,) [s]
@@ -66,7 +66,7 @@ class RelaxationFit:
         return replace(scene, materials=replace(scene.materials, **made))
 
 
-def relaxation(model: PressModel, found: FingerFit, presses: Sequence[Held]) -> RelaxationFit:
+def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
     """Return how a finger relaxes in presses that are held.
 
     g is equally likely from 0 to 0.95 before, tau equally likely in its logarithm; a and the noise are integrated in
@@ -100,7 +100,7 @@ def relaxation(model: PressModel, found: FingerFit, presses: Sequence[Held]) -> 
 
 
 def _posterior(
-    presses: Sequence[Held], elastic: Sequence[Array], parts: Array, times: Array, error: float
+    presses: Sequence[HoldCurve], elastic: Sequence[Array], parts: Array, times: Array, error: float
 ) -> tuple[Array, Array]:
     """Return the log posterior (g, t) of parts (g,) and times (t,), and the stiffness at once that fits best (g, t).
 

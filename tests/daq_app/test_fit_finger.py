@@ -49,7 +49,7 @@ def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict
         assert layer["stiffness"]["low"] < true < layer["stiffness"]["high"]
     for touch in told["touch"]:
         assert touch == pytest.approx(TOUCH, abs=0.05)
-    assert told["check"]["missed"] < 0.02
+    assert told["check"]["deviation"] < 0.02
     assert told["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
     scene, _ = finger_in(out)
     depth = np.array([0.4, 0.8, 1.1])

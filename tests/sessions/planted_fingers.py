@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sessions.prediction.finger_fit import Loaded
+from sessions.prediction.finger_fit import LoadingCurve
 from sessions.prediction.press_model import DEGREE, REACH, PressModel
 from solver import Friction, Loading, Material, Materials, Scene, Solve, solve_many
 
@@ -69,6 +69,8 @@ def presses(force, noise, rng, count=3, points=16, deep=1.6):
     spread = noise * force(np.array(deep))
     touches = rng.uniform(0.5, 2.0, count)
     return [
-        Loaded(depth + at, force(depth) + spread * rng.standard_normal(points), at + 0.03, np.full(points, np.nan))
+        LoadingCurve(
+            depth + at, force(depth) + spread * rng.standard_normal(points), at + 0.03, np.full(points, np.nan)
+        )
         for at in touches
     ]

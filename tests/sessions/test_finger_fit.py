@@ -134,7 +134,7 @@ def test_planted_layers_lie_in_their_intervals_and_the_force_in_between_within_5
         assert holds(one.profile, true)
     depth = np.array([0.3, 0.7, 1.1, 1.5])
     np.testing.assert_allclose(law(best)(depth), planted(depth), rtol=0.05)
-    assert check(model, best, 1.6).missed < 0.02
+    assert check(model, best, 1.6).deviation < 0.02
 
 
 @pytest.mark.slow

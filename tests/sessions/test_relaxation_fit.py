@@ -8,7 +8,7 @@ from planted_fingers import PUBLISHED, law, power_law, power_law_model, presses,
 
 from sessions.prediction.finger_fit import SPREAD, fit
 from sessions.prediction.press_model import FitError
-from sessions.prediction.relaxation_fit import Held, relaxation
+from sessions.prediction.relaxation_fit import HoldCurve, relaxation
 from solver import Friction, Loading, Relaxation, Solve, solve
 
 RATE, DEEP = 200.0, 1.5  # [Hz], [mm]
@@ -38,7 +38,7 @@ def held(elastic, press, part, tau, rng, rise=0.5, hold=3.0, size=1.0):
         gone = 1.0 - np.exp(-(now - s) / tau)
         force[at] = size * (e[-1] - part * np.sum((gone[1:] + gone[:-1]) / 2.0 * np.diff(e)))
     depth = DEEP * np.minimum(time / rise, 1.0)
-    return Held(time, depth + elastic.touch[press], force + 0.005 * rng.standard_normal(len(time)), press)
+    return HoldCurve(time, depth + elastic.touch[press], force + 0.005 * rng.standard_normal(len(time)), press)
 
 
 @pytest.mark.parametrize(("part", "tau"), [(0.4, 0.8), (0.2, 0.3)])

@@ -21,8 +21,8 @@ from sessions.exchange.displacement_log import displacement_log
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.finger_fit import FingerFit, Interval, fit
-from sessions.prediction.loading_curves import LoadingCurves, deepest, loading_curves
 from sessions.prediction.options import template
+from sessions.prediction.press_curves import PressCurves, deepest, press_curves
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
 from sessions.prediction.relaxation_fit import RelaxationFit, relaxation
 from sessions.recording import Recording
@@ -100,17 +100,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
             **({} if found.relaxation is None else {"relaxation": found.relaxation.to_dict()}),
             "presses": list(curves.names),
             "left_out": list(curves.left_out),
-            "check": {"missed": found.check.missed, "shares": shares},
+            "check": {"deviation": found.check.deviation, "shares": shares},
             "assumed": assumed,
         }
     )
     if simulated:
         console.say(simulated)
     _print(found, options, console)
-    return FLAWED if curves.left_out or found.check.missed > AGREE else DONE
+    return FLAWED if curves.left_out or found.check.deviation > AGREE else DONE
 
 
-class _Found(NamedTuple):
+class _Outcome(NamedTuple):
     """What came of the presses."""
 
     fit: FingerFit
@@ -133,13 +133,13 @@ def _check_values(options: argparse.Namespace) -> None:
         raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
 
 
-def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> LoadingCurves:
+def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> PressCurves:
     """Return the presses that the log follows. Raises FitError where there is none, ImportRefused."""
     log = displacement_log(options.displacement)
     if options.shift and log.clock == "sequence":
         raise WrongValue("--shift is of times, and the log counts readings: leave it out")
     shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
-    curves = loading_curves(recording, replace(log, at=log.at + shift), settings)
+    curves = press_curves(recording, replace(log, at=log.at + shift), settings)
     if not curves.presses:
         why = curves.left_out[0] if curves.left_out else "It holds no press."
         raise FitError(
@@ -150,10 +150,10 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
 
 
 def _fitted(
-    options: argparse.Namespace, plan: SessionPlan, curves: LoadingCurves, gain_error: float, console: Console
-) -> _Found:
+    options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
+) -> _Outcome:
     """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
-    if options.relaxation and not curves.held:
+    if options.relaxation and not curves.holds:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
     given, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=given), plan))
@@ -165,11 +165,11 @@ def _fitted(
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, shown)
     found = fit(model, curves.presses, gain_error, options.seed)
     own = check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
-    return _Found(found, own, relaxation(model, found, curves.held) if options.relaxation else None)
+    return _Outcome(found, own, relaxation(model, found, curves.holds) if options.relaxation else None)
 
 
-def _print(told: _Found, options: argparse.Namespace, console: Console) -> None:
-    found, checked = told.fit, told.check
+def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
+    found, checked = outcome.fit, outcome.check
     rows = [
         [
             one.name,
@@ -190,19 +190,19 @@ def _print(told: _Found, options: argparse.Namespace, console: Console) -> None:
     )
     for one in found.layers:
         console.say(one.sentence)
-    if told.relaxation is not None:
-        part, time = told.relaxation.part, told.relaxation.time
+    if outcome.relaxation is not None:
+        part, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(
             f"relaxation: part {part.value:.2f} (95 % {_ends(part, 1.0)}), time {number(time.value)} s "
-            f"(95 % {_ends(time, 1.0)}); at once {number(told.relaxation.at_once)} times as stiff as above"
+            f"(95 % {_ends(time, 1.0)}); at once {number(outcome.relaxation.at_once)} times as stiff as above"
         )
-        console.say(told.relaxation.sentence)
+        console.say(outcome.relaxation.sentence)
     console.say(
         f"Assumed: friction {options.mu:g}, width {found.scene.finger.width:g} mm, a prior of a factor "
         f"{options.prior:g}. Stiffness is that at the presses' own speed, and grows with the width assumed."
     )
-    agree = "agree with" if checked.missed <= AGREE else "DIFFER from"
-    console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.missed:.1g} % at most.")
+    agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"
+    console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.deviation:.1g} % at most.")
     if options.scene is not None:
         console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
 

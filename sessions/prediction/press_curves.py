@@ -7,8 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction.finger_fit import Loaded
-from sessions.prediction.relaxation_fit import Held
+from sessions.prediction.finger_fit import LoadingCurve
+from sessions.prediction.relaxation_fit import HoldCurve
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings, Stroke
 from sessions.strokes.analysis import analyse_blocks
@@ -47,28 +47,28 @@ class StageLog(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class LoadingCurves:
+class PressCurves:
     """The presses that a log follows, and why others are left out."""
 
-    presses: tuple[Loaded, ...]
+    presses: tuple[LoadingCurve, ...]
     names: tuple[str, ...]  # of each press, for people
-    held: tuple[Held, ...]  # those whose stage stands for a while, from the touch to the end of that
+    holds: tuple[HoldCurve, ...]  # those whose stage stands for a while, from the touch to the end of that
     left_out: tuple[str, ...]  # a sentence each
 
 
-def loading_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> LoadingCurves:
+def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> PressCurves:
     """Return the loading part of each press without a slide, in trials of every phase."""
     if recording.info is None:
-        return LoadingCurves((), (), (), ("No forces were recorded.",))
+        return PressCurves((), (), (), ("No forces were recorded.",))
     taken = [record for record in recording.trials if record.take]
     parts = (
         [(record.trial, recording.readings(record.trial.number)) for record in taken]
         if recording.plan.blocks
         else [(None, recording.readings())]
     )
-    presses: list[Loaded] = []
+    presses: list[LoadingCurve] = []
     names: list[str] = []
-    holds: list[Held] = []
+    holds: list[HoldCurve] = []
     left_out: list[str] = []
     for trial, block in parts:
         found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
@@ -82,22 +82,22 @@ def loading_curves(recording: Recording, log: StageLog, settings: AnalysisSettin
                 continue
             name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
             when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
-            loaded = _loaded(stroke, when, log)
-            if isinstance(loaded, str):
-                left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loaded}.")
+            loading = _loading(stroke, when, log)
+            if isinstance(loading, str):
+                left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
             else:
-                held = _held(stroke, when, log.displacement, len(presses))
-                holds += [held] if held is not None else []
-                presses.append(loaded)
+                hold = _hold(stroke, when, log.displacement, len(presses))
+                holds += [] if hold is None else [hold]
+                presses.append(loading)
                 names.append(name)
-    return LoadingCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
+    return PressCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
 
 
 def _holds(stroke: Stroke, instant: float) -> bool:
     return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
 
 
-def _loaded(stroke: Stroke, when: Array, log: StageLog) -> Loaded | str:
+def _loading(stroke: Stroke, when: Array, log: StageLog) -> LoadingCurve | str:
     """Return the loading of a press whose log has its rows at instants `when` (n,) [s]; or why there is none."""
     curve = stroke.curve
     assert curve is not None
@@ -128,10 +128,10 @@ def _loaded(stroke: Stroke, when: Array, log: StageLog) -> Loaded | str:
     some = count > 0
     lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
     means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force, lengths)]
-    return Loaded(means[0], means[1], float(travel[0]), means[2])
+    return LoadingCurve(means[0], means[1], float(travel[0]), means[2])
 
 
-def _held(stroke: Stroke, when: Array, displacement: Array, press: int) -> Held | None:
+def _hold(stroke: Stroke, when: Array, displacement: Array, press: int) -> HoldCurve | None:
     """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
     curve = stroke.curve
     assert curve is not None
@@ -144,9 +144,9 @@ def _held(stroke: Stroke, when: Array, displacement: Array, press: int) -> Held 
     if time[standing[-1]] - time[standing[0]] < SHORTEST_HOLD:
         return None
     upto = slice(0, int(standing[-1]) + 1)
-    return Held(time[upto], travel[upto], force[upto], press)
+    return HoldCurve(time[upto], travel[upto], force[upto], press)
 
 
-def deepest(curves: LoadingCurves) -> float:
+def deepest(curves: PressCurves) -> float:
     """Return the greatest travel of any press [mm]."""
     return max(float(one.displacement.max() - one.touch) for one in curves.presses)
