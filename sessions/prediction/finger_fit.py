@@ -22,6 +22,7 @@ from solver import Scene
 Array = NDArray[np.float64]
 
 SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 % within a factor of 3.9 either way
+POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 # Halving and doubling these moved ends of intervals by so much of their width, over twelve planted fingers.
 DRAWS = 20_000  # of the posterior: 0.2 % in the median
@@ -41,6 +42,17 @@ class LoadingCurve(NamedTuple):
     force: Array  # (n,) normal [N]
     touch: float  # displacement at which the force leaves its zero [mm]
     width: Array  # (n,) length of the contact along the finger [mm]; nan where nobody measured it
+    readings: int = 0  # that the points are means of
+
+    @staticmethod
+    def of(displacement: Array, force: Array, width: Array) -> "LoadingCurve":
+        """Return the means of readings (m,) over as many equal parts of their travel as a curve has points."""
+        edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), POINTS + 1)
+        which = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, POINTS - 1)
+        count = np.bincount(which, minlength=POINTS)
+        some = count > 0
+        means = [np.bincount(which, one, POINTS)[some] / count[some] for one in (displacement, force, width)]
+        return LoadingCurve(means[0], means[1], float(displacement[0]), means[2], len(displacement))
 
 
 class Interval(NamedTuple):

@@ -15,7 +15,6 @@ from sessions.strokes.analysis import analyse_blocks
 
 Array = NDArray[np.float64]
 
-POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
 STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...
 SHORTEST_HOLD = 0.5  # ... for so long: what shortest press the analysis knows [s]
@@ -52,7 +51,7 @@ class PressCurves:
 
     presses: tuple[LoadingCurve, ...]
     names: tuple[str, ...]  # of each press, for people
-    holds: tuple[HoldCurve, ...]  # those whose stage stands for a while, from the touch to the end of that
+    holds: tuple[HoldCurve | None, ...]  # each press to the end of its hold; None where its stage does not stand
     left_out: tuple[str, ...]  # a sentence each
 
 
@@ -68,7 +67,7 @@ def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings
     )
     presses: list[LoadingCurve] = []
     names: list[str] = []
-    holds: list[HoldCurve] = []
+    holds: list[HoldCurve | None] = []
     left_out: list[str] = []
     for trial, block in parts:
         found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
@@ -86,8 +85,7 @@ def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings
             if isinstance(loading, str):
                 left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
             else:
-                hold = _hold(stroke, when, log.displacement, len(presses))
-                holds += [] if hold is None else [hold]
+                holds.append(_hold(stroke, when, log.displacement))
                 presses.append(loading)
                 names.append(name)
     return PressCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
@@ -122,16 +120,11 @@ def _loading(stroke: Stroke, when: Array, log: StageLog) -> LoadingCurve | str:
             f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
             "mm is no press: displacement must be positive into the finger, on the session's clock"
         )
-    edges: Array = np.linspace(float(travel[0]), float(travel[-1]), POINTS + 1)
-    which = np.clip(np.searchsorted(edges, travel, side="right") - 1, 0, POINTS - 1)
-    count = np.bincount(which, minlength=POINTS)
-    some = count > 0
     lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
-    means = [np.bincount(which, values, POINTS)[some] / count[some] for values in (travel, force, lengths)]
-    return LoadingCurve(means[0], means[1], float(travel[0]), means[2])
+    return LoadingCurve.of(travel, force, lengths)
 
 
-def _hold(stroke: Stroke, when: Array, displacement: Array, press: int) -> HoldCurve | None:
+def _hold(stroke: Stroke, when: Array, displacement: Array) -> HoldCurve | None:
     """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
     curve = stroke.curve
     assert curve is not None
@@ -144,7 +137,7 @@ def _hold(stroke: Stroke, when: Array, displacement: Array, press: int) -> HoldC
     if time[standing[-1]] - time[standing[0]] < SHORTEST_HOLD:
         return None
     upto = slice(0, int(standing[-1]) + 1)
-    return HoldCurve(time[upto], travel[upto], force[upto], press)
+    return HoldCurve(time[upto], travel[upto], force[upto])
 
 
 def deepest(curves: PressCurves) -> float:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval
+from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval, LoadingCurve, fit
 from sessions.prediction.press_model import LAYERS, FitError, PressModel
 from solver import Relaxation, Scene
 
@@ -25,6 +25,7 @@ BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, th
 TRIED = 60  # of each number at once, between bounds that are drawn closer ...
 ROUNDS = 5  # ... so many times at most, until ...
 FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
+TURNS, AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
 LEAST_PART = 0.01  # a part that may be less is not told from none [-]
 LARGEST_PART = 0.95  # a scene allows 0.99 [-]
 LONGEST = 10.0  # relaxation times are tried from a block to so many times the longest hold
@@ -37,7 +38,24 @@ class HoldCurve(NamedTuple):
     time: Array  # (n,) [s]
     displacement: Array  # (n,) as the log has it [mm]
     force: Array  # (n,) normal [N]
-    press: int  # which of the presses that were fitted
+
+    @property
+    def fall(self) -> float:
+        """By how much the force falls from its greatest to the end, in means over a block, by the greatest [-]."""
+        force = _means(np.floor((self.time - self.time[0]) / BLOCK).astype(np.int64), self.force)
+        return float(1.0 - force[-1] / force.max())
+
+    def at_once(self, part: float, tau: float) -> "HoldCurve":
+        """Return the press with the forces that it would have had if nothing had relaxed since its touch."""
+        out = np.empty(len(self.force))
+        out[0] = after = self.force[0]
+        for at in range(1, len(out)):
+            by = float(self.time[at] - self.time[at - 1]) / tau
+            kept, grown = np.exp(-by), -np.expm1(-by) / by
+            rest = self.force[at] - part * (kept * after - grown * out[at - 1])
+            out[at] = rest / (1.0 - part + part * grown)
+            after = kept * after + grown * (out[at] - out[at - 1])
+        return self._replace(force=out)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +84,40 @@ class RelaxationFit:
         return replace(scene, materials=replace(scene.materials, **made))
 
 
+def relaxing_fit(
+    model: PressModel,
+    presses: Sequence[LoadingCurve],
+    holds: Sequence[HoldCurve],
+    gain_error: float = 0.0,
+    seed: int = 0,
+) -> tuple[FingerFit, RelaxationFit]:
+    """Return the stiffnesses at once of a finger that relaxes, and how it does, from presses that are all held.
+
+    A press is too slow to be elastic, and what relaxes on its way bends the force over depth. So both are found in
+    turns: the relaxation for the finger, and the finger for forces out of which the relaxation was taken. Raises
+    FitError where no press is held.
+    """
+    found = fit(model, presses, gain_error, seed)
+    rate = relaxation(model, found, holds)
+    for _ in range(TURNS):
+        before = rate.part.value
+        calm = [
+            one._replace(force=_rebinned(one, hold.at_once(rate.part.value, rate.time.value)))
+            for one, hold in zip(presses, holds, strict=True)
+        ]
+        found = fit(model, calm, gain_error, seed)
+        rate = relaxation(model, found, holds)
+        if abs(rate.part.value - before) < AGREED:
+            break
+    return found, rate
+
+
+def _rebinned(press: LoadingCurve, hold: HoldCurve) -> Array:
+    """Return the forces (n,) of a hold's readings on its way, as the points of a press have them."""
+    way = slice(0, press.readings)
+    return LoadingCurve.of(hold.displacement[way], hold.force[way], np.zeros(press.readings)).force
+
+
 def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
     """Return how a finger relaxes in presses that are held.
 
@@ -75,7 +127,9 @@ def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]
     if not presses:
         raise FitError("No press is held: let the stage stand for half a second or more before it lifts.")
     stiffness = np.array([found.scene.materials.of(name).E for name in LAYERS])
-    elastic = [model.force(stiffness, one.displacement - found.touch[one.press]) for one in presses]
+    elastic = [
+        model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, found.touch, strict=True)
+    ]
     limits = (0.0, LARGEST_PART), (BLOCK, LONGEST * max(float(np.ptp(one.time)) for one in presses))
     bounds, rounds = limits, 0
     while True:

@@ -24,7 +24,7 @@ from sessions.prediction.finger_fit import FingerFit, Interval, fit
 from sessions.prediction.options import template
 from sessions.prediction.press_curves import PressCurves, deepest, press_curves
 from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
-from sessions.prediction.relaxation_fit import RelaxationFit, relaxation
+from sessions.prediction.relaxation_fit import RelaxationFit, relaxing_fit
 from sessions.recording import Recording
 from sessions.strokes import AnalysisSettings
 from sessions.toml_file import toml_text
@@ -33,6 +33,7 @@ from solver import Scene
 EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
 MU, FACTOR = 0.5, 2.0  # usual ones
 DEEPER = 1.1  # the model goes so much deeper than the stage, should the finger be touched before its onset is seen [-]
+FALL = 0.05  # of the force in a hold, from which on relaxing is named [-]
 AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones before that is a flaw [-]
 
 
@@ -78,7 +79,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if gain_error is not None:
         settings = replace(settings, gain_error=gain_error)
     curves = _curves(options, recording, settings)
-    for sentence in curves.left_out:
+    flaws = [*curves.left_out, *([] if options.relaxation else _relaxes(curves))]
+    for sentence in flaws:
         console.note(sentence)
     found = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
@@ -99,7 +101,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             **found.fit.to_dict(),
             **({} if found.relaxation is None else {"relaxation": found.relaxation.to_dict()}),
             "presses": list(curves.names),
-            "left_out": list(curves.left_out),
+            "flaws": flaws,
             "check": {"deviation": found.check.deviation, "shares": shares},
             "assumed": assumed,
         }
@@ -107,7 +109,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if simulated:
         console.say(simulated)
     _print(found, options, console)
-    return FLAWED if curves.left_out or found.check.deviation > AGREE else DONE
+    return FLAWED if flaws or found.check.deviation > AGREE else DONE
 
 
 class _Outcome(NamedTuple):
@@ -149,11 +151,23 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     return curves
 
 
+def _relaxes(curves: PressCurves) -> list[str]:
+    """Say where the finger relaxes in a hold, which bends its force over depth."""
+    fall = max((one.fall for one in curves.holds if one is not None), default=0.0)
+    if fall <= FALL:
+        return []
+    return [
+        f"The force falls by {100.0 * fall:.0f} % while the stage stands: the finger relaxes, which bends its force on "
+        "the way down too, and layers are off by more than their intervals. Ask for --relaxation."
+    ]
+
+
 def _fitted(
     options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
 ) -> _Outcome:
     """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
-    if options.relaxation and not curves.holds:
+    held = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
+    if options.relaxation and not held:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
     given, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=given), plan))
@@ -163,9 +177,12 @@ def _fitted(
         return True
 
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, shown)
-    found = fit(model, curves.presses, gain_error, options.seed)
+    if options.relaxation:
+        found, rate = relaxing_fit(model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed)
+    else:
+        found, rate = fit(model, curves.presses, gain_error, options.seed), None
     own = check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
-    return _Outcome(found, own, relaxation(model, found, curves.holds) if options.relaxation else None)
+    return _Outcome(found, own, rate)
 
 
 def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
@@ -194,12 +211,12 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         part, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(
             f"relaxation: part {part.value:.2f} (95 % {_ends(part, 1.0)}), time {number(time.value)} s "
-            f"(95 % {_ends(time, 1.0)}); at once {number(outcome.relaxation.at_once)} times as stiff as above"
+            f"(95 % {_ends(time, 1.0)}); the stiffness above is that at once"
         )
         console.say(outcome.relaxation.sentence)
     console.say(
         f"Assumed: friction {options.mu:g}, width {found.scene.finger.width:g} mm, a prior of a factor "
-        f"{options.prior:g}. Stiffness is that at the presses' own speed, and grows with the width assumed."
+        f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
     )
     agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"
     console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.deviation:.1g} % at most.")
