@@ -24,6 +24,7 @@ VERBS = {
     "analyse": "find the strokes of a session and their friction",
     "decide": "record what a person decides about a stroke, or undo it",
     "predict": "predict the receptor's strain-energy density for each trial",
+    "fit-finger": "fit the stiffnesses of a subject's own finger to presses of known displacement",
     "solve": "run the solver on a scene file",
     "sensitivity": "tell which of a scene's numbers moves the SED, or on which fingers a response keeps its sign",
     "accuracy": "measure how fast the solver is and how true, on this machine, as one page",
@@ -55,8 +56,9 @@ _FAILED = (
     "drivers.transducer.SetupError",
     "sessions.exchange.ExportError",
     "sessions.report.html.ReportError",
-    "sessions.exchange.import_csv.ImportRefused",
+    "sessions.exchange.csv_rows.ImportRefused",
     "sessions.plan.plan.Blinded",
+    "sessions.prediction.press_model.FitError",
     "sessions.recording.errors.RecordingError",
     "sessions.plan.study.StudyError",
     "solver.failures.SolveFailure",
@@ -96,7 +98,7 @@ def _dispatch(arguments: list[str]) -> int:
     name, *rest = arguments
     if name not in VERBS:
         return _said(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
-    verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_')}")
+    verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
     try:
         options = _parser(name, verb).parse_args(_joined(rest))
     except SystemExit as leaving:  # argparse has printed its help

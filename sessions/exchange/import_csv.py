@@ -1,6 +1,5 @@
 """A foreign recording becomes a session: every reading as the file holds it, and the file itself beside them."""
 
-import csv
 import hashlib
 import math
 from collections.abc import Iterator, Sequence
@@ -16,6 +15,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.atomic_file import write_whole
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
+from sessions.exchange.csv_rows import COMMENT, ImportRefused, number_in, records, shown
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.recording.provenance import Setting, provenance
@@ -29,14 +29,8 @@ ORIGINAL_FILE = "original.csv"
 RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file's times hold [-]
 UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
-_DELIMITERS = (",", ";", "\t")
 _FEWEST = 2
-_COMMENT = "#"
 _SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
-
-
-class ImportRefused(Exception):
-    """The file cannot be taken as a recording; one sentence names file, line and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,17 +116,17 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
 
 def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, Array, list[int]]:
     """Return the columns, the numbers (n, columns; nan in extra ones) and the line each row stands on."""
-    records = _records(path, content)
-    first = next(records, None)
+    rest = records(path, content)
+    first = next(rest, None)
     if first is None:
         raise ImportRefused(f"{path} is empty: give a CSV file with a row for each reading")
     line, cells = first
-    header = None if all(_number(cell) is not None for cell in cells) else [cell.strip() for cell in cells]
+    header = None if all(number_in(cell) is not None for cell in cells) else [cell.strip() for cell in cells]
     try:
         told = columns(header, stated.axes, stated.units, len(cells))
     except ColumnsUnknown as unknown:
         raise SettingsError(f"{path}, line {line}: {unknown}") from unknown
-    body = records if header is not None else _with(first, records)
+    body = rest if header is not None else _with(first, rest)
     used = {position: told.names[position] for position in (*told.axes, told.time) if position is not None}
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -142,31 +136,6 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
     if len(rows) < _FEWEST:
         raise ImportRefused(f"{path} holds {len(rows)} readings: give a file with at least {_FEWEST}")
     return told, np.array(rows), lines
-
-
-def _records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
-    """Yield line number and cells of every row that is no comment; empty lines are allowed at the end alone."""
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ImportRefused(f"{path}: byte {error.start} is no UTF-8 text; save the file as CSV in UTF-8") from error
-    lines = text.splitlines(keepends=True)
-    first_line = next((line for line in lines if not line.startswith(_COMMENT)), "")
-    delimiter = next((mark for mark in _DELIMITERS if mark in first_line), ",")
-    empty: int | None = None
-    reader = csv.reader(iter(lines), delimiter=delimiter)
-    try:
-        for cells in reader:
-            if cells and cells[0].startswith(_COMMENT):
-                continue
-            if not any(cell.strip() for cell in cells):
-                empty = empty or reader.line_num
-                continue
-            if empty is not None:
-                raise ImportRefused(f"{path}, line {empty} is empty: remove it, or what follows it")
-            yield reader.line_num, cells
-    except csv.Error as error:
-        raise ImportRefused(f"{path}, line {reader.line_num}: this is no CSV ({error}); save the file anew") from error
 
 
 def _with(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
@@ -182,29 +151,13 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
         )
     row = [math.nan] * width
     for position, name in used.items():
-        value = _number(cells[position])
+        value = number_in(cells[position])
         if value is None or not math.isfinite(value):
             raise ImportRefused(
-                f'{path}, line {line}: {name} is "{_shown(cells[position])}", which is no number; '
-                "mend or remove the row"
+                f'{path}, line {line}: {name} is "{shown(cells[position])}", which is no number; mend or remove the row'
             )
         row[position] = value
     return row
-
-
-def _shown(cell: str) -> str:
-    """Return what a cell holds, on one line and not too long."""
-    return " ".join(cell.split())[:40]
-
-
-def _number(cell: str) -> float | None:
-    """Return a cell as a number (nan and infinities too), or None."""
-    if "_" in cell:  # Python reads 1_000 as a number; a data file means none
-        return None
-    try:
-        return float(cell)
-    except ValueError:
-        return None
 
 
 def _times(
@@ -241,7 +194,7 @@ def _times(
 
 def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
     """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
-    head = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(_COMMENT)]
+    head = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
     return any(_SIMULATED in told for told in (*head, *names))
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sessions.exchange import bids, csv_folder, hdf5
+from sessions.exchange.csv_rows import ImportRefused
 from sessions.exchange.exported import ExportedSession, restore
-from sessions.exchange.import_csv import ImportRefused
 from sessions.file_access import remedy
 from sessions.recording import Recording, RecordingError
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, SEALED_FILE

@@ -18,9 +18,11 @@ from solver.arrays import Array
 from solver.body.finite_measures import IMAGINARY
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger
+from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, load_arguments
 from solver.quantities import NAMES, SED
 from solver.scene import Scene
+from solver.scene.tables import TISSUES
 
 MU, TAU_MAX, DEPTH = range(3)
 
@@ -97,11 +99,28 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     return out
 
 
+def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
+    """Return how the normal force of a frictionless press follows each tissue's stiffness (r,): d log N / d log E.
+
+    Regions stand in the order of the mesh; a rigid bone has 0. With u the displacements, w their derivative by the
+    depth and K the stiffness of one tissue, dN / d log E is w K u: without friction the contact's forces do no work on
+    w but by the depth. The sum is 1, since N is linear in all stiffnesses together. Raises ValueError with friction.
+    """
+    if state.load.mu != 0.0:
+        raise ValueError("with friction the normal force is no derivative of an energy")
+    mesh = finger.geometry.mesh
+    by_depth = finger.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
+    moved, slope = (
+        field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth)
+    )
+    work = np.einsum("ei,eij,ej->e", slope, finger.body.elastic.stiffness, moved)
+    return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
+
+
 def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
     """Return how the responses of endings change (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
 
-    By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40,
-    110), exact to round-off.
+    By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
     """
     beside = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
     return endings.responses(beside).imag / IMAGINARY

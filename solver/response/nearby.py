@@ -27,7 +27,7 @@ from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin
-from solver.response.derivatives import Derivatives, of_slide
+from solver.response.derivatives import Derivatives, by_stiffness, of_slide
 from solver.scene import Scene
 
 GOOD = 1e-8  # tolerance of the displacements [mm]: far less than a difference of friction that anybody could tell
@@ -79,6 +79,19 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
             yield _SmallNearby(scene, _slide(model, scene, states(found.skin)), model)
         except NotConverged:
             yield None
+
+
+def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
+    """Return d log N / d log E (n, 4) of presses that slide without friction at small strain, by tissue.
+
+    Raises ValueError for others, and where a press is not met again.
+    """
+    found: list[Array] = []
+    for slide in nearby(predictions):
+        if not isinstance(slide, _SmallNearby):
+            raise ValueError("no press at small strain that slides without friction")
+        found.append(by_stiffness(slide.finger, slide.here))
+    return np.array(found)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

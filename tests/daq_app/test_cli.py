@@ -24,7 +24,7 @@ def test_an_unknown_verb_is_one_sentence_and_exit_code_2(capsys):
 def test_every_verb_explains_itself_with_an_example(verb, capsys):
     assert run([verb, "--help"]) == 0
     told = capsys.readouterr().out
-    module = importlib.import_module(f"daq_app.cli.verbs.{verb.replace('import', 'import_')}")
+    module = importlib.import_module(f"daq_app.cli.verbs.{verb.replace('import', 'import_').replace('-', '_')}")
     assert module.EXAMPLE in told
     assert "--json" in told
 

@@ -1,0 +1,230 @@
+"""Fit the stiffness of each layer of a subject's own finger to presses whose displacement a stage logged.
+
+The session holds presses without a slide; the log holds the displacement of the bone or the stage, positive into the
+finger. Its header has displacement_mm and one of time_s, received_ns or sequence, as readings.csv of an export calls
+them, and may have contact_width_mm. Nothing in the session is changed. The scene written by --scene is taken by
+'predict --scene' and 'solve'.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from daq_app.batch.derived import settings_kept, visit
+from daq_app.cli.calibration_option import add_calibration, calibration_error
+from daq_app.console import Console, WrongValue, number, span, table
+from sessions.atomic_file import write_whole
+from sessions.exchange.displacement_log import displacement_log
+from sessions.plan.plan import SessionPlan
+from sessions.prediction import PredictionOptions, finger_in, with_own_finger
+from sessions.prediction.finger_fit import FingerFit, Interval, fit
+from sessions.prediction.options import template
+from sessions.prediction.press_curves import PressCurves, deepest, press_curves
+from sessions.prediction.press_model import LAYERS, Check, FitError, check, press_model
+from sessions.prediction.relaxation_fit import RelaxationFit, relaxing_fit
+from sessions.recording import Recording
+from sessions.strokes import AnalysisSettings
+from sessions.toml_file import toml_text
+from solver import Scene
+
+EXAMPLE = "daq-app fit-finger recordings/P07 --displacement stage.csv --scene P07-finger.toml"
+MU, FACTOR = 0.5, 2.0  # usual ones
+DEEPER = 1.1  # the model goes so much deeper than the stage, should the finger be touched before its onset is seen [-]
+FALL = 0.05  # of the force in a hold, from which on relaxing is named [-]
+AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones before that is a flaw [-]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare session, log, what is known of finger and surface, and where the finger goes."""
+    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
+    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces")
+    parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
+    parser.add_argument("--shift", type=float, default=0.0, metavar="S", help="added to the log's times (0)")
+    parser.add_argument(
+        "--finger", type=Path, metavar="FILE", help="scene file with the finger's dimensions (else the session's own)"
+    )
+    parser.add_argument(
+        "--mu",
+        type=float,
+        default=MU,
+        metavar="MU",
+        help=f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly changes)",
+    )
+    parser.add_argument(
+        "--prior",
+        type=float,
+        default=FACTOR,
+        metavar="FACTOR",
+        help=f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)",
+    )
+    parser.add_argument(
+        "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
+    )
+    parser.add_argument("--seed", type=int, default=0, help="of the posterior's draws (0)")
+    parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
+    add_calibration(parser)
+
+
+def run(options: argparse.Namespace, console: Console) -> int:
+    """Fit the finger and print its layers."""
+    from daq_app.cli.main import DONE, FLAWED
+
+    _check_values(options)
+    recording = visit(options.session, options.subject)
+    settings = settings_kept(recording)
+    gain_error = calibration_error(options)
+    if gain_error is not None:
+        settings = replace(settings, gain_error=gain_error)
+    curves = _curves(options, recording, settings)
+    flaws = [*curves.left_out, *([] if options.relaxation else _relaxes(curves))]
+    for sentence in flaws:
+        console.note(sentence)
+    found = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
+    simulated = recording.simulated_sentence
+    if options.scene is not None:
+        head = f"# {simulated}\n" if simulated else ""
+        write_whole(options.scene, (head + toml_text(found.scene)).encode())
+    assumed = {
+        "mu": options.mu,
+        "prior_factor": options.prior,
+        "calibration_error": settings.gain_uncertainty,
+        "width": found.scene.finger.width,
+        "seed": options.seed,
+    }
+    shares = dict(zip(LAYERS, found.check.shares.tolist(), strict=True))
+    console.result(
+        {
+            **({"simulated": "SIMULATED"} if simulated else {}),
+            **found.fit.to_dict(),
+            **({} if found.relaxation is None else {"relaxation": found.relaxation.to_dict()}),
+            "presses": list(curves.names),
+            "flaws": flaws,
+            "check": {"deviation": found.check.deviation, "shares": shares},
+            "assumed": assumed,
+        }
+    )
+    if simulated:
+        console.say(simulated)
+    _print(found, options, console)
+    return FLAWED if flaws or found.check.deviation > AGREE else DONE
+
+
+class _Outcome(NamedTuple):
+    """What came of the presses."""
+
+    fit: FingerFit
+    check: Check
+    relaxation: RelaxationFit | None
+
+    @property
+    def scene(self) -> Scene:
+        """The finger found."""
+        return self.fit.scene if self.relaxation is None else self.relaxation.relaxing(self.fit.scene)
+
+
+def _check_values(options: argparse.Namespace) -> None:
+    """Raise WrongValue for an option out of its range."""
+    ranges = {"mu": (0.0, 5.0), "prior": (1.1, 4.0), "shift": (-1e9, 1e9), "seed": (0, 2**32)}
+    for name, (low, high) in ranges.items():
+        if not low <= getattr(options, name) <= high:
+            raise WrongValue(f"--{name} {getattr(options, name)} is not allowed: {low:g} to {high:g}")
+    if options.scene is not None and not options.scene.parent.is_dir():
+        raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
+
+
+def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> PressCurves:
+    """Return the presses that the log follows. Raises FitError where there is none, ImportRefused."""
+    log = displacement_log(options.displacement)
+    if options.shift and log.clock == "sequence":
+        raise WrongValue("--shift is of times, and the log counts readings: leave it out")
+    shift = options.shift * (1e9 if log.clock == "received_ns" else 1.0)
+    curves = press_curves(recording, replace(log, at=log.at + shift), settings)
+    if not curves.presses:
+        why = curves.left_out[0] if curves.left_out else "It holds no press."
+        raise FitError(
+            f"{recording.folder} holds no press that {options.displacement} follows. {why} Press straight down, hold "
+            "for half a second without a slide, and log on the session's clock."
+        )
+    return curves
+
+
+def _relaxes(curves: PressCurves) -> list[str]:
+    """Say where the finger relaxes in a hold, which bends its force over depth."""
+    fall = max((one.fall for one in curves.holds if one is not None), default=0.0)
+    if fall <= FALL:
+        return []
+    return [
+        f"The force falls by {100.0 * fall:.0f} % while the stage stands: the finger relaxes, which bends its force on "
+        "the way down too, and layers are off by more than their intervals. Ask for --relaxation."
+    ]
+
+
+def _fitted(
+    options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
+) -> _Outcome:
+    """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
+    held = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
+    if options.relaxation and not held:
+        raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
+    given, _ = (None, "") if options.finger is None else finger_in(options.finger)
+    finger = template(with_own_finger(PredictionOptions(scene=given), plan))
+
+    def shown(part: float) -> bool:
+        console.progress(part, "solving presses")
+        return True
+
+    model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, shown)
+    if options.relaxation:
+        found, rate = relaxing_fit(model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed)
+    else:
+        found, rate = fit(model, curves.presses, gain_error, options.seed), None
+    own = check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
+    return _Outcome(found, own, rate)
+
+
+def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
+    found, checked = outcome.fit, outcome.check
+    rows = [
+        [
+            one.name,
+            number(1e3 * one.stiffness.value),
+            _ends(one.stiffness),
+            _ends(one.profile),
+            _ends(one.prior),
+            f"{100 * share:.0f} %",
+        ]
+        for one, share in zip(found.layers, checked.shares, strict=True)
+    ]
+    console.say(table(rows, head=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
+    overall, (low, high) = found.overall, (found.overall.low or 0.0, found.overall.high or 0.0)
+    console.say(
+        f"overall stiffness: {number(overall.value)} of the published finger's, 95 % interval {span(low, high)}, from "
+        f"{found.points} points of {len(found.touch)} presses up to {number(found.deepest)} mm"
+        + (f", and {found.widths} lengths of contact" if found.widths else "")
+    )
+    for one in found.layers:
+        console.say(one.sentence)
+    if outcome.relaxation is not None:
+        part, time = outcome.relaxation.part, outcome.relaxation.time
+        console.say(
+            f"relaxation: part {part.value:.2f} (95 % {_ends(part, 1.0)}), time {number(time.value)} s "
+            f"(95 % {_ends(time, 1.0)}); the stiffness above is that at once"
+        )
+        console.say(outcome.relaxation.sentence)
+    console.say(
+        f"Assumed: friction {options.mu:g}, width {found.scene.finger.width:g} mm, a prior of a factor "
+        f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
+    )
+    agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"
+    console.say(f"The solver's own forces {agree} those fitted: by {100 * checked.deviation:.1g} % at most.")
+    if options.scene is not None:
+        console.say(f"finger: {options.scene}, for 'daq-app predict SESSION --scene {options.scene}'")
+
+
+def _ends(one: Interval, unit: float = 1e-3) -> str:
+    """Return an interval in a unit, kPa for stiffness."""
+    low, high = ("open" if end is None else number(end / unit) for end in (one.low, one.high))
+    return f"{low} to {high}"

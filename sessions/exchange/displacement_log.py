@@ -1,0 +1,69 @@
+"""The log of a stage, or of whatever else followed the bone, beside a recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.exchange.csv_rows import ImportRefused, number_in, records, shown
+from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+
+Array = NDArray[np.float64]
+
+DISPLACEMENT = "displacement_mm"
+WIDTH = "contact_width_mm"
+CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export calls them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplacementLog:
+    """Where a stage stood; n rows in order of time."""
+
+    clock: str  # one of CLOCKS: what `at` counts
+    at: Array  # (n,) [s], [ns] or readings, growing
+    displacement: Array  # (n,) positive into the finger, from anywhere [mm]
+    width: Array  # (n,) of the contact along the finger [mm]; nan where nobody measured it
+
+
+def displacement_log(path: Path) -> DisplacementLog:
+    """Return a stage's log from a CSV file with a header; columns that it does not need are left alone.
+
+    Raises ImportRefused.
+    """
+    try:
+        content = read_limited(path, LARGEST_TABLE)
+    except OSError as error:
+        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
+    rows = records(path, content)
+    _, header = next(rows, (0, [""]))
+    names = [cell.strip() for cell in header]
+    clock = next((name for name in CLOCKS if name in names), None)
+    if clock is None or DISPLACEMENT not in names:
+        raise ImportRefused(
+            f"{path} needs a header with {DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
+            f"calls them; it has {', '.join(map(shown, names)) or 'none'}"
+        )
+    places = [names.index(name) for name in (clock, DISPLACEMENT)]
+    of_width = names.index(WIDTH) if WIDTH in names else None
+    values: list[tuple[float, float, float]] = []
+    for line, cells in rows:
+        at, displacement = (_number(cells, place) for place in places)
+        if not np.isfinite([at, displacement]).all():
+            raise ImportRefused(f"{path}, line {line}: {clock} or {DISPLACEMENT} is no number; mend or remove the row")
+        if values and at <= values[-1][0]:
+            raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
+        width = np.nan if of_width is None else _number(cells, of_width)
+        if width <= 0.0:
+            raise ImportRefused(f"{path}, line {line}: {WIDTH} is not above 0; leave the cell empty without a contact")
+        values.append((at, displacement, width))
+    if len(values) < 2:
+        raise ImportRefused(f"{path} holds {len(values)} rows: give a log with at least 2")
+    return DisplacementLog(clock, *np.array(values).T)
+
+
+def _number(cells: Sequence[str], place: int) -> float:
+    """Return the number in a cell; nan where there is none."""
+    value = number_in(cells[place]) if place < len(cells) else None
+    return np.nan if value is None else value

@@ -1,0 +1,340 @@
+"""The stiffness of a subject's own finger from presses, whose force and depth were recorded: a posterior.
+
+Each layer's log stiffness has a normal prior about the published one; noise of the force is Gaussian of unknown size
+(Jeffreys' prior). Where the stage touches the skin is not known either, for each press. Given the two contrasts
+between the layers, the rest is almost linear and integrated in closed form (Laplace; Student's t for unknown noise:
+Gelman et al. 2013, Bayesian Data Analysis, sections 3.2 and 14.2). What is left has two dimensions, and a grid does it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import least_squares
+from scipy.special import ndtri
+
+from sessions.prediction.press_model import CONTRASTS, LAYERS, REACH, FitError, PressModel, at_depths
+from solver import Scene
+
+Array = NDArray[np.float64]
+
+SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 % within a factor of 3.9 either way
+POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
+CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
+# Halving and doubling these moved ends of intervals by so much of their width, over twelve planted fingers.
+DRAWS = 20_000  # of the posterior: 0.2 % in the median
+FEWEST = 6  # points of depth and force beyond the numbers that are looked for; fewer tell hardly the noise
+GRID = 25  # contrasts along each axis: 0.5 % with 49, 2 % with 13 in the median
+ROUNDS, SETTLED = 12, 1e-5  # of the search for touches: 0.2 % at most; it ends when sums of squares fall by less
+FINE = 200.0  # nodes that carry the posterior (inverse Simpson index), else the grid is drawn closer: not at all
+CLOSER = 4  # grids at most
+QUANTILES = (0.025, 0.975)
+NARROW = 0.8  # of the prior's width: a narrower interval says that presses tell something of a layer
+
+
+class LoadingCurve(NamedTuple):
+    """One press as it is loaded: n points."""
+
+    displacement: Array  # (n,) of the stage or bone, positive into the finger [mm]
+    force: Array  # (n,) normal [N]
+    touch: float  # displacement at which the force leaves its zero [mm]
+    width: Array  # (n,) length of the contact along the finger [mm]; nan where nobody measured it
+    readings: int = 0  # that the points are means of
+
+    @staticmethod
+    def of(displacement: Array, force: Array, width: Array) -> "LoadingCurve":
+        """Return the means of readings (m,) over as many equal parts of their travel as a curve has points."""
+        edges: Array = np.linspace(float(displacement[0]), float(displacement[-1]), POINTS + 1)
+        which = np.clip(np.searchsorted(edges, displacement, side="right") - 1, 0, POINTS - 1)
+        count = np.bincount(which, minlength=POINTS)
+        some = count > 0
+        means = [np.bincount(which, one, POINTS)[some] / count[some] for one in (displacement, force, width)]
+        return LoadingCurve(means[0], means[1], float(displacement[0]), means[2], len(displacement))
+
+
+class Interval(NamedTuple):
+    """A number with the ends of its 95 % interval; None where the data do not bound it within the model's range."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LayerFit:
+    """What is known of one layer's stiffness [MPa]."""
+
+    name: str
+    stiffness: Interval  # at the maximum of the posterior, with its 95 % credible interval
+    profile: Interval  # at the maximum of the likelihood, with the 95 % interval of its profile
+    prior: Interval
+    ratio: float  # of the credible interval to the prior's, of log stiffness [-]
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FingerFit:
+    """The posterior of a finger's stiffnesses."""
+
+    scene: Scene  # with the finger at the maximum of the posterior
+    layers: tuple[LayerFit, ...]
+    overall: Interval  # force over that of the published stiffnesses, mean of the logs over the depths pressed [-]
+    touch: tuple[float, ...]  # displacement at which each press touches [mm]
+    noise: float  # standard deviation of the points' forces [N]
+    widths: int  # points with a length of contact
+    points: int
+    deepest: float  # [mm]
+    draws: Array  # (m, 3) of the posterior of the stiffnesses [MPa]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, without draws."""
+        return {
+            "layers": [
+                {**asdict(one), **{name: getattr(one, name)._asdict() for name in ("stiffness", "profile", "prior")}}
+                for one in self.layers
+            ],
+            "overall": self.overall._asdict(),
+            "touch": list(self.touch),
+            "noise": self.noise,
+            "points": self.points,
+            "widths": self.widths,
+            "deepest": self.deepest,
+        }
+
+
+class _Grid(NamedTuple):
+    """What the data say at contrasts; g of them."""
+
+    contrast: Array  # (g, 2) in deviations of the prior
+    mean: Array  # (g,) mean log factor of the stiffnesses that fits best
+    touch: Array  # (g, presses) [mm]
+    misfit: Array  # (g,) of the forces, sum of squares [N2]
+    variance: Array  # (g,) of the mean by the noise's variance [1/N2]
+    fits: Array  # (g,) log likelihood
+    weight: Array  # (g,) of the posterior, their sum 1
+    likelihood: Array  # (g,) the same without the prior
+    step: float  # greatest distance between neighbours, in deviations
+
+
+class Likelihood:
+    """What presses say of a finger, by a model of them."""
+
+    def __init__(self, model: PressModel, presses: Sequence[LoadingCurve]) -> None:
+        """Take presses. Raises FitError where they are too few."""
+        self.model = model
+        self.force, self.displacement, width = (
+            np.concatenate([getattr(one, name) for one in presses]) for name in ("force", "displacement", "width")
+        )
+        self.which = np.repeat(np.arange(len(presses)), [len(one.force) for one in presses])
+        self.presses = self.which == np.arange(len(presses))[:, None]
+        self.free = len(self.force) - 1 - len(presses)
+        if self.free < FEWEST:
+            raise FitError(
+                f"{len(self.force)} points of {len(presses)} presses are too few: press deeper, slower, or more often."
+            )
+        # What the model itself is off by is no smaller where the noise is.
+        self.floor = len(self.force) * float(np.mean((model.error * self.force) ** 2))
+        self.wide = np.flatnonzero(np.isfinite(width))
+        self.width = width[self.wide]
+        depth = self.displacement - np.array([one.touch for one in presses])[self.which]
+        off = np.interp(depth[self.wide], model.depth, model.width_error)
+        self.width_floor = float(np.sum((off * self.width) ** 2))
+
+    def grid(self, contrast: Array, step: float, start: Array) -> _Grid:
+        """Return the best mean and touch at contrasts (g, 2) that lie a `step` apart, from touches (presses,) [mm]."""
+        forces = self.model.log_force(contrast) + np.log(self.model.scene.finger.width)
+        spline = CubicSpline(np.log(self.model.depth), forces, axis=1)
+        touch = np.tile(start, (len(contrast), 1))
+        mean, misfit, residual, jacobian = self._linear(spline, touch)
+        damping = np.full(len(contrast), 1e-3)
+        for _ in range(ROUNDS):  # Levenberg and Marquardt, all contrasts at once
+            moved = touch + _steps(jacobian, residual, damping)[:, 1:]
+            found = self._linear(spline, moved)
+            better = found[1] < misfit
+            gain = float(np.max(np.where(better, misfit - found[1], 0.0) / (misfit + self.floor)))
+            for old, new in zip((touch, mean, misfit, residual, jacobian), (moved, *found), strict=True):
+                old[better] = new[better]
+            damping = np.where(better, damping / 5.0, damping * 5.0)
+            if gain < SETTLED:
+                break
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        variance = np.asarray(np.linalg.inv(normal)[:, 0, 0], np.float64)
+        prior = (contrast**2).sum(axis=1) + 3.0 * (mean / self.model.spread) ** 2
+        fits = -(self.free * np.log(misfit + self.floor) + self._of_width(contrast, touch)) / 2.0
+        log = fits - (prior + np.linalg.slogdet(normal)[1]) / 2.0
+        return _Grid(contrast, mean, touch, misfit, variance, fits, _weights(log), _weights(fits), step)
+
+    def _linear(self, spline: CubicSpline, touch: Array) -> tuple[Array, Array, Array, Array]:
+        """Return the best mean (g,) at touches, its misfit (g,), residual (g, n) and Jacobian (g, n, 1 + presses)."""
+        shape, slope = at_depths(spline, self.displacement - touch[:, self.which])
+        factor = np.maximum((shape @ self.force) / np.maximum((shape**2).sum(axis=1), 1e-30), 1e-6)
+        force = factor[:, None] * shape
+        by_touch = (-factor[:, None] * slope)[:, :, None] * self.presses.T
+        residual = force - self.force
+        return np.log(factor), (residual**2).sum(axis=1), residual, np.dstack([force, by_touch])
+
+    def _of_width(self, contrast: Array, touch: Array) -> Array:
+        """Return minus twice the log likelihood (g,) of the contacts' lengths, 0 where there are none."""
+        if not len(self.wide):
+            return np.zeros(len(contrast))
+        spline = CubicSpline(np.log(self.model.depth), self.model.log_width(contrast), axis=1)
+        width, _ = at_depths(spline, self.displacement[self.wide] - touch[:, self.which[self.wide]])
+        misfit = ((width - self.width) ** 2).sum(axis=1) + self.width_floor
+        return np.asarray(len(self.wide) * np.log(misfit), np.float64)
+
+    def maximum(self, grid: _Grid) -> tuple[Array, Array, float]:
+        """Return contrast (2,), touches and mean of the posterior's maximum, by the model's derivatives."""
+        best = int(np.argmax(grid.weight))
+        sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.free))
+        start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
+        of_width = float(self._of_width(grid.contrast[best][None], grid.touch[best][None])[0])
+        width_sigma = float(np.exp(of_width / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
+        scale = np.concatenate([np.full(len(self.force), sigma), np.full(len(self.wide), width_sigma), np.ones(3)])
+
+        def residual(at: Array) -> Array:
+            return self._at(at)[0] / scale
+
+        def jacobian(at: Array) -> Array:
+            return self._at(at)[1] / scale[:, None]
+
+        found = least_squares(residual, start, jacobian, x_scale="jac").x
+        return found[:2], found[3:], float(found[2])
+
+    def _at(self, at: Array) -> tuple[Array, Array]:
+        """Return residuals of forces, contacts and prior, and their Jacobian by both contrasts, mean and touches."""
+        model, contrast, knots = self.model, at[None, :2], np.log(self.model.depth)
+        depth = self.displacement - at[3:][self.which]
+        log = model.log_force(contrast) + np.log(model.scene.finger.width) + at[2]
+        parts: list[Array] = []
+        rows: list[Array] = []
+        for values, slopes, measured, only in (
+            (log, model.slopes(contrast), self.force, np.arange(len(depth))),
+            (model.log_width(contrast), model.width_slopes(contrast), self.width, self.wide),
+        ):
+            value, slope = (one[0] for one in at_depths(CubicSpline(knots, values, axis=1), depth[only][None]))
+            by_contrast = CubicSpline(knots, slopes[0], axis=1)(np.log(np.maximum(depth[only], model.depth[0])))
+            by_mean = value if values is log else np.zeros(len(only))
+            parts.append(value - measured)
+            by_touch = -slope[:, None] * self.presses.T[only]
+            rows.append(np.column_stack([(value * by_contrast).T, by_mean, by_touch]))
+        prior = np.diag([1.0, 1.0, np.sqrt(3.0) / model.spread])
+        parts.append(prior @ at[:3])
+        rows.append(np.column_stack([prior, np.zeros((3, len(at) - 3))]))
+        return np.concatenate(parts), np.vstack(rows)
+
+    def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
+        """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""
+        contrast, mean, misfit, variance, fits = (
+            np.concatenate([getattr(one, name) for one in grids]) for name in _Grid._fields[:6] if name != "touch"
+        )
+        step = np.concatenate([np.full(len(one.mean), one.step) for one in grids])
+        log = mean + self.model.spread * contrast @ CONTRASTS[:, layer]
+        left = CHI_SQUARED - 2.0 * (fits.max() - fits)  # of the likelihood's fall, for the mean beside its best
+        wide = np.sqrt(variance * (misfit + self.floor) * np.expm1(np.maximum(left, 0.0) / self.free))
+        half = np.where(left >= 0.0, wide, -np.inf)
+        ends = [int((log - half).argmin()), int((log + half).argmax())]
+        rim = np.hypot(*contrast[ends].T) + 1.5 * step[ends] > REACH
+        low, high = float((log - half)[ends[0]]), float((log + half)[ends[1]])
+        return Interval(float(log[fits.argmax()]), None if rim[0] else low, None if rim[1] else high)
+
+
+def _weights(log: Array) -> Array:
+    weight = np.exp(log - log.max())
+    return np.asarray(weight / weight.sum(), np.float64)
+
+
+def fit(model: PressModel, presses: Sequence[LoadingCurve], gain_error: float = 0.0, seed: int = 0) -> FingerFit:
+    """Return the posterior of the stiffnesses of a finger, given presses.
+
+    `gain_error` is the standard uncertainty of the force's calibration [-], `seed` that of the draws. Raises FitError
+    where points are too few.
+    """
+    likelihood = Likelihood(model, presses)
+    start = np.array([one.touch for one in presses])
+    first = likelihood.grid(*_nodes(np.zeros(2), REACH * np.eye(2)), start)
+    last = _closer(likelihood, first, "weight")
+    likely = [first, last, _closer(likelihood, first, "likelihood")]
+    at, touch, mean = likelihood.maximum(last)
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(len(last.weight), DRAWS, p=last.weight)
+    scale = np.sqrt((last.misfit + likelihood.floor) / likelihood.free * last.variance)
+    means = last.mean[chosen] + scale[chosen] * rng.standard_t(likelihood.free, DRAWS)
+    means += gain_error * rng.standard_normal(DRAWS)
+    best = model.stiffnesses(np.array([mean]), at[None])[0]
+    draws = model.stiffnesses(means, last.contrast[chosen])
+    depth = likelihood.displacement - touch[likelihood.which]
+    used = (model.depth >= depth.min()) & (model.depth <= depth.max())
+    used[np.argmin(np.abs(model.depth - np.median(depth)))] = True
+    relative = (model.log_force(np.vstack([at, last.contrast])) - model.log_force(np.zeros((1, 2))))[:, used]
+    ratio = relative.mean(axis=1)
+    low, high = np.exp(np.quantile(means + ratio[1:][chosen], QUANTILES))
+    return FingerFit(
+        scene=model.finger(best),
+        layers=tuple(_layer(likelihood, likely, number, best, draws) for number in range(len(LAYERS))),
+        overall=Interval(float(np.exp(mean + ratio[0])), float(low), float(high)),
+        touch=tuple(touch.tolist()),
+        noise=float(np.sqrt(last.misfit.min() / likelihood.free)),
+        points=len(likelihood.force),
+        widths=len(likelihood.width),
+        deepest=float(depth.max()),
+        draws=draws,
+    )
+
+
+def _layer(likelihood: Likelihood, grids: Sequence[_Grid], number: int, best: Array, draws: Array) -> LayerFit:
+    """Return what is known of one layer, and say it in a sentence."""
+    name, spread = LAYERS[number], likelihood.model.spread
+    published = likelihood.model.scene.materials.of(name).E
+    low, high = np.quantile(draws[:, number], QUANTILES).tolist()
+    half = float(ndtri(QUANTILES[1])) * spread
+    ratio = float(np.log(high / low)) / (2.0 * half)
+    share = f"its 95 % interval is {100 * ratio:.0f} % as wide as the prior's, on the scale of logarithms"
+    sentence = (
+        f"The presses narrow the stiffness of the {name}: {share}."
+        if ratio < NARROW
+        else f"The presses cannot tell the stiffness of the {name} from that of the other layers: {share}."
+    )
+    profile = likelihood.profile(grids, number)
+    low_end, high_end = (None if one is None else published * float(np.exp(one)) for one in profile[1:])
+    ends = Interval(published * float(np.exp(profile.value)), low_end, high_end)
+    prior = Interval(published, published * float(np.exp(-half)), published * float(np.exp(half)))
+    return LayerFit(name, Interval(float(best[number]), low, high), ends, prior, ratio, sentence)
+
+
+def _nodes(centre: Array, axes: Array) -> tuple[Array, float]:
+    """Return contrasts (g, 2) of a grid within the model's reach, and their step; `axes` (2, 2) are its half widths."""
+    line: Array = np.linspace(-1.0, 1.0, GRID)
+    nodes = centre + np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2) @ axes
+    step = float(np.hypot(*axes.T).max()) * 2.0 / (GRID - 1)
+    return nodes[(nodes**2).sum(axis=1) <= REACH**2], step
+
+
+def _closer(likelihood: Likelihood, grid: _Grid, name: str) -> _Grid:
+    """Return a grid along the main axes of what carries the weights of a `name`, drawn closer until enough do."""
+    for _ in range(CLOSER):
+        weight: Array = getattr(grid, name)
+        if 1.0 / float((weight**2).sum()) >= FINE:
+            break
+        carry = weight > 1e-4 * weight.max()
+        nodes = grid.contrast[carry]
+        centre = np.average(nodes, axis=0, weights=weight[carry])
+        spread = (nodes - centre).T @ ((nodes - centre) * weight[carry, None]) / weight[carry].sum()
+        turned = np.linalg.eigh(spread)[1].T
+        along = (nodes - centre) @ turned.T
+        low, high = along.min(axis=0) - grid.step, along.max(axis=0) + grid.step
+        middle, half = (low + high) / 2.0 @ turned, (high - low) / 2.0
+        grid = likelihood.grid(*_nodes(centre + middle, half[:, None] * turned), grid.touch[int(weight.argmax())])
+    return grid
+
+
+def _steps(jacobian: Array, residual: Array, damping: Array) -> Array:
+    """Return the damped steps (g, p) that lessen residuals (g, n), each number on its own scale."""
+    across = np.swapaxes(jacobian, 1, 2)
+    normal = across @ jacobian
+    diagonal = np.einsum("gii->gi", normal)
+    diagonal *= 1.0 + damping[:, None]
+    diagonal += 1e-12 * diagonal.max(axis=1, keepdims=True)
+    return np.asarray(np.linalg.solve(normal, -(across @ residual[:, :, None]))[:, :, 0], np.float64)

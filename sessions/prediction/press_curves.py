@@ -1,0 +1,145 @@
+"""Presses of a recording as force over displacement: what a finger's stiffness is fitted to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction.finger_fit import LoadingCurve
+from sessions.prediction.relaxation_fit import HoldCurve
+from sessions.recording import Recording
+from sessions.strokes import AnalysisSettings, Stroke
+from sessions.strokes.analysis import analyse_blocks
+
+Array = NDArray[np.float64]
+
+LONGEST_GAP = 0.1  # of the log within a press [s]: the travel of a finger in so long is less than a point's share
+STANDS = 0.01  # a stage stands while it is so near its greatest travel, as a share of that [-] ...
+SHORTEST_HOLD = 0.5  # ... for so long: what shortest press the analysis knows [s]
+LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
+
+
+class StageLog(Protocol):
+    """Where the bone or the stage stood; n rows in order of time."""
+
+    @property
+    def clock(self) -> str:
+        """What `at` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings."""
+        ...
+
+    @property
+    def at(self) -> Array:
+        """Instants (n,), growing."""
+        ...
+
+    @property
+    def displacement(self) -> Array:
+        """Displacement (n,) [mm], positive into the finger."""
+        ...
+
+    @property
+    def width(self) -> Array:
+        """Length of the contact along the finger (n,) [mm], nan where nobody measured it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PressCurves:
+    """The presses that a log follows, and why others are left out."""
+
+    presses: tuple[LoadingCurve, ...]
+    names: tuple[str, ...]  # of each press, for people
+    holds: tuple[HoldCurve | None, ...]  # each press to the end of its hold; None where its stage does not stand
+    left_out: tuple[str, ...]  # a sentence each
+
+
+def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> PressCurves:
+    """Return the loading part of each press without a slide, in trials of every phase."""
+    if recording.info is None:
+        return PressCurves((), (), (), ("No forces were recorded.",))
+    taken = [record for record in recording.trials if record.take]
+    parts = (
+        [(record.trial, recording.readings(record.trial.number)) for record in taken]
+        if recording.plan.blocks
+        else [(None, recording.readings())]
+    )
+    presses: list[LoadingCurve] = []
+    names: list[str] = []
+    holds: list[HoldCurve | None] = []
+    left_out: list[str] = []
+    for trial, block in parts:
+        found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
+        clocks: Mapping[str, Array] = {
+            "time_s": block.time,
+            "received_ns": block.received_ns.astype(np.float64),
+            "sequence": block.sequence.astype(np.float64),
+        }
+        for stroke in found.strokes:
+            if not any(_holds(stroke, press.start) for press in found.presses):
+                continue
+            name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
+            when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
+            loading = _loading(stroke, when, log)
+            if isinstance(loading, str):
+                left_out.append(f"{name[0].upper()}{name[1:]} is left out: {loading}.")
+            else:
+                holds.append(_hold(stroke, when, log.displacement))
+                presses.append(loading)
+                names.append(name)
+    return PressCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
+
+
+def _holds(stroke: Stroke, instant: float) -> bool:
+    return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
+
+
+def _loading(stroke: Stroke, when: Array, log: StageLog) -> LoadingCurve | str:
+    """Return the loading of a press whose log has its rows at instants `when` (n,) [s]; or why there is none."""
+    curve = stroke.curve
+    assert curve is not None
+    assert stroke.onset is not None
+    last = float(curve.time[int(np.nanargmax(curve.normal))])
+    finite = np.isfinite(when)
+    when, displacement, width = when[finite], log.displacement[finite], log.width[finite]
+    inside = np.flatnonzero((when >= stroke.onset) & (when <= last))
+    if not len(when) or when[0] > stroke.onset or when[-1] < last:
+        return "the log does not follow it from its onset to its greatest force"
+    around = when[max(inside[0] - 1, 0) : inside[-1] + 2] if len(inside) else when[:0]
+    if not len(inside) or float(np.diff(around).max(initial=0.0)) > LONGEST_GAP:
+        return f"the log has a gap of more than {LONGEST_GAP:g} s in it"
+    loading = (curve.time >= stroke.onset) & (curve.time <= last) & np.isfinite(curve.normal)
+    travel = np.interp(curve.time[loading], when, displacement)
+    force = curve.normal[loading]
+    # A stage that stands while the finger relaxes adds nothing but time: it ends where it has arrived.
+    arrived = int(np.argmax(travel >= travel.max() - 1e-3 * np.ptp(travel))) + 1
+    travel, force = travel[:arrived], force[:arrived]
+    if travel[-1] - travel[0] < LEAST_TRAVEL:
+        return (
+            f"the log moves by {travel[-1] - travel[0]:.2g} mm while the force grows, and less than {LEAST_TRAVEL:g} "
+            "mm is no press: displacement must be positive into the finger, on the session's clock"
+        )
+    lengths = np.interp(curve.time[loading][:arrived], when, width)  # nan beside every row that has none
+    return LoadingCurve.of(travel, force, lengths)
+
+
+def _hold(stroke: Stroke, when: Array, displacement: Array) -> HoldCurve | None:
+    """Return the readings of a press to the end of its hold; None where the stage hardly stands."""
+    curve = stroke.curve
+    assert curve is not None
+    assert stroke.onset is not None
+    finite = np.isfinite(when)
+    followed = (curve.time >= stroke.onset) & (curve.time <= when[finite][-1]) & np.isfinite(curve.normal)
+    time, force = curve.time[followed], curve.normal[followed]
+    travel = np.interp(time, when[finite], displacement[finite])
+    standing = np.flatnonzero(travel >= travel.max() - STANDS * np.ptp(travel))
+    if time[standing[-1]] - time[standing[0]] < SHORTEST_HOLD:
+        return None
+    upto = slice(0, int(standing[-1]) + 1)
+    return HoldCurve(time[upto], travel[upto], force[upto])
+
+
+def deepest(curves: PressCurves) -> float:
+    """Return the greatest travel of any press [mm]."""
+    return max(float(one.displacement.max() - one.touch) for one in curves.presses)

@@ -1,0 +1,231 @@
+"""The model's force of a press for any stiffnesses of the layers, from few solves.
+
+At small strain N is linear in all stiffnesses together, so only two contrasts between the three layers are left, and
+the depth. Over them log N is a polynomial through solved forces and their exact derivatives by each stiffness.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from sessions.prediction.solving import settled
+from solver import Cancelled, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
+from solver.response.nearby import stiffness_shares
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], bool]
+
+LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
+# Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
+CONTRASTS = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, -2.0]]) / np.sqrt([[2.0], [6.0]])
+REACH = 3.3  # contrasts reach so many deviations of the prior: 0.4 % of a two-dimensional normal law lies beyond
+DEGREE = 7  # of the polynomial; 6 misses solved forces by twice as much, 8 by as much as 7
+RINGS = (1, 5, 8, 12)  # contrasts solved on circles: 26 forces and 52 slopes for the 36 numbers of degree 7
+DEGREE_OF_WIDTH = 4  # of the contact's length, whose derivatives nobody has: 15 numbers
+DEGREE_OF_FRICTION = 2  # of what friction adds to log N, 2 to 13 % over contrasts and depths
+RINGS_OF_FRICTION = (1, 4, 5)  # 10 forces for the 6 numbers of degree 2
+DEPTHS = 9  # at which presses are solved; between them log N follows log depth as a cubic spline
+CHECKED = 4  # depths at which a fitted finger is solved
+SHALLOWEST = 0.05  # of the deepest: a contact of few elements is not worth more
+
+
+class FitError(Exception):
+    """The finger cannot be fitted: why, and what to do."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PressModel:
+    """log N over depth and stiffness contrasts; k depths."""
+
+    scene: Scene  # whose finger and stiffnesses the contrasts are counted from
+    spread: float  # of the prior of each log stiffness, its standard deviation [-]
+    depth: Array  # (k,) [mm]
+    coefficients: Array  # (c, k) of log N [N/mm]
+    width: Array  # (w, k) of the log of the contact's length along the finger [mm]
+    mu: float  # friction of the surface that is pressed [-]
+    error: float  # of the solved forces as the solver estimates it, and of the polynomial between them, relative [-]
+    width_error: Array  # (k,) likewise of the contact, which is coarse where it is short [-]
+
+    def log_force(self, contrast: Array) -> Array:
+        """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, the mean log stiffness kept."""
+        return _basis(contrast, DEGREE)[0] @ self.coefficients
+
+    def slopes(self, contrast: Array) -> Array:
+        """Return how that changes with both contrasts (g, 2, k)."""
+        return np.stack([part @ self.coefficients for part in _basis(contrast, DEGREE)[1:]], axis=1)
+
+    def log_width(self, contrast: Array) -> Array:
+        """Return the log of the contact's length (g, k) [mm]; the mean log stiffness does not matter."""
+        return _basis(contrast, DEGREE_OF_WIDTH)[0] @ self.width
+
+    def width_slopes(self, contrast: Array) -> Array:
+        """Return how that changes with both contrasts (g, 2, k)."""
+        return np.stack([part @ self.width for part in _basis(contrast, DEGREE_OF_WIDTH)[1:]], axis=1)
+
+    def force(self, stiffness: Array, depth: Array) -> Array:
+        """Return N (n,) [N] of the whole finger with layers of a `stiffness` (3,) [MPa] at depths (n,) [mm]."""
+        mean, contrast = self.place(stiffness)
+        log = self.log_force(contrast[None]) + mean + np.log(self.scene.finger.width)
+        return at_depths(CubicSpline(np.log(self.depth), log, axis=1), depth[None])[0][0]
+
+    def place(self, stiffness: Array) -> tuple[float, Array]:
+        """Return the mean log factor and the contrast (2,) of a `stiffness` (3,) [MPa]."""
+        log = np.log(stiffness) - np.log([self.scene.materials.of(name).E for name in LAYERS])
+        return float(log.mean()), CONTRASTS @ log / self.spread
+
+    def stiffnesses(self, mean: Array, contrast: Array) -> Array:
+        """Return each layer's stiffness (g, 3) [MPa] for mean log factors (g,) and contrasts (g, 2)."""
+        reference = [self.scene.materials.of(name).E for name in LAYERS]
+        return np.array(reference) * np.exp(mean[:, None] + self.spread * contrast @ CONTRASTS)
+
+    def fingers(self, contrast: Array) -> Iterator[Scene]:
+        """Yield the scene with layers of each `contrast` (g, 2)."""
+        for stiffness in self.stiffnesses(np.zeros(len(contrast)), contrast):
+            yield self.finger(stiffness)
+
+    def finger(self, stiffness: Array) -> Scene:
+        """Return the scene with layers of a `stiffness` (3,) [MPa], that at the speed of the presses: none relaxes."""
+        made = self.scene.materials
+        layers = {
+            name: replace(made.of(name), E=float(one), prony=()) for name, one in zip(LAYERS, stiffness, strict=True)
+        }
+        return replace(self.scene, materials=replace(made, **layers))
+
+
+def press_model(
+    scene: Scene, spread: float, deepest: float, mu: float = 0.0, progress: Progress | None = None
+) -> PressModel:
+    """Return the model of presses up to a depth [mm] of the finger of a scene, on a surface of friction `mu`.
+
+    `spread` is the standard deviation of each log stiffness in the prior. Raises FitError where a press has no state,
+    Cancelled where `progress` returns False.
+    """
+    depth = np.geomspace(SHALLOWEST * deepest, deepest, DEPTHS)
+    contrast = _design(RINGS)
+    sticking = _design(RINGS_OF_FRICTION) if mu else np.empty((0, 2))
+    count = len(contrast) + len(sticking)
+    force, width, slope = (np.empty((len(contrast), *more, DEPTHS)) for more in ((), (), (2,)))
+    errors: list[float] = []
+    wide = np.zeros(DEPTHS)
+    blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
+    for at, finger in enumerate(blank.fingers(contrast)):
+        _report(progress, at / count)
+        found = _pressed(finger, depth, 0.0)
+        force[at] = np.log([one.normal_force for one in found])
+        shares = stiffness_shares(found)[:, : len(LAYERS)]
+        slope[at] = spread * CONTRASTS @ shares.T
+        width[at] = np.log([one.contact_width for one in found])
+        errors += [one.normal_force_error or 0.0 for one in found]
+        wide += np.array([one.contact_width_error or 0.0 for one in found]) / len(contrast)
+    basis = np.vstack(_basis(contrast, DEGREE))
+    known = np.vstack([force, slope[:, 0], slope[:, 1]])
+    coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
+    residual = basis[: len(contrast)] @ coefficients - force
+    if mu:
+        more = np.empty((len(sticking), DEPTHS))
+        for at, finger in enumerate(blank.fingers(sticking)):
+            _report(progress, (len(contrast) + at) / count)
+            more[at] = np.log([one.normal_force for one in _pressed(finger, depth, mu)])
+        more -= _basis(sticking, DEGREE)[0] @ coefficients
+        basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
+        friction = np.linalg.lstsq(basis, more, rcond=None)[0]
+        residual = np.vstack([residual, basis @ friction - more])
+        coefficients[_orders(DEGREE).sum(axis=1) <= DEGREE_OF_FRICTION] += friction
+    error = float(np.hypot(np.mean(errors), np.sqrt(np.mean(residual**2))))
+    basis = _basis(contrast, DEGREE_OF_WIDTH)[0]
+    of_width = np.linalg.lstsq(basis, width, rcond=None)[0]
+    wide = np.hypot(wide, np.sqrt(np.mean((basis @ of_width - width) ** 2, axis=0)))
+    return replace(blank, coefficients=coefficients, width=of_width, error=error, width_error=wide)
+
+
+class Check(NamedTuple):
+    """What the solver itself says of a finger that was fitted."""
+
+    deviation: float  # the fitted model's forces differ from the solver's own by, at most [-]
+    shares: Array  # (3,) d log N / d log E of each layer at the deepest press, without friction [-]
+
+
+def check(model: PressModel, stiffness: Array, deepest: float) -> Check:
+    """Solve presses up to a depth [mm] of the finger with layers of a `stiffness` (3,) [MPa] and compare forces.
+
+    Raises FitError.
+    """
+    finger = model.finger(stiffness)
+    mean, contrast = model.place(stiffness)
+    upto = np.flatnonzero(model.depth <= deepest)[-CHECKED:]
+    depth = model.depth[upto]
+    fitted = model.log_force(contrast[None])[0, upto] + mean
+    free = _pressed(finger, depth, 0.0)
+    sticking = _pressed(finger, depth, model.mu) if model.mu else free
+    deviation = np.abs(np.exp(fitted) / np.array([one.normal_force for one in sticking]) - 1.0)
+    return Check(float(deviation.max()), stiffness_shares(free[-1:])[0, : len(LAYERS)])
+
+
+def at_depths(spline: CubicSpline, depth: Array) -> tuple[Array, Array]:
+    """Return exp of a spline (g) of log depth at depths (g, n) [mm], and its derivative by depth.
+
+    Beyond its knots the logarithm goes on straight: a power law.
+    """
+    depth = np.maximum(depth, 1e-9)  # above the skin nothing presses
+    knots, log = spline.x, np.log(depth)
+    inside = np.clip(log, knots[0], knots[-1])
+    piece = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    cubic, square, line, constant = spline.c[:, piece, np.arange(len(depth))[:, None]]
+    by = inside - knots[piece]
+    slope = (3.0 * cubic * by + 2.0 * square) * by + line
+    value = np.exp(((cubic * by + square) * by + line) * by + constant + slope * (log - inside))
+    return value, value * slope / depth
+
+
+def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
+    """Return presses with friction; without it those of a slide, which are the same states."""
+    slide: Slide = "none" if mu else "+x"
+    loads = [Loading(float(one), slide) for one in depth]
+    try:
+        scenes = [replace(finger, friction=Friction(mu), loading=one, solve=Solve(evidence="quick")) for one in loads]
+    except SceneError as unfit:
+        raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
+    found = [one for one in settled(scenes) if one is not None]
+    if len(found) < len(scenes):
+        raise FitError(
+            f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "
+            "the finger's own dimensions with --finger."
+        )
+    return found
+
+
+def _report(progress: Progress | None, part: float) -> None:
+    if progress is not None and not progress(part):
+        raise Cancelled
+
+
+def _design(rings: Sequence[int]) -> Array:
+    """Return contrasts (g, 2) on rings of so many points, whose radii lie like Chebyshev's, in deviations."""
+    radii = REACH * np.sin(np.linspace(0.0, np.pi / 2.0, len(rings)))
+    points = [
+        radius * np.array([np.cos(angle), np.sin(angle)])
+        for number, (radius, count) in enumerate(zip(radii, rings, strict=True))
+        for angle in 2.0 * np.pi * (np.arange(count) + 0.5 * (number % 2)) / count
+    ]
+    return np.array(points)
+
+
+def _orders(degree: int) -> NDArray[np.int64]:
+    """Return the orders (c, 2) of the Chebyshev products up to a total degree."""
+    return np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def _basis(contrast: Array, degree: int) -> tuple[Array, Array, Array]:
+    """Return Chebyshev products (g, c) up to a total degree at contrasts (g, 2), and their derivatives by both."""
+    value = [chebyshev.chebvander(contrast[:, axis] / REACH, degree) for axis in (0, 1)]
+    by = np.zeros((degree + 1, degree + 1))
+    for order in range(1, degree + 1):
+        by[:degree, order] = np.asarray(chebyshev.chebder(np.eye(degree + 1)[order]), np.float64) / REACH
+    slope = [one @ by for one in value]
+    i, j = _orders(degree).T
+    return value[0][:, i] * value[1][:, j], slope[0][:, i] * value[1][:, j], value[0][:, i] * slope[1][:, j]

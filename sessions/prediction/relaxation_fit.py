@@ -1,0 +1,225 @@
+"""How the tissues of a finger relax, from presses that are held: part g and time tau of one Prony term.
+
+All layers relax alike. The force is then the elastic one for the depth so far, less what has relaxed of it
+(quasi-linear viscoelasticity: Fung 1993, Biomechanics, section 7.6):
+
+N(t) = a [(1 - g) e(t) + g h(t)], dh/dt = de/dt - h / tau,
+
+with e(t) the force of the finger that was fitted, whose size a is found anew, since a press is too slow to be elastic.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sessions.prediction.finger_fit import QUANTILES, FingerFit, Interval, LoadingCurve, fit
+from sessions.prediction.press_model import LAYERS, FitError, PressModel
+from solver import Relaxation, Scene
+
+Array = NDArray[np.float64]
+
+BLOCK = 0.05  # forces are compared as means over so long: filtered at 20 Hz, they hang together for about that [s]
+TRIED = 60  # of each number at once, between bounds that are drawn closer ...
+ROUNDS = 5  # ... so many times at most, until ...
+FINE = 12.0  # ... so many of each carry the posterior (inverse Simpson index)
+TURNS, AGREED = 8, 0.003  # of finger and relaxation at most, and the change of the part that ends them [-]
+LEAST_PART = 0.01  # a part that may be less is not told from none [-]
+LARGEST_PART = 0.95  # a scene allows 0.99 [-]
+LONGEST = 10.0  # relaxation times are tried from a block to so many times the longest hold
+FEWEST = 10  # blocks beyond the numbers that are looked for
+
+
+class HoldCurve(NamedTuple):
+    """One press from its touch to the end of its hold: n readings."""
+
+    time: Array  # (n,) [s]
+    displacement: Array  # (n,) as the log has it [mm]
+    force: Array  # (n,) normal [N]
+
+    @property
+    def fall(self) -> float:
+        """By how much the force falls from its greatest to the end, in means over a block, by the greatest [-]."""
+        force = _means(np.floor((self.time - self.time[0]) / BLOCK).astype(np.int64), self.force)
+        return float(1.0 - force[-1] / force.max())
+
+    def at_once(self, part: float, tau: float) -> "HoldCurve":
+        """Return the press with the forces that it would have had if nothing had relaxed since its touch."""
+        out = np.empty(len(self.force))
+        out[0] = after = self.force[0]
+        for at in range(1, len(out)):
+            by = float(self.time[at] - self.time[at - 1]) / tau
+            kept, grown = np.exp(-by), -np.expm1(-by) / by
+            rest = self.force[at] - part * (kept * after - grown * out[at - 1])
+            out[at] = rest / (1.0 - part + part * grown)
+            after = kept * after + grown * (out[at] - out[at - 1])
+        return self._replace(force=out)
+
+
+@dataclass(frozen=True, slots=True)
+class RelaxationFit:
+    """What is known of one Prony term that all layers share."""
+
+    part: Interval  # g [-]
+    time: Interval  # tau [s]
+    at_once: float  # stiffness at once by that of the finger fitted as if it were elastic [-]
+    sentence: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        return {
+            "part": self.part._asdict(),
+            "time": self.time._asdict(),
+            "at_once": self.at_once,
+            "sentence": self.sentence,
+        }
+
+    def relaxing(self, scene: Scene) -> Scene:
+        """Return a scene whose layers are as stiff at once as found here and relax."""
+        term = (Relaxation(self.part.value, self.time.value),)
+        layers = {name: scene.materials.of(name) for name in LAYERS}
+        made = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
+        return replace(scene, materials=replace(scene.materials, **made))
+
+
+def relaxing_fit(
+    model: PressModel,
+    presses: Sequence[LoadingCurve],
+    holds: Sequence[HoldCurve],
+    gain_error: float = 0.0,
+    seed: int = 0,
+) -> tuple[FingerFit, RelaxationFit]:
+    """Return the stiffnesses at once of a finger that relaxes, and how it does, from presses that are all held.
+
+    A press is too slow to be elastic, and what relaxes on its way bends the force over depth. So both are found in
+    turns: the relaxation for the finger, and the finger for forces out of which the relaxation was taken. Raises
+    FitError where no press is held.
+    """
+    found = fit(model, presses, gain_error, seed)
+    rate = relaxation(model, found, holds)
+    for _ in range(TURNS):
+        before = rate.part.value
+        calm = [
+            one._replace(force=_rebinned(one, hold.at_once(rate.part.value, rate.time.value)))
+            for one, hold in zip(presses, holds, strict=True)
+        ]
+        found = fit(model, calm, gain_error, seed)
+        rate = relaxation(model, found, holds)
+        if abs(rate.part.value - before) < AGREED:
+            break
+    return found, rate
+
+
+def _rebinned(press: LoadingCurve, hold: HoldCurve) -> Array:
+    """Return the forces (n,) of a hold's readings on its way, as the points of a press have them."""
+    way = slice(0, press.readings)
+    return LoadingCurve.of(hold.displacement[way], hold.force[way], np.zeros(press.readings)).force
+
+
+def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
+    """Return how a finger relaxes in presses that are held.
+
+    g is equally likely from 0 to 0.95 before, tau equally likely in its logarithm; a and the noise are integrated in
+    closed form, as for the stiffness. Raises FitError where no press is held.
+    """
+    if not presses:
+        raise FitError("No press is held: let the stage stand for half a second or more before it lifts.")
+    stiffness = np.array([found.scene.materials.of(name).E for name in LAYERS])
+    elastic = [
+        model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, found.touch, strict=True)
+    ]
+    limits = (0.0, LARGEST_PART), (BLOCK, LONGEST * max(float(np.ptp(one.time)) for one in presses))
+    bounds, rounds = limits, 0
+    while True:
+        rounds += 1
+        parts: Array = np.linspace(*bounds[0], TRIED)
+        times = np.geomspace(*bounds[1], TRIED)
+        log, at_once = _posterior(presses, elastic, parts, times, model.error)
+        weight = np.exp(log - log.max())
+        marginal: tuple[Array, Array] = (weight.sum(axis=1), weight.sum(axis=0))
+        if rounds == ROUNDS or min(float(one.sum() ** 2 / (one**2).sum()) for one in marginal) >= FINE:
+            break
+        bounds = _about(parts, marginal[0]), _about(times, marginal[1])
+    at = np.unravel_index(int(log.argmax()), log.shape)
+    low, high = _ends(parts, marginal[0])
+    part = Interval(float(parts[at[0]]), low, None if high >= LARGEST_PART else high)
+    low, high = _ends(times, marginal[1])
+    edge = 1.0 + 1e-6
+    time = Interval(
+        float(times[at[1]]), None if low <= limits[1][0] * edge else low, None if high * edge >= limits[1][1] else high
+    )
+    return RelaxationFit(part, time, float(at_once[at]), _sentence(part, time))
+
+
+def _posterior(
+    presses: Sequence[HoldCurve], elastic: Sequence[Array], parts: Array, times: Array, error: float
+) -> tuple[Array, Array]:
+    """Return the log posterior (g, t) of parts (g,) and times (t,), and the stiffness at once that fits best (g, t).
+
+    `elastic` are the forces (n,) of each press without relaxing, which the model knows but for an `error` [-].
+    """
+    misfit, spread, size = np.zeros((3, len(parts), len(times)))
+    count = 0
+    for one, calm in zip(presses, elastic, strict=True):
+        block = np.floor((one.time - one.time[0]) / BLOCK).astype(np.int64)
+        force, base, after = (_means(block, part) for part in (one.force, calm, _fading(one.time, calm, times)))
+        shape = base[:, None, None] + parts[:, None] * (after - base[:, None])[:, None, :]  # (n, g, t)
+        square = (shape**2).sum(axis=0)
+        factor = np.einsum("n,ngt->gt", force, shape) / square
+        misfit += ((factor * shape - force[:, None, None]) ** 2).sum(axis=0) + float(np.sum((error * force) ** 2))
+        spread += np.log(square)
+        size += np.log(factor) / len(presses)
+        count += len(force)
+    free = count - len(presses)
+    if free < FEWEST:
+        raise FitError(f"Presses are held for {count * BLOCK:.2g} s in all, which is too short: hold them longer.")
+    return -(free * np.log(misfit) + spread) / 2.0, np.exp(size)
+
+
+def _fading(time: Array, elastic: Array, times: Array) -> Array:
+    """Return h (n, t) for an elastic force (n,) that grows evenly between instants, for relaxation times (t,).
+
+    Exact for that (Taylor, Pister and Goudreau 1970).
+    """
+    out = np.zeros((len(time), len(times)))
+    out[0] = elastic[0]
+    for at in range(1, len(time)):
+        by = (time[at] - time[at - 1]) / times
+        out[at] = np.exp(-by) * out[at - 1] - np.expm1(-by) / by * (elastic[at] - elastic[at - 1])
+    return out
+
+
+def _means(block: NDArray[np.int64], values: Array) -> Array:
+    """Return the means (b, ...) of values (n, ...) over blocks numbered (n,) in order."""
+    firsts = np.flatnonzero(np.diff(block, prepend=-1))
+    counts = np.diff(np.append(firsts, len(block)))
+    return (np.add.reduceat(values, firsts, axis=0).T / counts).T
+
+
+def _about(values: Array, weight: Array) -> tuple[float, float]:
+    """Return bounds about the values (n,) that carry a weight."""
+    carry = np.flatnonzero(weight > 1e-6 * weight.max())
+    return float(values[max(carry[0] - 1, 0)]), float(values[min(carry[-1] + 1, len(values) - 1)])
+
+
+def _ends(values: Array, weight: Array) -> tuple[float, float]:
+    """Return the ends of a 95 % interval of values (n,) of a weight."""
+    sums = np.cumsum(weight) / weight.sum()
+    low, high = (float(values[int(np.searchsorted(sums, one))]) for one in QUANTILES)
+    return low, high
+
+
+def _sentence(part: Interval, time: Interval) -> str:
+    """Say what the holds tell."""
+    if part.low is not None and part.low < LEAST_PART:
+        return "The holds do not show that the finger relaxes: the part that does may be none."
+    if time.high is None or part.high is None:
+        return "The finger still relaxes when the holds end: hold longer to know how far and for how long it goes on."
+    if time.low is None:
+        return "The finger has relaxed before readings can follow it: the time is an upper bound alone."
+    return (
+        f"After the hold {100 * (1.0 - part.value):.0f} % of the stiffness at once is left; the rest goes with "
+        f"{time.value:.2g} s."
+    )

@@ -1,0 +1,107 @@
+"""A finger planted in a session of presses comes back by the command line, and its file serves other verbs."""
+
+import json
+
+import numpy as np
+import pytest
+from planted_fingers import law
+
+from daq_app.cli.main import run
+from sessions.prediction import finger_in
+from sessions.prediction.press_model import PressModel
+
+PLANTED = (0.25, 0.1, 0.025)  # [MPa]
+RATE, DEEP, TOUCH = 200.0, 1.4, 3.2  # [Hz], [mm], displacement of the stage at the touch [mm]
+
+
+def stage(time, begin):
+    """Return depth [mm] of a press that goes down within 1 s, holds for 1 s and lifts within 0.3 s."""
+    return DEEP * np.clip(np.minimum((time - begin) / 1.0, (begin + 2.3 - time) / 0.3), 0.0, 1.0) - 0.2
+
+
+@pytest.fixture(scope="module")
+def pressed(tmp_path_factory):
+    """Files of forces and of a stage, on one clock, of three presses of a planted finger without friction."""
+    folder = tmp_path_factory.mktemp("pressed")
+    time = np.arange(round(14.0 * RATE)) / RATE
+    depth = np.max([stage(time, begin) for begin in (1.5, 5.5, 9.5)], axis=0)
+    rng = np.random.default_rng(8)
+    force = np.zeros((len(time), 6))
+    force[:, 2] = -law(PLANTED)(depth)
+    force += rng.standard_normal(force.shape) * 0.003
+    header = "t_s,Fx_N,Fy_N,Fz_N,Tx_Nmm,Ty_Nmm,Tz_Nmm"
+    np.savetxt(folder / "forces.csv", np.column_stack([time, force]), "%.6f", ",", header=header, comments="")
+    log = np.column_stack([time, depth + TOUCH])[::2]
+    np.savetxt(folder / "stage.csv", log, "%.6f", ",", header="time_s,displacement_mm", comments="")
+    assert run(["import", str(folder / "forces.csv"), "--out", str(folder / "session"), "--json"]) == 0
+    return folder
+
+
+@pytest.mark.slow
+def test_a_planted_finger_comes_back_and_its_scene_is_taken_by_solve_and_predict(pressed, tmp_path, capsys):
+    out = tmp_path / "own.toml"
+    words = ["fit-finger", str(pressed / "session"), "--displacement", str(pressed / "stage.csv"), "--mu", "0"]
+    capsys.readouterr()
+    assert run([*words, "--relaxation", "--scene", str(out), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["presses"]) == 3
+    for layer, true in zip(told["layers"], PLANTED, strict=True):
+        assert layer["stiffness"]["low"] < true < layer["stiffness"]["high"]
+    for touch in told["touch"]:
+        assert touch == pytest.approx(TOUCH, abs=0.05)
+    assert told["check"]["deviation"] < 0.02
+    assert told["relaxation"]["part"]["low"] < 0.02  # what was planted does not relax
+    scene, _ = finger_in(out)
+    depth = np.array([0.4, 0.8, 1.1])
+    own = law([scene.materials.of(name).E for name in ("epidermis", "dermis", "fat")], depths=depth)
+    np.testing.assert_allclose(own(depth), law(PLANTED)(depth), rtol=0.05)
+    assert run(["solve", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["normal_force"] > 0.0
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """No model is solved: what is tested fails before."""
+
+    def refuse(*_: object, **__: object) -> PressModel:
+        raise AssertionError("solved")
+
+    monkeypatch.setattr("daq_app.cli.verbs.fit_finger.press_model", refuse)
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("content", "words", "code", "named"),
+    [
+        ("time_s,x\n0,1\n1,2\n", [], 1, "displacement_mm"),
+        ("time_s,displacement_mm\n0,1\n0,2\n", [], 1, "line 3: time_s does not grow"),
+        ("time_s,displacement_mm\n0,1\n1,much\n", [], 1, "line 3"),
+        ("time_s,displacement_mm\n0,1\n1,2\n", [], 1, "does not follow it"),
+        ("sequence,displacement_mm\n0,1\n1,2\n", ["--shift", "2"], 2, "--shift"),
+        ("time_s,displacement_mm\n0,1\n1,2\n", ["--prior", "0.5"], 2, "--prior 0.5"),
+    ],
+)
+def test_a_log_or_option_that_cannot_be_taken_is_one_sentence(pressed, tmp_path, capsys, content, words, code, named):
+    log = tmp_path / "log.csv"
+    log.write_text(content)
+    capsys.readouterr()
+    assert run(["fit-finger", str(pressed / "session"), "--displacement", str(log), *words]) == code
+    said = capsys.readouterr().err
+    assert named in said
+    assert said.count("\n") == 1 or "left out" in said
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_stage_that_moves_the_other_way_is_named(pressed, tmp_path, capsys):
+    rows = np.loadtxt(pressed / "stage.csv", delimiter=",", skiprows=1)
+    rows[:, 1] *= -1.0
+    np.savetxt(tmp_path / "back.csv", rows, "%.6f", ",", header="time_s,displacement_mm", comments="")
+    words = ["fit-finger", str(pressed / "session"), "--displacement", str(tmp_path / "back.csv")]
+    assert run(words) == 1
+    assert "positive into the finger" in capsys.readouterr().err
+
+
+def test_a_visit_without_forces_holds_no_press_that_can_be_fitted(pressed, tmp_path, capsys):
+    words = ["fit-finger", str(tmp_path / "nowhere"), "--displacement", str(pressed / "stage.csv")]
+    assert run(words) == 1
+    assert "nowhere" in capsys.readouterr().err
