@@ -224,7 +224,7 @@ def test_points_on_springs_carry_what_their_springs_and_the_law_say(law):
 def test_compiled_loops_find_the_states_and_forces_that_plain_numpy_finds(law):
     for plain, found in zip(driven_plainly(law), driven(law), strict=True):
         np.testing.assert_array_equal(found.state, plain.state)
-        for name in ("normal", "tangential", "gap", "slid"):
+        for name in ("normal", "tangential", "gap", "slip"):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-13)
 
 
