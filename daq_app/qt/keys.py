@@ -43,6 +43,8 @@ KEYS = (
     Key("+", "longer", "show a longer stretch of time"),
     Key("-", "shorter", "show a shorter stretch of time"),
     Key("M", "model", "live model at finite strain, or at small strain again"),
+    Key("D", "drawer", "open or close the drawer: six axes, sample and finger"),
+    Key("I", "inspect", "inspect the last stroke's trial, and go back; a click on a tile inspects any trial"),
     Key("B", "bench", "show or fold the bench"),
     Key("F6", "subject", "show the subject's window and go to it"),
     Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),

@@ -15,6 +15,7 @@ from daq_app.window.live_trace import CHANNELS
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
+NAMES = {"N": "Normal force", "T": "Tangential force", "mu": "Friction coefficient", "speed": "Speed"}  # as spoken
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 
 
@@ -76,7 +77,8 @@ class LiveBar(QWidget):
             text = text.replace("-", "−")
             if text != self.values[channel].text():
                 say(self.values[channel], text)
-                self.values[channel].setAccessibleName(f"{_name(channel)} {text}")
+                spoken = "no number" if text == "–" else text
+                self.values[channel].setAccessibleName(f"{NAMES[channel]} {spoken}")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Leave out the numbers that would be cut, the last first."""
@@ -115,11 +117,11 @@ class LiveBar(QWidget):
 
     def _place_numbers(self, row: QHBoxLayout) -> None:
         for channel, _, _, colour in READ:
-            name = _name(channel)
+            name = short_name(channel)
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setAccessibleName(f"{name}: no number")
+            value.setAccessibleName(f"{NAMES[channel]} no number")
             caption = label(name, "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
@@ -129,5 +131,6 @@ class LiveBar(QWidget):
             self._pairs.append((caption, value))
 
 
-def _name(channel: str) -> str:
+def short_name(channel: str) -> str:
+    """Return how a channel is written where there is little room."""
     return {"mu": "µ"}.get(channel, channel)

@@ -14,7 +14,13 @@ from daq_app.qt.keys import KEYS
 
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on"), ("note", "Note…"), ("end", "End…"))
-PANELS = (("bench", "Bench"), ("hold", "Hold the picture"), ("model", "Live model at finite strain"))
+PANELS = (
+    ("bench", "Bench"),
+    ("drawer", "Drawer: axes, sample, finger"),
+    ("inspect", "Inspect the last trial"),
+    ("hold", "Hold the picture"),
+    ("model", "Live model at finite strain"),
+)
 LIBRARIES = ("PySide6", "numpy", "scipy", "numba")
 
 

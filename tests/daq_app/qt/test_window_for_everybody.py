@@ -308,8 +308,8 @@ def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
 def test_a_number_is_read_aloud_with_its_value(driver):
     bar = driver.window.live.bar
     bar.show_numbers(np.full((len(CHANNELS), 3), 0.5))
-    assert bar.values["N"].accessibleName() == "N 0.50 N"
-    assert bar.values["mu"].accessibleName() == "µ 0.50"
+    assert bar.values["N"].accessibleName() == "Normal force 0.50 N"
+    assert bar.values["mu"].accessibleName() == "Friction coefficient 0.50"
 
 
 @pytest.mark.parametrize("size", [16, 64, 256])
