@@ -78,12 +78,12 @@ class BenchPanel(QFrame):
             ("tare", view.tare),
             ("drift", view.drift),
         ):
-            say(self._fields[name], text)
+            say(self._fields[name], text, name)
         for name, text in view.life:
-            say(self._life[name], text)
+            say(self._life[name], text, name)
         for name, text in view.counters:
             if name in self._counters:
-                say(self._counters[name], text)
+                say(self._counters[name], text, name)
                 regrade(self._counters[name], "look" if name != "lag" and text != "0" else "")
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout
 
 from daq_app.qt.curve import Curve
-from daq_app.qt.live_bar import NAMES, short_name
+from daq_app.qt.live_bar import short_name, spoken
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.parts import button, label, regrade, say
 from daq_app.qt.tokens import GRID, MU, N, T, Tokens
@@ -68,8 +68,7 @@ class InspectedTrial(QFrame):
         self.details.setVisible(bool(shown.details))
         for name, text in shown.cells:
             say(self.cells[name], text)
-            spoken = "no number" if text == "–" else text
-            self.cells[name].setAccessibleName(f"{NAMES[name]} {spoken}")
+            self.cells[name].setAccessibleName(spoken(name, text))
         for plot in self._plots:
             plot.setVisible(shown.picture is not None)
         if shown.picture is not None:

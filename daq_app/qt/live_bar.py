@@ -77,8 +77,7 @@ class LiveBar(QWidget):
             text = text.replace("-", "−")
             if text != self.values[channel].text():
                 say(self.values[channel], text)
-                spoken = "no number" if text == "–" else text
-                self.values[channel].setAccessibleName(f"{NAMES[channel]} {spoken}")
+                self.values[channel].setAccessibleName(spoken(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Leave out the numbers that would be cut, the last first."""
@@ -121,7 +120,7 @@ class LiveBar(QWidget):
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setAccessibleName(f"{NAMES[channel]} no number")
+            value.setAccessibleName(spoken(channel, "–"))
             caption = label(name, "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
@@ -129,6 +128,15 @@ class LiveBar(QWidget):
             row.addWidget(value)
             self.values[channel] = value
             self._pairs.append((caption, value))
+
+
+def spoken(channel: str, text: str) -> str:
+    """Return what a screen reader says of a number.
+
+    >>> spoken("N", "1.20 N"), spoken("mu", "–")
+    ('Normal force 1.20 N', 'Friction coefficient no number')
+    """
+    return f"{NAMES[channel]} {'no number' if text == '–' else text}"
 
 
 def short_name(channel: str) -> str:

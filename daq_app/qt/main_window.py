@@ -36,7 +36,7 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import headline
 from daq_app.window.messages import Message, NewSession
-from daq_app.window.new_session import Refused, bench_of, checked
+from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from sessions.recording import Setting
@@ -71,7 +71,7 @@ class MainWindow(QMainWindow):
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
-        self.page = NewSessionPage(scale, bridge.send, lambda: self.act("ruler"))
+        self.page = NewSessionPage(scale, bridge.send, self.act)
         self.course = CoursePanel(scale, bridge.send)
         self.middle = Middle(bridge, tokens, scale, self.act)
         self.live = self.middle.live
@@ -176,6 +176,7 @@ class MainWindow(QMainWindow):
             "bench": self._fold_bench,
             "drawer": self.middle.toggle_drawer,
             "inspect": self.middle.toggle_inspection,
+            "pilot": self._pilot,
             "subject": self.show_subject,
             "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
             "open": self.rooms.choose,
@@ -241,20 +242,30 @@ class MainWindow(QMainWindow):
     def _start_session(self) -> None:
         if self.bridge.view.course is not None:
             return
+        bench = bench_of(self.bridge.state.bench)
+        cards = self.page.check(bench, anew=True)
+        if all(card.ready for card in cards):
+            self._begin(self.page.form(), bench)
+        else:
+            self._form_changed()
+            self.page.go_to_missing()
+
+    def _pilot(self) -> None:
+        if self.bridge.view.course is None and self.rooms.room == "prepare":
+            bench = bench_of(self.bridge.state.bench)
+            self._begin(pilot_form(self.page.form(), bench), bench)
+        else:
+            self.notice.warn("A protocol is piloted in Prepare, while no session is in hand.")
+
+    def _begin(self, form: SessionForm, bench: Bench) -> None:
+        """Ask the recorder for the session of a form; what keeps it from beginning is said."""
         shown = millimetres(self.subject.screen())
         origin = "measured" if shown.checked else "default"
         settings = (
             Setting("answer line length", LENGTH, "mm", origin),
             Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
         )
-        cards = self.page.check(bench_of(self.bridge.state.bench), anew=True)
-        if not all(card.ready for card in cards):
-            self._form_changed()
-            self.page.go_to_missing()
-            return
-        made = checked(
-            self.page.form(), bench_of(self.bridge.state.bench), datetime.now(), secrets.randbelow(2**31), settings
-        )
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), settings)
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return

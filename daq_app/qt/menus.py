@@ -45,6 +45,7 @@ class Menus:
         self._add(file, "quit", "Quit")
         self.session = bar.addMenu("&Session")
         self._add(self.session, "new", "New session")
+        self.pilot = self._add(self.session, "pilot", "Pilot the protocol")
         self._add(self.session, "tare", "Zero the bench")
         self.session.addSeparator()
         self.course = [self._add(self.session, name, words) for name, words in SESSION]
@@ -70,6 +71,7 @@ class Menus:
         """Offer what can be done now."""
         for made in self.course:
             made.setEnabled(in_hand and not over)
+        self.pilot.setEnabled(not in_hand)
         for made in (self.report, self.export):
             made.setEnabled(opened)
 

@@ -108,7 +108,6 @@ class Middle(QWidget):
         self.strip.show_inspected(None if shown is None else shown.number)
 
     def _show_stroke(self, words: str, details: str, grade: str) -> None:
-        say(self.stroke, words)
+        say(self.stroke, words, "The last stroke:")
         self.stroke.setToolTip(details)
-        self.stroke.setAccessibleName(f"The last stroke: {words}")
         regrade(self.stroke, grade)
