@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.curve import Curve
 from daq_app.qt.live_bar import short_name, spoken
@@ -24,17 +24,13 @@ PLOTS = (
 )
 
 
-class InspectedTrial(QFrame):
+class InspectedTrial(QWidget):
     """Takes the place of the signals while a trial is inspected; readings go on behind it."""
 
     def __init__(self, tokens: Tokens, scale: float, back: Callable[[], None]) -> None:
         """Show no trial; `back` returns to the signals."""
         super().__init__()
-        self._tokens = tokens
-        self._scale = scale
         self._shown: Inspection | None = None
-        self.setProperty("role", "panel")
-        self.setAccessibleName("inspected trial")
         self.heading = label("", "name", wrap=True)
         self.verdict = label("", "title", wrap=True)
         self.details = label("", "quiet", wrap=True)
@@ -44,7 +40,7 @@ class InspectedTrial(QFrame):
         head.addWidget(self.heading, 1)
         head.addWidget(button("Back to signals  I", "back to the signals of this moment", back))
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
+        layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)
         layout.addLayout(head)
         layout.addWidget(self.verdict)

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import button, label, regrade, say, scrolled
+from daq_app.qt.parts import button, label, panel, regrade, say, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
@@ -31,7 +31,9 @@ class Middle(QWidget):
         self.stroke = label("", wrap=True)
         self.redo = button("Redo  R", "redo the last stroke", lambda: act("redo"))
         self._pages = QStackedWidget()
-        for page in (self.live, scrolled(self.trial)):
+        frame, inside = panel("inspected trial")
+        inside.addWidget(scrolled(self.trial))
+        for page in (self.live, frame):
             self._pages.addWidget(page)
         row = QHBoxLayout()
         row.addWidget(self.stroke, 1)

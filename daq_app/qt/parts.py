@@ -108,9 +108,13 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "") -> 
 
 
 def choice(name: str) -> QComboBox:
-    """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
+    """Return a list to choose from that says `name` to screen readers, and takes the room it is given.
+
+    On Linux Qt gives what is chosen for the name of such a list, and `name` is read as its description.
+    """
     made = QComboBox()
     made.setAccessibleName(name)
+    made.setAccessibleDescription(name)
     made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
@@ -189,7 +193,9 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
 
 def field(layout: QVBoxLayout, words: str, widget: QWidget) -> None:
     """Put words and the field that they ask for below each other."""
-    layout.addWidget(label(words, "quiet", wrap=True))
+    caption = label(words, "quiet", wrap=True)
+    caption.setBuddy(widget)
+    layout.addWidget(caption)
     layout.addWidget(widget)
 
 

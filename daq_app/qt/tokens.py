@@ -166,9 +166,9 @@ QMenuBar, QMenu {{ background: {t.surface}; }}
 QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
 QMenu::item:disabled {{ color: {t.quiet}; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
-QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {px(SMALL)}; }}
-QPushButton[role="tile"][grade="wrong"] {{ color: {t.look}; border: 2px solid {t.look}; font-weight: 600; }}
-QPushButton[role="tile"][grade="current"] {{ border: 2px solid {t.text}; font-weight: 600; }}
+QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {px(SMALL)}; font-weight: 600; }}
+QPushButton[role="tile"][grade="wrong"] {{ color: {t.look}; border: 2px solid {t.look}; }}
+QPushButton[role="tile"][grade="current"] {{ border: 2px solid {t.text}; }}
 QPushButton[role="tile"][grade="coming"] {{ color: {t.quiet}; border-style: dashed; }}
 QPushButton[role="tile"]:checked {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; }}
 QPushButton[role="tile"]:focus {{ border: 2px solid {t.act}; }}

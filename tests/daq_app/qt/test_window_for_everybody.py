@@ -7,11 +7,12 @@ import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
 from PySide6.QtGui import QAccessible, QColor, QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLabel, QLineEdit, QListWidget, QWidget
 
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
+from daq_app.qt.parts import Shortened
 from daq_app.qt.press_bar import FULL, PressBar
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 
@@ -310,6 +311,23 @@ def test_a_number_is_read_aloud_with_its_value(driver):
     bar.show_numbers(np.full((len(CHANNELS), 3), 0.5))
     assert bar.values["N"].accessibleName() == "Normal force 0.50 N"
     assert bar.values["mu"].accessibleName() == "Friction coefficient 0.50"
+
+
+def test_no_name_for_screen_readers_hides_the_value_that_a_label_shows(driver):
+    named = [shown for shown in driver.window.findChildren(QLabel) if shown.text() and shown.accessibleName()]
+    assert driver.window.bench._fields["rate"] in named
+    silent = [shown for shown in named if shown.text() != "–" and not isinstance(shown, Shortened)]
+    assert [s.text() for s in silent if s.text() not in s.accessibleName() and s.text() != "SIMULATED"] == []
+    assert driver.window.bench._fields["rate"].accessibleName().startswith("rate ")
+
+
+def test_every_drop_down_says_what_is_chosen_from(driver):
+    lists = driver.window.findChildren(QComboBox)
+    assert len(lists) >= 6
+    for shown in lists:
+        said = QAccessible.queryAccessibleInterface(shown)
+        assert said.text(QAccessible.Text.Description) == shown.accessibleName() != ""
+        assert said.text(QAccessible.Text.Value) == shown.currentText()
 
 
 @pytest.mark.parametrize("size", [16, 64, 256])
