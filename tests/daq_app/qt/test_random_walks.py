@@ -19,7 +19,7 @@ pytestmark = pytest.mark.qt
 NONE, CONTROL, LEFT = Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.ControlModifier, Qt.MouseButton.LeftButton
 KEY = Qt.Key
 COURSE = [KEY.Key_Space] * 8 + [KEY.Key_R, KEY.Key_S, KEY.Key_P, KEY.Key_N, KEY.Key_0, KEY.Key_I, KEY.Key_D]
-COURSE += [KEY.Key_Escape] * 3 + [KEY.Key_F1, KEY.Key_F2, KEY.Key_F3, KEY.Key_F4, KEY.Key_F6, KEY.Key_Tab]
+COURSE += [KEY.Key_Escape] * 3 + [KEY.Key_F1, KEY.Key_F2, KEY.Key_F3, KEY.Key_F4, KEY.Key_F5, KEY.Key_F6, KEY.Key_Tab]
 COURSE += [KEY.Key_H, KEY.Key_Plus, KEY.Key_Minus, KEY.Key_B, KEY.Key_A, KEY.Key_T, KEY.Key_Return]
 HELD = [KEY.Key_E, KEY.Key_N, KEY.Key_M]
 ANSWER = [KEY.Key_Left, KEY.Key_Right, KEY.Key_Home, KEY.Key_Return, KEY.Key_Return, KEY.Key_Space, KEY.Key_1]
@@ -122,7 +122,12 @@ class Walk:
             page.area.clear()
             page.height_above.clear()
             page.folder.setText(self.right)
-            page.add_protocol(f"{self.right}/three.toml")
+            name = self.random.choice(("three", "three", "magnitude-estimation", "paired-comparison"))
+            if name == "three":
+                page.add_protocol(f"{self.right}/three.toml")
+            else:
+                page.protocol.setCurrentText(name)
+            (page.with_forces if self.random.random() < 0.8 else page.scores_only).setChecked(True)
             page.subject.setText(f"P{self.random.randrange(100)}")
 
     def fault(self):
@@ -135,12 +140,15 @@ class Walk:
         elif what == "plugged":
             self.plug()
         else:
-            bridge.send(Connect("net-ft://127.0.0.1:9"))
+            bridge.send(Connect("net-ft://127.0.0.1?http=9"))
         return what
 
     def plug(self):
-        if self.driver.state.bench.link == "none":
+        """Connect the simulated bench where nothing is connected or being connected; return whether one is."""
+        link = self.driver.state.bench.link
+        if link == "none":
             self.window.bridge.send(Connect("sim:?rate=100"))
+        return link == "open"
 
     # ---- what must hold
 
@@ -158,7 +166,7 @@ class Walk:
         to_do = window.to_do
         if not to_do.sentence.isVisible() or not to_do.sentence.text().strip():
             return "no sentence says what to do"
-        if window.bridge.view.drawing if hasattr(window.bridge.view, "drawing") else self.driver.state.drawing:
+        if self.driver.state.drawing is not None:
             return f"an error in the window: {self.driver.state.drawing}"
         if to_do.primary.isVisible() and to_do.primary.isEnabled():
             return ""
@@ -204,8 +212,7 @@ class Walk:
         driver.until(lambda: driver.state.bench.link != "lost", "the end of the link")
         if driver.state.bench.link == "open" and not driver.state.bench.info.simulated:
             window.bridge.send(Disconnect())
-        self.plug()
-        driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+        driver.until(self.plug, "the simulated bench")
         driver.until(window.to_do.primary.isEnabled, "Start")
 
 
@@ -229,6 +236,23 @@ def walked(driver, seed, files, steps):
     for _ in range(steps):
         walk.step()
     walk.goes_on()
+
+
+def test_a_walk_notices_a_start_that_is_dark_without_a_reason_and_a_dialog_in_the_way(driver, files):
+    walk = Walk(driver, 0, files)
+    assert walk.dead_end() == ""  # the card says that the subject's code is missing
+    words = driver.window.page.frames["Subject"].words
+    said = words.text()
+    words.setText("")
+    assert "no card says why" in walk.dead_end()
+    words.setText(said)
+    box = QMessageBox(driver.window)
+    box.setModal(True)
+    box.show()
+    assert "dialog" in walk.dead_end()
+    box.hide()
+    box.deleteLater()
+    assert walk.dead_end() == ""
 
 
 def test_a_hundred_random_steps_lead_into_no_dead_end(driver, files):
