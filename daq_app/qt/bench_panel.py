@@ -24,6 +24,8 @@ from daq_app.window.view_life import NAMES
 
 SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
 
+SPOKEN = {"tare": "mean of the zero", "drift": "drift of the zero"}  # where a caption alone does not say of what
+
 
 class BenchPanel(QFrame):
     """The right of the experimenter's window."""
@@ -78,7 +80,7 @@ class BenchPanel(QFrame):
             ("tare", view.tare),
             ("drift", view.drift),
         ):
-            say(self._fields[name], text, name)
+            say(self._fields[name], text, SPOKEN.get(name, name))
         for name, text in view.life:
             say(self._life[name], text, name)
         for name, text in view.counters:

@@ -38,7 +38,7 @@ class InspectedTrial(QWidget):
         self._plots = [LivePlot(*plot, tokens, scale, PICTURE) for plot in PLOTS]
         head = QHBoxLayout()
         head.addWidget(self.heading, 1)
-        head.addWidget(button("Back to signals  I", "back to the signals of this moment", back))
+        head.addWidget(button("Back  I", "back to the signals of this moment", back))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)
@@ -94,7 +94,7 @@ class InspectedTrial(QWidget):
         grid.setHorizontalSpacing(GRID)
         grid.setVerticalSpacing(0)
         for at, name in enumerate(PICTURE):
-            self.cells[name] = label("–", "name")
+            self.cells[name] = label("–", "value")
             grid.addWidget(label(short_name(name), "quiet"), at // 2, 2 * (at % 2))
             grid.addWidget(self.cells[name], at // 2, 2 * (at % 2) + 1)
         for column in (1, 3):

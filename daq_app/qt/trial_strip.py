@@ -21,6 +21,7 @@ class TrialStrip(QScrollArea):
         self._inspect = inspect
         self._scale = scale
         self._shown: tuple[Tile, ...] = ()
+        self.horizontalScrollBar().rangeChanged.connect(self._keep_in_sight)  # new tiles have their places then
         self.tiles: list[QPushButton] = []
         inside = QWidget()
         inside.setObjectName("inside")
@@ -53,14 +54,17 @@ class TrialStrip(QScrollArea):
             made.setToolTip(tile.words)
             regrade(made, GRADES.get(tile.kind, ""))
         self._shown = tiles
-        current = next((at for at, tile in enumerate(tiles) if tile.kind == "current"), None)
-        if current is not None:
-            self.ensureWidgetVisible(self.tiles[current], 8 * GRID, 0)
+        self._keep_in_sight()
 
     def show_inspected(self, number: int | None) -> None:
         """Show which trial is inspected; None: none is."""
         for made, tile in zip(self.tiles, self._shown, strict=True):
             made.setChecked(tile.number == number)
+
+    def _keep_in_sight(self) -> None:
+        current = next((at for at, tile in enumerate(self._shown) if tile.kind == "current"), None)
+        if current is not None:
+            self.ensureWidgetVisible(self.tiles[current], 8 * GRID, 0)
 
     def _add(self) -> None:
         at = len(self.tiles)

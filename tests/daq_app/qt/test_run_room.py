@@ -6,9 +6,14 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from daq_app.qt import screens, tokens
+from daq_app.qt.inspected_trial import InspectedTrial
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
+from daq_app.qt.trial_strip import TrialStrip
+from daq_app.window.stroke_quality import StrokePicture
+from daq_app.window.view_trials import Inspection, Tile
 from sessions.run import steps
+from tests.daq_app.qt.test_legible import cut_off
 from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
 
 pytestmark = pytest.mark.qt
@@ -108,3 +113,41 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
         assert screens.settings().value(DRAWER) is None  # what there was no room for is no wish
     finally:
         window.resize(1440, 900)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, scale):
+    shown = InspectedTrial(tokens.LIGHT, scale, lambda: None)
+    shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    picture = StrokePicture(np.linspace(0.0, 3.0, 50), np.ones((4, 50)), 0.5, 2.5, (1.2, 0.5, 0.41, 20.6))
+    cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
+    words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
+    shown.show_trial(
+        Inspection(
+            12, "Trial 12, D86, take 2: done again, score 40", words, "refused", words, cells, picture, (1.0, 2.0)
+        )
+    )
+    shown.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is
+    shown.show()
+    application.processEvents()
+    assert shown.width() == 420
+    assert cut_off(shown) == []
+    shown.hide()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(application, scale):
+    strip = TrialStrip(scale, lambda _: None)
+    strip.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    strip.resize(600, strip.height())
+    strip.show()
+    kinds = ["done"] * 40 + ["current"] + ["coming"] * 19
+    strip.show_tiles(tuple(Tile(at + 1, f"D{at:02d}", kind) for at, kind in enumerate(kinds)))
+    application.processEvents()
+    application.processEvents()
+    tile = strip.tiles[40]
+    place = tile.mapTo(strip.viewport(), tile.rect().center())
+    assert strip.viewport().rect().contains(place)
+    assert all(made.width() >= made.sizeHint().width() for made in strip.tiles)
+    assert all(made.height() >= made.sizeHint().height() for made in strip.tiles)
+    strip.hide()
