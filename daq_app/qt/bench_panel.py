@@ -24,6 +24,8 @@ from daq_app.window.view_life import NAMES
 
 SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
 
+SPOKEN = {"tare": "mean of the zero", "drift": "drift of the zero"}  # where a caption alone does not say of what
+
 
 class BenchPanel(QFrame):
     """The right of the experimenter's window."""
@@ -78,12 +80,12 @@ class BenchPanel(QFrame):
             ("tare", view.tare),
             ("drift", view.drift),
         ):
-            say(self._fields[name], text)
+            say(self._fields[name], text, SPOKEN.get(name, name))
         for name, text in view.life:
-            say(self._life[name], text)
+            say(self._life[name], text, name)
         for name, text in view.counters:
             if name in self._counters:
-                say(self._counters[name], text)
+                say(self._counters[name], text, name)
                 regrade(self._counters[name], "look" if name != "lag" and text != "0" else "")
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)

@@ -51,7 +51,6 @@ class CoursePanel(QFrame):
         self._bottom.addWidget(self._actions())
         self._bottom.addWidget(self._asked(scale))
         self._timer = label("", "quiet")
-        self._timer.setAccessibleName("time since this was asked")
         head = QHBoxLayout()
         head.addWidget(label("Plan", "section"), 1)
         head.addWidget(self._timer)
@@ -70,7 +69,7 @@ class CoursePanel(QFrame):
     def show_view(self, view: CourseView) -> None:
         """Show the course."""
         before, self._view = self._view, view
-        say(self._timer, f"waiting {view.timer}" if view.timer else "")
+        say(self._timer, f"waiting {view.timer}" if view.timer else "", "Time since this was asked:")
         if before is not None and before.rows == view.rows and _buttons(before) == _buttons(view):
             return
         if before is None or before.rows != view.rows:

@@ -69,7 +69,6 @@ class Notice(QFrame):
         self._warning: str | None = None
         self.setProperty("role", "banner")
         self._words = label("", wrap=True)
-        self._words.setAccessibleName("notice")
         self._button = button("", "what the notice offers", self._do)
         self._button.setVisible(False)
         self._scale = scale
@@ -91,8 +90,7 @@ class Notice(QFrame):
         self._banner = banner
         mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
         text = f"{mark}{banner.sentence}" if banner else told[:1].upper() + told[1:]
-        say(self._words, text)
-        self._words.setAccessibleDescription(text)
+        say(self._words, text, "Notice:")
         regrade(self, banner.grade if banner else "")
         self._button.setVisible(banner is not None and banner.sends is not None)
         if self._folds:

@@ -43,7 +43,10 @@ KEYS = (
     Key("+", "longer", "show a longer stretch of time"),
     Key("-", "shorter", "show a shorter stretch of time"),
     Key("M", "model", "live model at finite strain, or at small strain again"),
+    Key("D", "drawer", "open or close the drawer: six axes, sample and finger"),
+    Key("I", "inspect", "inspect the last stroke's trial, and go back; a click on a tile inspects any trial"),
     Key("B", "bench", "show or fold the bench"),
+    Key("F5", "pilot", "pilot the protocol of the page with simulated hand and answers"),
     Key("F6", "subject", "show the subject's window and go to it"),
     Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),
     Key("Ctrl+O", "open", "look at a recorded session: strokes, predictions, report, exports"),
@@ -81,6 +84,7 @@ _NAMED = {
     Qt.Key.Key_F2: "F2",
     Qt.Key.Key_F3: "F3",
     Qt.Key.Key_F4: "F4",
+    Qt.Key.Key_F5: "F5",
     Qt.Key.Key_F6: "F6",
     Qt.Key.Key_Escape: "Esc",
 }

@@ -15,6 +15,7 @@ from daq_app.window.live_trace import CHANNELS
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
+NAMES = {"N": "Normal force", "T": "Tangential force", "mu": "Friction coefficient", "speed": "Speed"}  # as spoken
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 
 
@@ -76,7 +77,7 @@ class LiveBar(QWidget):
             text = text.replace("-", "−")
             if text != self.values[channel].text():
                 say(self.values[channel], text)
-                self.values[channel].setAccessibleName(f"{_name(channel)} {text}")
+                self.values[channel].setAccessibleName(spoken(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Leave out the numbers that would be cut, the last first."""
@@ -115,11 +116,11 @@ class LiveBar(QWidget):
 
     def _place_numbers(self, row: QHBoxLayout) -> None:
         for channel, _, _, colour in READ:
-            name = _name(channel)
+            name = short_name(channel)
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-            value.setAccessibleName(f"{name}: no number")
+            value.setAccessibleName(spoken(channel, "–"))
             caption = label(name, "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
@@ -129,5 +130,15 @@ class LiveBar(QWidget):
             self._pairs.append((caption, value))
 
 
-def _name(channel: str) -> str:
+def spoken(channel: str, text: str) -> str:
+    """Return what a screen reader says of a number.
+
+    >>> spoken("N", "1.20 N"), spoken("mu", "–")
+    ('Normal force 1.20 N', 'Friction coefficient no number')
+    """
+    return f"{NAMES[channel]} {'no number' if text == '–' else text}"
+
+
+def short_name(channel: str) -> str:
+    """Return how a channel is written where there is little room."""
     return {"mu": "µ"}.get(channel, channel)

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.curve import Curve
+from daq_app.qt.drawer import Drawer
 from daq_app.qt.finger_view import FingerView
 from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import LivePlot
+from daq_app.qt.parts import button
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
 from daq_app.window.course_state import Mark, picture_end
@@ -25,6 +27,7 @@ LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
 TRAIL = 2.0  # of the centre of pressure [s] ...
 POINTS = 120  # ... in so many points
+TAB = 24  # width of what opens and closes the drawer, before the font's scale [px]
 READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
 
 PLOTS = (
@@ -74,10 +77,19 @@ class LivePanel(QFrame):
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.setSpacing(4)
         layout.addWidget(self.bar)
-        self._side = QWidget()
-        self._pictures = self._placed()
+        self.drawer = Drawer(*self._placed())
+        self.tab = button("", "drawer", self.toggle_drawer, "handle")
+        self.tab.setFixedWidth(round(TAB * scale))
+        self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        self._pictures = QWidget()
+        pictures = QHBoxLayout(self._pictures)
+        pictures.setContentsMargins(0, 0, 0, 0)
+        pictures.setSpacing(2)
+        pictures.addWidget(self.drawer, 1)
+        pictures.addWidget(self.tab)
         layout.addWidget(self._pictures, 1)
         layout.addStretch(0)
+        self._show_tab()
         self.show_seconds(self._seconds)
         self.show_finite(settings().value(FINITE) == "yes")
 
@@ -96,10 +108,22 @@ class LivePanel(QFrame):
         for part in (*self.plots, self._model_plot, self.finger, self.map):
             part.set_tokens(tokens)
 
-    def show_side(self, shown: bool) -> None:
-        """Show or fold the six axes and the sample, where there is little room."""
-        self._side.setVisible(shown)
-        self._grid.setColumnStretch(1, 3 if shown else 0)
+    def set_room(self, room: bool) -> None:
+        """Say whether there is room for the stroke and an open drawer beside each other."""
+        self.drawer.set_room(room)
+        self._show_tab()
+
+    def toggle_drawer(self) -> None:
+        """Open or close the drawer, where readings are shown."""
+        if self._forces_shown:
+            self.drawer.toggle()
+            self._show_tab()
+
+    def _show_tab(self) -> None:
+        opened = self.drawer.is_open
+        self.tab.setText("▸\nD" if opened else "◂\nD")
+        self.tab.setAccessibleName(f"{'close' if opened else 'open'} the drawer: six axes, sample and finger")
+        self.tab.setToolTip(self.tab.accessibleName())
 
     def show_forces(self, shown: bool) -> None:
         """Show readings, or nothing of them where the protocol keeps them from the experimenter."""
@@ -177,7 +201,8 @@ class LivePanel(QFrame):
 
     def _columns(self) -> int:
         """Return how many columns a curve has: two pixels each, as its line is wide."""
-        return max(self.plots[0].width() // 2, 100)
+        shown = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
+        return max(shown.width() // 2, 100)
 
     def _draw_model(self, now: float, clock: float) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
@@ -209,27 +234,23 @@ class LivePanel(QFrame):
         self._grid.setRowStretch(3, 2 if model else 0)
         self.finger.setVisible(model)
 
-    def _placed(self) -> QWidget:
-        """Return the pictures, each in its place."""
-        made = QWidget()
-        grid = self._grid = QGridLayout(made)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(4)
+    def _placed(self) -> tuple[QWidget, QWidget]:
+        """Return the stroke's plots, and what the drawer holds: finger, sample and the six axes."""
+        stroke, drawer = QWidget(), QWidget()
+        grid = self._grid = QGridLayout(stroke)
+        side = QVBoxLayout(drawer)
+        for layout in (grid, side):
+            layout.setContentsMargins(0, 0, 0, 0)
+            layout.setSpacing(4)
         for row, (plot, stretch) in enumerate(zip((*self.plots[:3], self._model_plot), (3, 2, 2, 2), strict=True)):
             grid.addWidget(plot, row, 0)
             grid.setRowStretch(row, stretch)
-        side = QVBoxLayout(self._side)
-        side.setContentsMargins(0, 0, 0, 0)
-        side.setSpacing(4)
         side.addWidget(self.finger, 5)
         side.addWidget(self.map, 3)
         for plot in self.plots[3:]:
             side.addWidget(plot, 2)
         self.plots[3].show_times(False)
-        grid.addWidget(self._side, 0, 1, 4, 1)
-        grid.setColumnStretch(0, 5)
-        grid.setColumnStretch(1, 3)
-        return made
+        return stroke, drawer
 
     def _hold(self) -> None:
         self._held = self._feed.trace.newest if self.bar.hold.isChecked() else None

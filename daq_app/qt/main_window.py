@@ -23,10 +23,9 @@ from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keyboard import Keyboard
 from daq_app.qt.keys import KeysPage
-from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.menus import Menus
+from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import button, label, regrade, say
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
@@ -37,7 +36,7 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import headline
 from daq_app.window.messages import Message, NewSession
-from daq_app.window.new_session import Refused, bench_of, checked
+from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from sessions.recording import Setting
@@ -72,14 +71,12 @@ class MainWindow(QMainWindow):
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
-        self.page = NewSessionPage(scale, bridge.send, lambda: self.act("ruler"))
+        self.page = NewSessionPage(scale, bridge.send, self.act)
         self.course = CoursePanel(scale, bridge.send)
-        self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
+        self.middle = Middle(bridge, tokens, scale, self.act)
+        self.live = self.middle.live
         self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
         self.strip = BenchStrip(tokens, scale, self._fold_bench)
-        self.stroke = label("No stroke yet.", wrap=True)
-        self.stroke.setAccessibleName("the last stroke")
-        self.redo = button("Redo  R", "redo the last stroke", lambda: self.course.ask("redo"))
         self.subject = SubjectWindow(tokens, scale, bridge.session_now)
         self.subject.answered.connect(self._answered)
         self.subject.screen_changed.connect(self._line_changed)
@@ -115,19 +112,13 @@ class MainWindow(QMainWindow):
         self.notice.show_view(view.banner, "" if course is None else course.told)
         self.bench.show_view(view.bench)
         self.strip.show_view(view.bench)
+        self.middle.show_view(course)
         self._turn(0 if course is None else 1)
         if course is None:
             self._form_changed()
         else:
             self.course.show_view(course)
             self.to_do.show_what(course.headline, course.primary, course.direction)
-            self.live.map.show_direction(course.direction)
-            self.live.show_forces(course.forces_shown)
-            say(self.stroke, course.stroke.words if course.forces_shown else "Forces are not shown in this protocol.")
-            self.stroke.setToolTip(course.stroke.details)
-            regrade(self.stroke, {"refused": "wrong", "doubtful": "look"}.get(course.stroke.grade, ""))
-            self.redo.setEnabled(course.redo.enabled)
-            self.redo.setText(f"{course.redo.label}  {course.redo.key}")
         self.to_do.second.setVisible(self.rooms.over)
         self.rooms.show_state()
         self._show_subject_view(view)
@@ -135,7 +126,7 @@ class MainWindow(QMainWindow):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
-        for part in (self.header, self.to_do, self.live, self.bench, self.strip, self.subject, self.rooms):
+        for part in (self.header, self.to_do, self.middle, self.bench, self.strip, self.subject, self.rooms):
             part.set_tokens(tokens)
 
     def show_subject(self) -> None:
@@ -183,6 +174,9 @@ class MainWindow(QMainWindow):
             "longer": lambda: self.live.change_length(1),
             "shorter": lambda: self.live.change_length(-1),
             "bench": self._fold_bench,
+            "drawer": self.middle.toggle_drawer,
+            "inspect": self.middle.toggle_inspection,
+            "pilot": self._pilot,
             "subject": self.show_subject,
             "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
             "open": self.rooms.choose,
@@ -206,7 +200,10 @@ class MainWindow(QMainWindow):
     def _leave(self) -> None:
         if self.keys is not None:
             self.keys.hide()
-        self.course.leave()
+        if self.course.asking:
+            self.course.leave()
+        else:
+            self.middle.leave()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Obey the keys; those of a field that is typed in never come here."""
@@ -245,20 +242,30 @@ class MainWindow(QMainWindow):
     def _start_session(self) -> None:
         if self.bridge.view.course is not None:
             return
+        bench = bench_of(self.bridge.state.bench)
+        cards = self.page.check(bench, anew=True)
+        if all(card.ready for card in cards):
+            self._begin(self.page.form(), bench)
+        else:
+            self._form_changed()
+            self.page.go_to_missing()
+
+    def _pilot(self) -> None:
+        if self.bridge.view.course is None and self.rooms.room == "prepare":
+            bench = bench_of(self.bridge.state.bench)
+            self._begin(pilot_form(self.page.form(), bench), bench)
+        else:
+            self.notice.warn("A protocol is piloted in Prepare, while no session is in hand.")
+
+    def _begin(self, form: SessionForm, bench: Bench) -> None:
+        """Ask the recorder for the session of a form; what keeps it from beginning is said."""
         shown = millimetres(self.subject.screen())
         origin = "measured" if shown.checked else "default"
         settings = (
             Setting("answer line length", LENGTH, "mm", origin),
             Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
         )
-        cards = self.page.check(bench_of(self.bridge.state.bench), anew=True)
-        if not all(card.ready for card in cards):
-            self._form_changed()
-            self.page.go_to_missing()
-            return
-        made = checked(
-            self.page.form(), bench_of(self.bridge.state.bench), datetime.now(), secrets.randbelow(2**31), settings
-        )
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), settings)
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return
@@ -269,14 +276,10 @@ class MainWindow(QMainWindow):
     def _form_changed(self) -> None:
         """Say what is to be done on the page of a new session."""
         bench = bench_of(self.bridge.state.bench)
-        self.live.show_forces(True)
         self.page.show_bench(bench)
         cards = self.page.check(bench)
         ready = all(card.ready for card in cards)
         self.to_do.show_what(headline(cards, self.page.subject.text()), Button("Start", "Enter", ready), 0)
-        self.redo.setEnabled(False)
-        say(self.stroke, "No stroke yet.")
-        regrade(self.stroke, "")
 
     def _turn(self, page: int) -> None:
         """Show the page of a new session (0) or the course (1); keys go where they are of use there."""
@@ -354,7 +357,7 @@ class MainWindow(QMainWindow):
         cards = self._left.currentIndex() == 0 and width >= WIDE
         self._left.setMaximumWidth(round((CARDS if cards else PLAN) * min(self._scale, 1.4)))
         self.strip.setVisible(not shown and width >= 800)
-        self.live.show_side(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
+        self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
         self.to_do.show_small(height < TALL or width < ROOMY)
         self.notice.show_folding(height < LOW)
         if self.keys is not None:
@@ -363,19 +366,12 @@ class MainWindow(QMainWindow):
     def _placed(self) -> QWidget:
         window = QWidget()
         window.setObjectName("window")
-        middle = QVBoxLayout()
-        middle.setSpacing(GRID)
-        middle.addWidget(self.live, 1)
-        row = QHBoxLayout()
-        row.addWidget(self.stroke, 1)
-        row.addWidget(self.redo)
-        middle.addLayout(row)
         body = QHBoxLayout()
         body.setSpacing(GRID)
         self._left.setMinimumWidth(round(PLAN * min(self._scale, 1.4)))
         self.bench.setFixedWidth(round(290 * min(self._scale, 1.4)))
         body.addWidget(self._left, 4)
-        body.addLayout(middle, 3)
+        body.addWidget(self.middle, 3)
         for part in (self.bench, self.strip):
             part.hide()  # until it is known how much room there is
             body.addWidget(part)

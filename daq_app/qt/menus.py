@@ -14,7 +14,13 @@ from daq_app.qt.keys import KEYS
 
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on"), ("note", "Note…"), ("end", "End…"))
-PANELS = (("bench", "Bench"), ("hold", "Hold the picture"), ("model", "Live model at finite strain"))
+PANELS = (
+    ("bench", "Bench"),
+    ("drawer", "Drawer: axes, sample, finger"),
+    ("inspect", "Inspect the last trial"),
+    ("hold", "Hold the picture"),
+    ("model", "Live model at finite strain"),
+)
 LIBRARIES = ("PySide6", "numpy", "scipy", "numba")
 
 
@@ -39,6 +45,7 @@ class Menus:
         self._add(file, "quit", "Quit")
         self.session = bar.addMenu("&Session")
         self._add(self.session, "new", "New session")
+        self.pilot = self._add(self.session, "pilot", "Pilot the protocol")
         self._add(self.session, "tare", "Zero the bench")
         self.session.addSeparator()
         self.course = [self._add(self.session, name, words) for name, words in SESSION]
@@ -64,6 +71,7 @@ class Menus:
         """Offer what can be done now."""
         for made in self.course:
             made.setEnabled(in_hand and not over)
+        self.pilot.setEnabled(not in_hand)
         for made in (self.report, self.export):
             made.setEnabled(opened)
 

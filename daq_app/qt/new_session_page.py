@@ -9,13 +9,11 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QButtonGroup,
-    QCheckBox,
     QComboBox,
     QCompleter,
     QFileDialog,
     QFrame,
     QHBoxLayout,
-    QLineEdit,
     QRadioButton,
     QVBoxLayout,
     QWidget,
@@ -23,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.card import CardFrame
 from daq_app.qt.languages import missing_glyphs, name_of, translator
-from daq_app.qt.parts import button, choice, label, say, scrolled
+from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
@@ -56,8 +54,8 @@ class NewSessionPage(QFrame):
 
     changed = Signal()
 
-    def __init__(self, scale: float, send: Callable[[Message], None], ruler: Callable[[], None]) -> None:
-        """Show an empty form; `send` takes what is asked for, `ruler` checks the subject's screen.
+    def __init__(self, scale: float, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
+        """Show an empty form; `send` takes what is asked for, `act` what a button of the page stands for.
 
         Enter goes to the window, whose primary button begins.
         """
@@ -65,31 +63,31 @@ class NewSessionPage(QFrame):
         self.setProperty("role", "panel")
         self.setAccessibleName("new session")
         self._send = send
-        self._ruler = ruler
+        self._act = act
         self._cards: tuple[Card, ...] = ()
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
         self._shown: tuple[Unfinished, ...] = ()
-        self.subject = _line("subject code, never a name")
+        self.subject = entry("subject code, never a name")
         self.protocol = choice("protocol")
         self.protocol.addItems([*protocol_names(), "choose a file …"])
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
-        self.study = _line("study, a folder of its own; may be empty")
-        self.folder = _line("folder in which sessions are kept")
+        self.study = entry("study, a folder of its own; may be empty")
+        self.folder = entry("folder in which sessions are kept")
         self.folder.setText("recordings")
-        self.seed = _line("seed of the stimulus order; empty for a new one")
+        self.seed = entry("seed of the stimulus order; empty for a new one")
         self.seed.setPlaceholderText("a new one")
-        self.height_above = _line("height of the face above the transducer's origin in millimetres; may be empty")
+        self.height_above = entry("height of the face above the transducer's origin in millimetres; may be empty")
         self.height_above.setPlaceholderText("as stated")
         self.language = choice("language that the subject reads")
         self.normal = choice("axis of the transducer along which pressing is positive")
         self.normal.addItems(["as stated", *AXES])
-        self.area = _line("contact area of finger and surface in square millimetres; may be empty")
+        self.area = entry("contact area of finger and surface in square millimetres; may be empty")
         self.area.setPlaceholderText("as stated")
         self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
-        self.pre_evaluation = _tick("Pre-evaluation first", "every stimulus judged once before all else")
-        self.practice = _tick("Practice first", "practice before the trials that count")
+        self.pre_evaluation = tick("Pre-evaluation first", "every stimulus judged once before all else")
+        self.practice = tick("Practice first", "practice before the trials that count")
         self.with_forces = QRadioButton("Forces, with the transducer")
         self.scores_only = QRadioButton("Scores only")
         self.people_score = QRadioButton("People")
@@ -104,6 +102,8 @@ class NewSessionPage(QFrame):
         self._people_words = label("", "quiet", wrap=True)
         self._line_words = ""  # how far the length of the subject's line is known
         self._screen = ""  # with that, which characters of the texts no font here has
+        self._pilot = button("Pilot  F5", "pilot this protocol with simulated hand and answers", lambda: act("pilot"))
+        self._pilot.setToolTip("Runs by itself, needs no subject, and is kept apart in the folder “pilots”")
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
         self._resume = choice("sessions that were cut short")
         self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
@@ -340,11 +340,11 @@ class NewSessionPage(QFrame):
 
     def _build_study(self, layout: QVBoxLayout) -> None:
         """Lay out in which study and by which protocol, and whether it is rehearsed."""
-        _field(layout, "Study, may be empty", self.study)
-        _field(layout, "Protocol", self.protocol)
+        field(layout, "Study, may be empty", self.study)
+        field(layout, "Protocol", self.protocol)
         layout.addWidget(self.pre_evaluation)
         layout.addWidget(self.practice)
-        _field(layout, "Seed of the order", self.seed)
+        field(layout, "Seed of the order", self.seed)
         layout.addWidget(label("Who strokes and scores", "quiet", wrap=True))
         row = QHBoxLayout()
         row.addWidget(self.people_score)
@@ -352,13 +352,14 @@ class NewSessionPage(QFrame):
         row.addStretch(1)
         layout.addLayout(row)
         layout.addWidget(self._people_words)
+        layout.addWidget(self._pilot)
 
     def _build_subject(self, layout: QVBoxLayout) -> None:
         """Lay out who takes part."""
-        _field(layout, "Subject code", self.subject)
+        field(layout, "Subject code", self.subject)
         layout.addWidget(self._enrol)
-        _field(layout, "Stroking hand", self.stroking)
-        _field(layout, "Answering hand", self.answering)
+        field(layout, "Stroking hand", self.stroking)
+        field(layout, "Answering hand", self.answering)
 
     def _build_recorded(self, layout: QVBoxLayout) -> None:
         """Lay out what is recorded, and what the analysis must know of the face."""
@@ -366,17 +367,19 @@ class NewSessionPage(QFrame):
         layout.addWidget(self.scores_only)
         of_height = QVBoxLayout(self._height)
         of_height.setContentsMargins(0, 0, 0, 0)
-        _field(of_height, "Height of the face above the transducer's origin [mm]", self.height_above)
-        _field(of_height, "Axis along which pressing is positive", self.normal)
+        field(of_height, "Height of the face above the transducer's origin [mm]", self.height_above)
+        field(of_height, "Axis along which pressing is positive", self.normal)
         layout.addWidget(self._height)
         of_area = QVBoxLayout(self._area)
         of_area.setContentsMargins(0, 0, 0, 0)
-        _field(of_area, "Contact area, for tau_max [mm²]", self.area)
+        field(of_area, "Contact area, for tau_max [mm²]", self.area)
         layout.addWidget(self._area)
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
-        _field(layout, "Language that the subject reads", self.language)
-        layout.addWidget(button("Check with a ruler  Ctrl+M", "check the subject's line with a ruler", self._ruler))
+        field(layout, "Language that the subject reads", self.language)
+        layout.addWidget(
+            button("Check with a ruler  Ctrl+M", "check the subject's line with a ruler", lambda: self._act("ruler"))
+        )
 
     def _build_disk(self, layout: QVBoxLayout) -> None:
         folder = QHBoxLayout()
@@ -384,24 +387,6 @@ class NewSessionPage(QFrame):
         folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
         layout.addWidget(label("Folder", "quiet"))
         layout.addLayout(folder)
-
-
-def _field(layout: QVBoxLayout, words: str, field: QWidget) -> None:
-    layout.addWidget(label(words, "quiet", wrap=True))
-    layout.addWidget(field)
-
-
-def _tick(words: str, name: str) -> QCheckBox:
-    made = QCheckBox(words)
-    made.setAccessibleName(name)
-    made.setMinimumHeight(TARGET - GRID)
-    return made
-
-
-def _line(name: str) -> QLineEdit:
-    made = QLineEdit()
-    made.setAccessibleName(name)
-    return made
 
 
 def _hands(name: str) -> QComboBox:

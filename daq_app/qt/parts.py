@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
+    QCheckBox,
     QComboBox,
     QFrame,
     QLabel,
@@ -107,9 +108,13 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "") -> 
 
 
 def choice(name: str) -> QComboBox:
-    """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
+    """Return a list to choose from that says `name` to screen readers, and takes the room it is given.
+
+    On Linux Qt gives what is chosen for the name of such a list, and `name` is read as its description.
+    """
     made = QComboBox()
     made.setAccessibleName(name)
+    made.setAccessibleDescription(name)
     made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
@@ -175,7 +180,35 @@ def regrade(widget: QWidget, grade: str) -> None:
             child.style().polish(child)
 
 
-def say(widget: QLabel, text: str) -> None:
-    """Show a text, only where it is another one: nothing is laid out anew for nothing."""
+def say(widget: QLabel, text: str, name: str = "") -> None:
+    """Show a text, only where it is another one: nothing is laid out anew for nothing.
+
+    A screen reader says it after the `name` of what it tells; without a name the text alone.
+    """
     if widget.text() != text:
         widget.setText(text)
+    if name:
+        widget.setAccessibleName(f"{name} {text or 'nothing'}")
+
+
+def field(layout: QVBoxLayout, words: str, widget: QWidget) -> None:
+    """Put words and the field that they ask for below each other."""
+    caption = label(words, "quiet", wrap=True)
+    caption.setBuddy(widget)
+    layout.addWidget(caption)
+    layout.addWidget(widget)
+
+
+def tick(words: str, name: str) -> QCheckBox:
+    """Return a box to tick that says `name` to screen readers."""
+    made = QCheckBox(words)
+    made.setAccessibleName(name)
+    made.setMinimumHeight(TARGET - GRID)
+    return made
+
+
+def entry(name: str) -> QLineEdit:
+    """Return a line to type in that says `name` to screen readers."""
+    made = QLineEdit()
+    made.setAccessibleName(name)
+    return made

@@ -12,6 +12,8 @@ from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
 THEMES = ("system", "light", "dark")
 SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
 RECENT = 12  # sessions that are offered
+DRAWER = "window/drawer open"
+DRAWER_SIZES = "window/drawer sizes"
 _GEOMETRY, _THEME, _SCALE, _RECENT = "window/geometry", "window/theme", "window/type scale", "window/recent sessions"
 
 

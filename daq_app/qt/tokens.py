@@ -166,6 +166,12 @@ QMenuBar, QMenu {{ background: {t.surface}; }}
 QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
 QMenu::item:disabled {{ color: {t.quiet}; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
+QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {px(SMALL)}; font-weight: 600; }}
+QPushButton[role="tile"][grade="wrong"] {{ color: {t.look}; border: 2px solid {t.look}; }}
+QPushButton[role="tile"][grade="current"] {{ border: 2px solid {t.text}; }}
+QPushButton[role="tile"][grade="coming"] {{ color: {t.quiet}; border-style: dashed; }}
+QPushButton[role="tile"]:checked {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; }}
+QPushButton[role="tile"]:focus {{ border: 2px solid {t.act}; }}
 QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QComboBox, QHBoxLayout, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSlider, QWidget
 
 from daq_app.analyst.transport import SPEEDS, Transport
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import GRID, TARGET
 
 TICK = 33  # between two pictures while it plays [ms]
@@ -38,9 +38,7 @@ class TransportBar(QWidget):
         self.slider.setMinimumHeight(TARGET)
         self.slider.setMinimumWidth(60)
         self.slider.valueChanged.connect(self._move_to)
-        self.speed = QComboBox()
-        self.speed.setAccessibleName(f"speed of {what}")
-        self.speed.setMinimumHeight(TARGET)
+        self.speed = choice(f"speed of {what}")
         self.speed.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.speed.addItems([f"× {value:g}" for value in SPEEDS])
         self.speed.setCurrentIndex(SPEEDS.index(1.0))

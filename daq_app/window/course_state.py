@@ -42,6 +42,7 @@ class TrialState:
     takes: int = 0
     answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
+    discarded: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,7 +252,7 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":
-            return session.with_trial(number, outcome=_discarded(data), answer=None)
+            return session.with_trial(number, outcome=_discarded(data), answer=None, discarded=str(data["reason"]))
         case "skip":
             return session.with_trial(number, outcome="skipped")
         case _:

@@ -24,6 +24,7 @@ from sessions.toml_file import SettingsError
 HIGHEST = 500.0  # a face above the transducer's origin [mm]
 AREAS = (1.0, 2000.0)  # of a contact [mm2]
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
 SHOWN = 20  # sessions that were cut short, at most
 
 
@@ -46,6 +47,7 @@ class SessionForm:
     practice: bool = False  # before the trials that count
     language: str = ""  # that the subject reads, its code; empty: the protocol's own
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
+    pilot: bool = False  # kept apart from what people do, in no study
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,16 @@ def bench_of(bench: BenchState) -> Bench:
     simulated = bench.info is not None and bench.info.simulated and bench.frame is not None
     rate = float("nan") if bench.info is None else bench.info.rate
     return Bench(bench.link == "open", simulated, bench.frame, rate)
+
+
+def pilot_form(form: SessionForm, bench: Bench) -> SessionForm:
+    """Return the form that pilots the protocol of a form, or of its study: nobody is named and nobody is needed.
+
+    The simulated bench is stroked where it is connected. Otherwise the pilot is of scores alone, as no simulated hand
+    strokes a real transducer.
+    """
+    forces = form.forces and bench.simulated
+    return replace(form, subject=PILOT, forces=forces, height="", normal="", area="", simulated=True, pilot=True)
 
 
 def checked(
@@ -138,7 +150,7 @@ def checked(
     folder = session_folder(form, what, now)
     people = People(_kind(form, bench), seed, chosen.planted_friction)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
-    if form.study.strip():
+    if form.study.strip() and not form.pilot:
         own.append(Setting("study", form.study.strip(), "", "set"))
     return StartSession(planned, str(folder), people, (*own, *settings))
 
@@ -235,7 +247,8 @@ def enrolled(form: SessionForm) -> str:
 
 def session_folder(form: SessionForm, what: str, now: datetime) -> Path:
     """Return the folder the session will be in: a new one for every visit."""
-    return place_of(form) / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
+    place = Path(form.folder.strip() or ".").expanduser() / PILOTS if form.pilot else place_of(form)
+    return place / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
 
 
 def place_of(form: SessionForm) -> Path:
@@ -249,6 +262,8 @@ def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | No
     if not form.study.strip() or not is_study(folder):
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
     study = open_study(folder)
+    if form.pilot:
+        return study.protocol, new_seed, None, None
     member = study.member(form.subject.strip())
     return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(folder))
 

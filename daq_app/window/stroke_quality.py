@@ -1,9 +1,11 @@
 """How good the last stroke was, said while the stimulus is still mounted: the analysis of its take, in few words."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
@@ -37,6 +39,39 @@ WORDS = {
     FlawName.DEAD: "the transducer is dead",
 }
 
+# What to do about the worst of them, as a command to whoever runs the session; about the rest, another stroke helps.
+ADVICE: Mapping[FlawName, str] = {
+    FlawName.NO_STROKE: "Stroke once, firmly, and lift.",
+    FlawName.NO_STEADY_SLIDING: "Slide further, at one speed.",
+    FlawName.ROLLED: "Slide further, not roll.",
+    FlawName.SECOND_STROKE: "Stroke once, then lift.",
+    FlawName.WRONG_DIRECTION: "Stroke the way the arrow points.",
+    FlawName.TOO_LITTLE_FORCE: "Press harder.",
+    FlawName.NO_UNLOADED_STRETCH: "Keep the finger off until the stroke.",
+    FlawName.BEGINS_IN_CONTACT: "Keep the finger off until the stroke.",
+    FlawName.ENDS_IN_CONTACT: "Lift the finger at the end.",
+    FlawName.NOT_LIFTED: "Lift the finger between strokes.",
+    FlawName.DIRECTION_TURNS: "Stroke straight, one way.",
+    FlawName.SATURATED: "Press less, and check the transducer.",
+    FlawName.DEVICE_FAULT: "Check the transducer first.",
+    FlawName.FROZEN: "Connect the transducer again first.",
+    FlawName.DEAD: "Connect the transducer again first.",
+    FlawName.DRIFT: "Zero again, hands off.",
+}
+PRESS_ON = "Keep pressing until the end."
+PICTURE = ("N", "T", "mu", "speed")  # rows of a stroke's picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokePicture:
+    """The course of a stroke with some time around it, n readings, as it is shown when its trial is inspected."""
+
+    time: NDArray[np.float64]  # (n,) [s, device time]
+    values: NDArray[np.float64]  # (4, n) rows of PICTURE: N, T [N], mu [-], speed [mm/s]; nan where it means nothing
+    onset: float | None  # [s, device time]
+    lift: float | None
+    means: tuple[float | None, ...]  # of the rows of PICTURE over the steady window
+
 
 @dataclass(frozen=True, slots=True)
 class Quality:
@@ -52,6 +87,8 @@ class Quality:
     fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
     friction: FrictionParameters | None = None  # that the model is to get
     normal_force: float | None = None  # mean over the steady window [N]
+    advice: str = ""  # what to do about the worst, one sentence
+    picture: StrokePicture | None = None
 
 
 def stroke_quality(
@@ -72,12 +109,13 @@ def stroke_quality(
     if fell is not None and fell >= FELL:
         words.append("normal force fell by half")
         sentences.append(f"The normal force ended at {100 * (1 - fell):.0f} % of what it was: the finger was leaving.")
+    advice = ADVICE.get(told[0].name, "") if told else PRESS_ON if words else ""
     grades = {flaw.grade for flaw in told}
     grade = "refused" if "refused" in grades else "doubtful" if words else "good"
     if stroke is None:
-        return Quality(
-            "refused", tuple(words) or ("no stroke was found",), tuple(sentences), None, None, None, None, None
-        )
+        known = tuple(words) or (WORDS[FlawName.NO_STROKE],)
+        advice = advice or ADVICE[FlawName.NO_STROKE]
+        return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice)
     return Quality(
         grade,
         tuple(words),
@@ -89,6 +127,8 @@ def stroke_quality(
         fell,
         analysis.friction[0],
         stroke.normal_force,
+        advice,
+        _picture(stroke),
     )
 
 
@@ -97,6 +137,16 @@ def in_newtons(info: TransducerInfo) -> TransducerInfo:
     known = info.calibration
     as_wrench = Calibration(known.serial, "N, N mm", np.eye(6), known.rated, known.source)
     return replace(info, calibration=as_wrench)
+
+
+def _picture(stroke: Stroke) -> StrokePicture | None:
+    """Return what is shown of a stroke later; None where nothing of its course is known."""
+    curve = stroke.curve
+    if curve is None:
+        return None
+    values = np.vstack([curve.normal, curve.tangential, curve.ratio, curve.speed])
+    means = (stroke.normal_force, stroke.tangential_force, stroke.mu_dynamic, stroke.speed)
+    return StrokePicture(curve.time, values, stroke.onset, stroke.lift, means)
 
 
 def _words(flaw: Flaw) -> str:

@@ -8,6 +8,7 @@ from daq_app.window.bench_state import BenchState
 from daq_app.window.course_state import SessionState, TrialState
 from daq_app.window.messages import Message, NewSession
 from daq_app.window.stroke_quality import Quality
+from daq_app.window.view_trials import Tile, tiles
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 from sessions.run import steps
 
@@ -56,6 +57,7 @@ class CourseView:
     timer: str  # how long it has been waited for what is asked
     told: str
     rows: tuple[PlanRow, ...]
+    tiles: tuple[Tile, ...]
     stroke: StrokeView
     redo: Button
     skip: Button
@@ -80,6 +82,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         timer="" if over else _clock(now - session.since),
         told=f"It is kept in {session.folder}" if over else session.told or "",
         rows=_rows(session),
+        tiles=tiles(session),
         stroke=stroke,
         redo=_redo(again, stroke.redo),
         skip=Button("Skip", "S", session.phase in IN_A_TRIAL, question="Why is it left out?"),

@@ -98,3 +98,29 @@ def test_a_protocol_of_ones_own_is_rehearsed_from_its_first_trial_to_its_last(dr
     assert [trial.outcome for trial in driver.session.trials] == ["done", "done"]
     assert "SIMULATED" in driver.view.simulated
     assert Path(driver.session.folder).name.startswith("P21_own_")
+
+
+def test_a_protocol_is_piloted_by_key_without_a_subject_and_apart_from_every_session(driver, tmp_path):
+    window, page = driver.window, driver.window.page
+    (tmp_path / "own.toml").write_text(OWN)
+    page.add_protocol(str(tmp_path / "own.toml"))
+    assert not window.to_do.primary.isEnabled()  # nobody is named
+    window.setFocus()
+    QTest.keyClick(window, Qt.Key.Key_F5)
+    driver.until(lambda: driver.session is not None and driver.session.sealing == "sealed", "the pilot")
+    folder = Path(driver.session.folder)
+    assert folder.parent == Path(page.folder.text()) / "pilots"
+    assert folder.name.startswith("PILOT_own_")
+    assert driver.session.plan.forces
+    assert [trial.outcome for trial in driver.session.trials] == ["done", "done"]
+    assert all(trial.answer.startswith("score") for trial in driver.session.trials)
+    assert "SIMULATED" in driver.view.simulated
+
+
+def test_a_pilot_of_a_protocol_that_cannot_be_read_says_why(driver, tmp_path):
+    window, page = driver.window, driver.window.page
+    (tmp_path / "wrong.toml").write_text("name = ")
+    page.add_protocol(str(tmp_path / "wrong.toml"))
+    QTest.mouseClick(page._pilot, Qt.MouseButton.LeftButton)
+    assert driver.session is None
+    assert "wrong.toml" in window.notice._words.text()

@@ -7,11 +7,12 @@ import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
 from PySide6.QtGui import QAccessible, QColor, QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QWidget
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLabel, QLineEdit, QListWidget, QWidget
 
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
+from daq_app.qt.parts import Shortened
 from daq_app.qt.press_bar import FULL, PressBar
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 
@@ -75,7 +76,7 @@ def test_a_click_leaves_space_to_the_primary_button(driver):
 def test_every_key_of_the_list_is_obeyed_and_no_two_are_the_same():
     assert len({known.key for known in KEYS}) == len(KEYS)
     special = {"Space": Qt.Key.Key_Space, "F1": Qt.Key.Key_F1, "Esc": Qt.Key.Key_Escape}
-    special |= {f"F{number}": Qt.Key(Qt.Key.Key_F1 + number - 1) for number in (2, 3, 4, 6)}
+    special |= {f"F{number}": Qt.Key(Qt.Key.Key_F1 + number - 1) for number in (2, 3, 4, 5, 6)}
     for known in KEYS:
         held = Qt.KeyboardModifier.ControlModifier if known.key.startswith("Ctrl+") else Qt.KeyboardModifier.NoModifier
         name = known.key.removeprefix("Ctrl+")
@@ -308,8 +309,25 @@ def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
 def test_a_number_is_read_aloud_with_its_value(driver):
     bar = driver.window.live.bar
     bar.show_numbers(np.full((len(CHANNELS), 3), 0.5))
-    assert bar.values["N"].accessibleName() == "N 0.50 N"
-    assert bar.values["mu"].accessibleName() == "µ 0.50"
+    assert bar.values["N"].accessibleName() == "Normal force 0.50 N"
+    assert bar.values["mu"].accessibleName() == "Friction coefficient 0.50"
+
+
+def test_no_name_for_screen_readers_hides_the_value_that_a_label_shows(driver):
+    named = [shown for shown in driver.window.findChildren(QLabel) if shown.text() and shown.accessibleName()]
+    assert driver.window.bench._fields["rate"] in named
+    silent = [shown for shown in named if shown.text() != "–" and not isinstance(shown, Shortened)]
+    assert [s.text() for s in silent if s.text() not in s.accessibleName() and s.text() != "SIMULATED"] == []
+    assert driver.window.bench._fields["rate"].accessibleName().startswith("rate ")
+
+
+def test_every_drop_down_says_what_is_chosen_from(driver):
+    lists = driver.window.findChildren(QComboBox)
+    assert len(lists) >= 6
+    for shown in lists:
+        said = QAccessible.queryAccessibleInterface(shown)
+        assert said.text(QAccessible.Text.Description) == shown.accessibleName() != ""
+        assert said.text(QAccessible.Text.Value) == shown.currentText()
 
 
 @pytest.mark.parametrize("size", [16, 64, 256])

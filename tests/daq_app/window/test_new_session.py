@@ -1,12 +1,13 @@
 from dataclasses import replace
 from datetime import datetime
+from pathlib import Path
 
 import pytest
 
 from daq_app.recorder.messages import People, StartSession
-from daq_app.window.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered
+from daq_app.window.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered, pilot_form
 from sessions.plan.plan import Frame
-from sessions.plan.protocols import Body, protocol_file
+from sessions.plan.protocols import Body, protocol_file, protocol_names
 from sessions.plan.study_file import create_study, enrol, study_key, withdraw
 
 NOW = datetime(2026, 3, 1, 14, 30, 5)
@@ -148,3 +149,24 @@ def test_pre_evaluation_and_practice_are_offered_where_the_protocol_has_them_and
     assert offered(replace(FORM, protocol=str(bare))) == ("pre-evaluation",)
     assert "practice" in checked(replace(FORM, protocol=str(bare), practice=True), REAL, NOW, 0).sentences["protocol"]
     assert offered(replace(FORM, protocol="nowhere")) == ()
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_any_protocol_is_piloted_on_the_simulated_bench_and_without_it(name, tmp_path):
+    form = SessionForm(protocol=name, folder=str(tmp_path), subject="Ada Lovelace", height="tall")
+    for bench, forces in ((Bench(True, True, Frame()), True), (Bench(True), False), (Bench(), False)):
+        made = checked(pilot_form(form, bench), bench, NOW, 5)
+        assert made.people.kind == "simulated people"
+        assert made.plan.subject == "PILOT"
+        assert made.plan.forces is forces
+        assert Path(made.folder).parent == tmp_path / "pilots"
+
+
+def test_a_pilot_in_a_study_runs_the_studys_protocol_and_leaves_nothing_in_it(tmp_path):
+    text = protocol_file("paired-comparison").read_text(encoding="utf-8")
+    create_study(tmp_path / "study", text, 11, blinded=True)
+    form = SessionForm(study="study", folder=str(tmp_path))
+    made = checked(pilot_form(form, Bench()), Bench(), NOW, 5)
+    assert made.plan.protocol == "paired-comparison"
+    assert Path(made.folder).parent == tmp_path / "pilots"
+    assert not any(setting.name == "study" for setting in made.settings)

@@ -1,0 +1,102 @@
+"""The stroke of one trial, standing still, with the verdict on it."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from daq_app.qt.curve import Curve
+from daq_app.qt.live_bar import short_name, spoken
+from daq_app.qt.live_plot import LivePlot
+from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.tokens import GRID, MU, N, T, Tokens
+from daq_app.window.course_state import Mark
+from daq_app.window.live_trace import Columns
+from daq_app.window.plot_scale import PlotScale
+from daq_app.window.stroke_quality import PICTURE
+from daq_app.window.view_trials import Inspection
+
+PLOTS = (
+    ("N and T [N]", (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
+    ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
+    ("speed [mm/s]", (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
+)
+
+
+class InspectedTrial(QWidget):
+    """Takes the place of the signals while a trial is inspected; readings go on behind it."""
+
+    def __init__(self, tokens: Tokens, scale: float, back: Callable[[], None]) -> None:
+        """Show no trial; `back` returns to the signals."""
+        super().__init__()
+        self._shown: Inspection | None = None
+        self.heading = label("", "name", wrap=True)
+        self.verdict = label("", "title", wrap=True)
+        self.details = label("", "quiet", wrap=True)
+        self.cells: dict[str, QLabel] = {}
+        self._plots = [LivePlot(*plot, tokens, scale, PICTURE) for plot in PLOTS]
+        head = QHBoxLayout()
+        head.addWidget(self.heading, 1)
+        head.addWidget(button("Back  I", "back to the signals of this moment", back))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID // 2)
+        layout.addLayout(head)
+        layout.addWidget(self.verdict)
+        layout.addWidget(self.details)
+        layout.addLayout(self._cells())
+        for at, plot in enumerate(self._plots):
+            plot.show_times(at == len(self._plots) - 1)
+            plot.show_end("end")
+            layout.addWidget(plot, 3 if at == 0 else 2)
+        layout.addStretch(0)
+
+    def show_trial(self, shown: Inspection) -> None:
+        """Show a trial."""
+        if shown == self._shown:
+            return
+        self._shown = shown
+        say(self.heading, shown.heading)
+        say(self.verdict, shown.verdict)
+        regrade(self.verdict, {"refused": "wrong", "doubtful": "look"}.get(shown.grade, ""))
+        say(self.details, shown.details)
+        self.details.setVisible(bool(shown.details))
+        for name, text in shown.cells:
+            say(self.cells[name], text)
+            self.cells[name].setAccessibleName(spoken(name, text))
+        for plot in self._plots:
+            plot.setVisible(shown.picture is not None)
+        if shown.picture is not None:
+            self._show_picture(shown)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        for plot in self._plots:
+            plot.set_tokens(tokens)
+
+    def _show_picture(self, shown: Inspection) -> None:
+        picture = shown.picture
+        assert picture is not None
+        time = picture.time
+        end = float(time[-1]) if len(time) else 0.0
+        span = end - float(time[0]) if len(time) else 0.0
+        marks = [Mark("onset", picture.onset, picture.onset)] if picture.onset is not None else []
+        marks += [Mark("lift", picture.lift, picture.lift)] if picture.lift is not None else []
+        marks += [Mark("steady", *shown.steady)] if shown.steady is not None else []
+        for plot in self._plots:
+            plot.show_seconds(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
+            plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
+
+    def _cells(self) -> QGridLayout:
+        """Return the means, each in its place: two rows, so that they find room at every size of type."""
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(GRID)
+        grid.setVerticalSpacing(0)
+        for at, name in enumerate(PICTURE):
+            self.cells[name] = label("–", "value")
+            grid.addWidget(label(short_name(name), "quiet"), at // 2, 2 * (at % 2))
+            grid.addWidget(self.cells[name], at // 2, 2 * (at % 2) + 1)
+        for column in (1, 3):
+            grid.setColumnStretch(column, 1)
+        return grid

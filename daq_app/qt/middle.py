@@ -1,0 +1,115 @@
+"""The middle of the experimenter's window: the trials, the signals or an inspected trial, and the last stroke."""
+
+from collections.abc import Callable
+
+from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+
+from daq_app.qt.bridge import Bridge
+from daq_app.qt.inspected_trial import InspectedTrial
+from daq_app.qt.live_panel import LivePanel
+from daq_app.qt.parts import button, label, panel, regrade, say, scrolled
+from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.trial_strip import TrialStrip
+from daq_app.window.view_course import CourseView
+from daq_app.window.view_trials import inspection
+
+GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
+HIDDEN = "Forces are not shown in this protocol."
+
+
+class Middle(QWidget):
+    """Shows the signals of this moment, until a trial is inspected; the next stroke brings the signals back."""
+
+    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float, act: Callable[[str], None]) -> None:
+        """Show no session; `act` does what a button stands for."""
+        super().__init__()
+        self._bridge = bridge
+        self._inspected: int | None = None  # number of the trial
+        self.strip = TrialStrip(scale, self.inspect)
+        self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
+        self.trial = InspectedTrial(tokens, scale, self.leave)
+        self.stroke = label("", wrap=True)
+        self.redo = button("Redo  R", "redo the last stroke", lambda: act("redo"))
+        self._pages = QStackedWidget()
+        frame, inside = panel("inspected trial")
+        inside.addWidget(scrolled(self.trial))
+        for page in (self.live, frame):
+            self._pages.addWidget(page)
+        row = QHBoxLayout()
+        row.addWidget(self.stroke, 1)
+        row.addWidget(self.redo)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(GRID)
+        layout.addWidget(self.strip)
+        layout.addWidget(self._pages, 1)
+        layout.addLayout(row)
+
+    @property
+    def inspected(self) -> int | None:
+        """Return the number of the trial that is inspected; None where none is."""
+        return self._inspected
+
+    def show_view(self, course: CourseView | None) -> None:
+        """Show the session in hand, or that there is none."""
+        self.strip.setVisible(course is not None)
+        self.live.show_forces(course is None or course.forces_shown)
+        if course is None:
+            self._show_stroke("No stroke yet.", "", "")
+            self.redo.setEnabled(False)
+            self.leave()
+            return
+        self.live.map.show_direction(course.direction)
+        words = course.stroke.words if course.forces_shown else HIDDEN
+        self._show_stroke(words, course.stroke.details, GRADES.get(course.stroke.grade, ""))
+        self.redo.setEnabled(course.redo.enabled)
+        self.redo.setText(f"{course.redo.label}  {course.redo.key}")
+        self.strip.show_tiles(course.tiles)
+        session = self._bridge.state.session
+        if session is not None and session.phase == "stroking":
+            self.leave()
+        self._show_inspected()
+
+    def inspect(self, number: int) -> None:
+        """Show a trial; the one that is shown already gives way to the signals."""
+        self._inspected = None if number == self._inspected else number
+        self._show_inspected()
+
+    def toggle_inspection(self) -> None:
+        """Inspect the trial whose stroke was looked at last, or else the one in hand; or go back."""
+        session = self._bridge.state.session
+        number = self._inspected
+        if number is None and session is not None:
+            number = session.judged if session.judged is not None else session.trial
+        if number is not None:
+            self.inspect(number)
+
+    def leave(self) -> None:
+        """Go back to the signals."""
+        if self._inspected is not None:
+            self.inspect(self._inspected)
+
+    def toggle_drawer(self) -> None:
+        """Open or close the drawer of the signals, which come back where a trial is inspected."""
+        if self._inspected is not None:
+            self.leave()
+        else:
+            self.live.toggle_drawer()
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        for part in (self.live, self.trial):
+            part.set_tokens(tokens)
+
+    def _show_inspected(self) -> None:
+        session, number = self._bridge.state.session, self._inspected
+        shown = None if session is None or number is None else inspection(session, number)
+        if shown is not None:
+            self.trial.show_trial(shown)
+        self._pages.setCurrentIndex(0 if shown is None else 1)
+        self.strip.show_inspected(None if shown is None else shown.number)
+
+    def _show_stroke(self, words: str, details: str, grade: str) -> None:
+        say(self.stroke, words, "The last stroke:")
+        self.stroke.setToolTip(details)
+        regrade(self.stroke, grade)

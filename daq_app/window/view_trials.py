@@ -1,0 +1,131 @@
+"""The trials of a session as a strip of tiles, and what is shown of the one that somebody inspects. No Qt."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from daq_app.window.course_state import SessionState, TrialState
+from daq_app.window.stroke_quality import PICTURE, Quality, StrokePicture
+
+TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
+MARKS: dict[TileKind, str] = {
+    "done": "✓",
+    "redone": "↻",
+    "flawed": "!",
+    "current": "▶",
+    "skipped": "–",
+    "coming": "○",
+}
+STATES: dict[TileKind, str] = {
+    "done": "done",
+    "redone": "done again",
+    "flawed": "done, its stroke has a flaw",
+    "current": "in hand",
+    "skipped": "skipped",
+    "coming": "still to come",
+}
+DIGITS: dict[str, int] = dict(zip(PICTURE, (2, 2, 2, 0), strict=True))
+UNITS: dict[str, str] = dict(zip(PICTURE, ("N", "N", "", "mm/s"), strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """One trial: its shape and words tell its state without colour."""
+
+    number: int
+    code: str
+    kind: TileKind
+
+    @property
+    def words(self) -> str:
+        """Return the trial and its state for a screen reader.
+
+        >>> Tile(3, "D86", "flawed").words
+        'trial 3, D86: done, its stroke has a flaw'
+        """
+        return f"trial {self.number}, {self.code}: {STATES[self.kind]}"
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What is shown of one trial: never what is measured now."""
+
+    number: int
+    heading: str
+    verdict: str  # one line; or why there is none
+    grade: Literal["none", "good", "doubtful", "refused"]
+    details: str  # every flaw at length, the worst first
+    cells: tuple[tuple[str, str], ...]  # row of PICTURE and its mean over the steady window with its unit; "–": none
+    picture: StrokePicture | None
+    steady: tuple[float, float] | None  # [s, device time]
+
+
+def tiles(session: SessionState) -> tuple[Tile, ...]:
+    """Return a tile for each trial, in the order of the plan."""
+    return tuple(Tile(t.trial.number, t.trial.stimulus.code, _kind(session, t)) for t in session.trials)
+
+
+def inspection(session: SessionState, number: int) -> Inspection | None:
+    """Return what is shown of a trial; None where the session has no trial of that number."""
+    trial = session.of(number)
+    if trial is None:
+        return None
+    kind = _kind(session, trial)
+    again = f", take {trial.takes}" if trial.takes > 1 else ""
+    heading = f"Trial {number}, {trial.trial.stimulus.code}{again}: {STATES[kind]}"
+    shown = session.plan.shown.experimenter
+    if trial.answer is not None and "answer" in shown:
+        heading = f"{heading}, {trial.answer}"
+    details = f"Its take before was discarded: {trial.discarded.rstrip('.')}." if trial.discarded else ""
+    quality = trial.quality
+    if "forces" not in shown:
+        return _without(number, heading, "Forces are not shown in this protocol.", details)
+    if quality is None:
+        return _without(number, heading, _why_none(session, trial), details)
+    picture = quality.picture
+    means = (None,) * len(PICTURE) if picture is None else picture.means
+    cells = tuple((name, _value(name, mean)) for name, mean in zip(PICTURE, means, strict=True))
+    at_length = " ".join((*quality.sentences, details)).strip()
+    return Inspection(number, heading, verdict(quality), quality.grade, at_length, cells, picture, quality.steady)
+
+
+def verdict(quality: Quality) -> str:
+    """Return one verdict on a stroke: the worst flaw, then what to do.
+
+    >>> verdict(Quality("refused", ("pressed too lightly",), (), None, None, None, None, None, advice="Press harder."))
+    'Redo: pressed too lightly. Press harder.'
+    """
+    if not quality.words:
+        return "Good"
+    opening = "Redo" if quality.grade == "refused" else "Doubtful"
+    return f"{opening}: {quality.words[0].rstrip('.')}. {quality.advice}".strip()
+
+
+def _kind(session: SessionState, trial: TrialState) -> TileKind:
+    if trial.trial.number == session.trial and session.phase != "ended":
+        return "current"
+    if trial.outcome != "done":
+        return trial.outcome
+    if trial.quality is not None and trial.quality.words:
+        return "flawed"
+    return "redone" if trial.takes > 1 else "done"
+
+
+def _why_none(session: SessionState, trial: TrialState) -> str:
+    """Return why nothing is known of the stroke of a trial."""
+    if not session.plan.forces:
+        return "No forces are recorded in this session."
+    if trial.outcome == "coming":
+        return "Its stroke is still to come."
+    if trial.outcome == "skipped":
+        return "It was left out: no stroke of it counts."
+    return "Its stroke was recorded, and this window has not looked at it: Review shows it after the session."
+
+
+def _without(number: int, heading: str, why: str, details: str) -> Inspection:
+    return Inspection(number, heading, why, "none", details, tuple((name, "–") for name in PICTURE), None, None)
+
+
+def _value(name: str, mean: float | None) -> str:
+    if mean is None:
+        return "–"
+    return f"{round(mean, DIGITS[name]) + 0.0:.{DIGITS[name]}f} {UNITS[name]}".strip().replace("-", "−")

@@ -1,0 +1,153 @@
+"""The Run room in the real window: tiles that are pressed, a stroke that is inspected, and the drawer."""
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+
+from daq_app.qt import screens, tokens
+from daq_app.qt.inspected_trial import InspectedTrial
+from daq_app.qt.live_panel import LivePanel
+from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
+from daq_app.qt.trial_strip import TrialStrip
+from daq_app.window.stroke_quality import StrokePicture
+from daq_app.window.view_trials import Inspection, Tile
+from sessions.run import steps
+from tests.daq_app.qt.test_legible import cut_off
+from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
+
+pytestmark = pytest.mark.qt
+
+LEFT = Qt.MouseButton.LeftButton
+
+
+def click(widget):
+    QTest.mouseClick(widget, LEFT, pos=widget.rect().center())
+
+
+def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
+    window, middle = driver.window, driver.window.middle
+    assert not middle.strip.isVisible()
+    begin(driver, "P30")
+    assert [tile.text()[0] for tile in middle.strip.tiles] == ["▶", "○", "○"]
+    one_trial(driver, drawn=False)
+    quality = driver.session.of(1).quality
+    first = middle.strip.tiles[0]
+    click(first)
+    assert middle.trial.isVisible()
+    assert not window.live.isVisible()
+    assert first.isChecked()
+    code = driver.session.trials[0].trial.stimulus.code
+    assert middle.trial.heading.text().startswith(f"Trial 1, {code}: done")
+    assert middle.trial.cells["mu"].accessibleName() == f"Friction coefficient {quality.mu:.2f}"
+    time, normal = quality.picture.time, quality.picture.values[0]
+    steady = (time >= quality.steady[0]) & (time <= quality.steady[1])
+    assert np.mean(normal[steady]) == pytest.approx(quality.normal_force, rel=0.02)
+    driver.application.processEvents()
+    still, newest = middle.trial.grab().toImage(), window.bridge.feed.trace.newest
+    driver.until(lambda: window.bridge.feed.trace.newest > newest + 1.0, "further readings")
+    assert middle.trial.grab().toImage() == still
+    click(middle.strip.tiles[2])
+    assert middle.trial.verdict.text() == "Its stroke is still to come."
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert window.live.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_I)
+    assert middle.inspected == 1
+    QTest.keyClick(window, Qt.Key.Key_Space)  # the course goes on behind it
+    driver.phase("stroking", "scoring")
+    assert window.live.isVisible()
+    assert middle.inspected is None
+    window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    click(first)
+    assert middle.trial.isVisible()  # a session that is over can be looked through
+
+
+def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(driver):
+    window, live = driver.window, driver.window.live
+    window.resize(1920, 1000)
+    driver.application.processEvents()
+    window.setFocus()
+    try:
+        assert live.map.isVisible()
+        QTest.keyClick(window, Qt.Key.Key_D)
+        assert not live.map.isVisible()
+        assert live.tab.accessibleName().startswith("open the drawer")
+        assert screens.settings().value(DRAWER) == "no"
+        again = LivePanel(window.bridge.feed, window.bridge.model, tokens.LIGHT, 1.0)
+        assert not again.drawer.is_open
+        click(live.tab)
+        assert live.map.isVisible()
+        handle = live.drawer.handle(1)
+        before = live.drawer.sizes()
+        middle = handle.rect().center()
+        QTest.mousePress(handle, LEFT, pos=middle)
+        QTest.mouseMove(handle, middle - QPoint(60, 0))
+        QTest.mouseRelease(handle, LEFT, pos=middle - QPoint(60, 0))
+        assert live.drawer.sizes()[1] == pytest.approx(before[1] + 60, abs=3)
+        again = LivePanel(window.bridge.feed, window.bridge.model, tokens.LIGHT, 1.0)
+        again.resize(live.size())
+        again.show()
+        driver.application.processEvents()
+        assert again.drawer.sizes()[1] == pytest.approx(live.drawer.sizes()[1], rel=0.05)
+        again.hide()
+    finally:
+        for key in (DRAWER, DRAWER_SIZES):
+            screens.settings().remove(key)
+        window.resize(1440, 900)
+
+
+def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_stroke(driver):
+    window, live = driver.window, driver.window.live
+    window.resize(1000, 700)
+    driver.application.processEvents()
+    window.setFocus()
+    try:
+        assert live.plots[0].isVisible()
+        assert not live.plots[3].isVisible()
+        QTest.keyClick(window, Qt.Key.Key_D)
+        assert live.plots[3].isVisible()
+        assert not live.plots[0].isVisible()
+        QTest.keyClick(window, Qt.Key.Key_D)
+        assert live.plots[0].isVisible()
+        assert screens.settings().value(DRAWER) is None  # what there was no room for is no wish
+    finally:
+        window.resize(1440, 900)
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, scale):
+    shown = InspectedTrial(tokens.LIGHT, scale, lambda: None)
+    shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    picture = StrokePicture(np.linspace(0.0, 3.0, 50), np.ones((4, 50)), 0.5, 2.5, (1.2, 0.5, 0.41, 20.6))
+    cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
+    words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
+    shown.show_trial(
+        Inspection(
+            12, "Trial 12, D86, take 2: done again, score 40", words, "refused", words, cells, picture, (1.0, 2.0)
+        )
+    )
+    shown.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is
+    shown.show()
+    application.processEvents()
+    assert shown.width() == 420
+    assert cut_off(shown) == []
+    shown.hide()
+
+
+@pytest.mark.parametrize("scale", [1.0, 2.0])
+def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(application, scale):
+    strip = TrialStrip(scale, lambda _: None)
+    strip.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    strip.resize(600, strip.height())
+    strip.show()
+    kinds = ["done"] * 40 + ["current"] + ["coming"] * 19
+    strip.show_tiles(tuple(Tile(at + 1, f"D{at:02d}", kind) for at, kind in enumerate(kinds)))
+    application.processEvents()
+    application.processEvents()
+    tile = strip.tiles[40]
+    place = tile.mapTo(strip.viewport(), tile.rect().center())
+    assert strip.viewport().rect().contains(place)
+    assert all(made.width() >= made.sizeHint().width() for made in strip.tiles)
+    assert all(made.height() >= made.sizeHint().height() for made in strip.tiles)
+    strip.hide()

@@ -1,0 +1,87 @@
+"""The tiles of a session's trials and what an inspected trial says, message by message, without Qt."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, SCORE, SECOND, TARE, after, logged
+
+from daq_app.recorder import messages as m
+from daq_app.window.messages import Judged
+from daq_app.window.stroke_quality import StrokePicture
+from daq_app.window.view_trials import MARKS, inspection, tiles, verdict
+from sessions.plan.plan import Shown
+from sessions.run import steps
+
+PICTURE = StrokePicture(np.arange(3.0), np.ones((4, 3)), 0.5, 1.5, (1.234, 0.5, 0.41, 20.6))
+KEPT = (logged("scored", 1, score=40.0), logged("take_kept", 1), steps.AskMount(SECOND))
+
+
+def kinds(*messages):
+    return [tile.kind for tile in tiles(after(*messages).session)][:3]
+
+
+def test_each_trial_is_one_tile_with_a_state_of_its_own():
+    assert kinds(*BEGUN) == ["coming"] * 3
+    assert kinds(*SCORE) == ["current", "coming", "coming"]
+    assert kinds(*SCORE, Judged(1, 1, GOOD), *KEPT) == ["done", "current", "coming"]
+    assert kinds(*SCORE, Judged(1, 1, BAD), *KEPT) == ["flawed", "current", "coming"]
+    assert kinds(*SCORE, logged("skip", 1, reason="torn"), steps.AskMount(SECOND)) == ["skipped", "current", "coming"]
+    again = (*SCORE, logged("take_discarded", 1, reason="a slip"), steps.StartTake(1, 2), Judged(1, 2, GOOD), *KEPT)
+    assert kinds(*again) == ["redone", "current", "coming"]
+
+
+def test_no_two_states_share_a_shape_or_words():
+    assert len(set(MARKS.values())) == len(MARKS)
+    shown = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
+    assert [tile.words for tile in shown[:3]] == [
+        f"trial 1, {FIRST.stimulus.code}: done",
+        f"trial 2, {SECOND.stimulus.code}: in hand",
+        f"trial 3, {PLAN.trials[2].stimulus.code}: still to come",
+    ]
+
+
+def test_an_inspected_trial_says_its_verdict_its_means_and_its_score():
+    judged = replace(GOOD, picture=PICTURE)
+    shown = inspection(after(*SCORE, Judged(1, 1, judged), *KEPT).session, 1)
+    assert shown.heading == f"Trial 1, {FIRST.stimulus.code}: done, score 40"
+    assert shown.verdict == "Good"
+    assert shown.cells == (("N", "1.23 N"), ("T", "0.50 N"), ("mu", "0.41"), ("speed", "21 mm/s"))
+    assert shown.picture is PICTURE
+    assert shown.steady == (2.0, 3.5)
+
+
+def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
+    flawed = replace(BAD, advice="Slide further, at one speed.")
+    assert verdict(flawed) == "Redo: no steady window. Slide further, at one speed."
+    assert verdict(replace(flawed, grade="doubtful")).startswith("Doubtful: no steady window")
+
+
+@pytest.mark.parametrize(
+    ("messages", "number", "why"),
+    [
+        (SCORE, 2, "Its stroke is still to come."),
+        ((*SCORE, logged("skip", 1, reason="torn")), 1, "It was left out: no stroke of it counts."),
+        ((*SCORE, *KEPT), 1, "Its stroke was recorded, and this window has not looked at it"),
+    ],
+)
+def test_a_trial_without_a_stroke_says_why(messages, number, why):
+    shown = inspection(after(*messages).session, number)
+    assert shown.verdict.startswith(why)
+    assert shown.picture is None
+    assert {text for _, text in shown.cells} == {"–"}
+
+
+def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
+    blind = replace(PLAN, shown=Shown(experimenter=()))
+    begun = m.SessionBegun("recordings/P07", blind, "people", None, 0, 1.0)
+    judged = Judged(1, 1, replace(GOOD, picture=PICTURE))
+    shown = inspection(after(BEGUN[0], begun, *TARE[2:], judged, *KEPT).session, 1)
+    assert shown.verdict == "Forces are not shown in this protocol."
+    assert shown.picture is None
+    assert "score" not in shown.heading
+
+
+def test_a_take_that_was_discarded_keeps_its_reason():
+    again = (*SCORE, logged("take_discarded", 1, reason="the finger slipped"), steps.StartTake(1, 2))
+    assert "discarded: the finger slipped." in inspection(after(*again).session, 1).details
