@@ -6,13 +6,16 @@ from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
-from daq_app.analyst.frame import top
-from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film, was_tried
+from daq_app.analyst.field_list import automatic_range
+from daq_app.analyst.seen import common_range, film_words, finger_words, shown_film, was_tried
 from daq_app.analyst.shown import scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
-from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas, Look
-from daq_app.qt.parts import Wrapped, button, choice
+from daq_app.qt.field_bar import OWN, FieldBar
+from daq_app.qt.field_plot import LINE, FieldPlot
+from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
+from daq_app.qt.finger_painter import Look
+from daq_app.qt.parts import Shortened, Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
@@ -38,10 +41,15 @@ class ModelColumn(QWidget):
         self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
         self._at: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens, scale)
+        self.fields, self.plot, self.probe = FieldBar(), FieldPlot(tokens), Shortened("quiet")
+        self.fields.changed.connect(self._paint)
+        self.plot.changed.connect(self._paint)
+        self.plot.draw.toggled.connect(lambda on: self._draw_line(on=on))
+        self.finger.probed.connect(self.probe.show_whole)
+        self.finger.cut.connect(self._cut)
         self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
-        self.free = button("Own scale", "colours that fit this trial alone", self._paint, "small")
         self.mesh = button("Mesh", "show the mesh", self._paint, "small")
-        for made in (self.near, self.free, self.mesh):
+        for made in (self.near, self.mesh):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
@@ -143,11 +151,26 @@ class ModelColumn(QWidget):
             frame = None if finger is None else finger.frame
             parts, arcs = (NO_PARTS, np.empty(0)) if finger is None else (finger.parts, finger.arcs)
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
-        own = 1.0 if frame is None else top(frame)
-        high = own if self.free.isChecked() else max(common_top(state), own if lost else 0.0)
-        look = Look(high, self.near.isChecked(), self.mesh.isChecked(), lost)
-        self.finger.show_frame(frame, parts, arcs, words, look)
+        field = self.fields.field
+        own = automatic_range(field, () if frame is None else (frame,))
+        common = common_range(state, field)
+        ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
+        look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
+        self.finger.show_frame(frame, parts, words, look)
+        self.plot.show_field(frame, parts, arcs, field, self.finger.line)
         self._name_saves()
+
+    def _draw_line(self, *, on: bool) -> None:
+        """Let the mouse draw a line, and plot along it."""
+        self.finger.draws_line = on
+        if on:
+            self.plot.source.setCurrentIndex(LINE)
+
+    def _cut(self) -> None:
+        """Plot along the line that was just drawn."""
+        if self.finger.line is not None:
+            self.plot.source.setCurrentIndex(LINE)
+        self._paint()
 
     def _moved(self, at: int) -> None:
         self._at = at
@@ -181,12 +204,15 @@ class ModelColumn(QWidget):
     def _finger_page(self) -> QWidget:
         page = QWidget()
         bar = QHBoxLayout()
-        for part in (self.near, self.free, self.mesh, self.history):
+        for part in (self.near, self.mesh, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.finger, 1)
+        layout.addWidget(self.fields)
+        layout.addWidget(self.finger, 3)
+        layout.addWidget(self.probe)
+        layout.addWidget(self.plot, 1)
         layout.addWidget(self.why)
         layout.addWidget(self.player)
         layout.addLayout(bar)

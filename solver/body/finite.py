@@ -252,11 +252,11 @@ class FiniteProbes:
 
     def responses(self, body: FiniteBody, displacement: Array) -> Array:
         """Return every quantity averaged over each patch (q, r, ...) for displacements (nodes, 2, ...)."""
-        state = self._state(body, displacement)
+        state = self.state(body, displacement)
         values = (quantity.finite(state) for quantity in QUANTITIES)
         return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
 
-    def _state(self, body: FiniteBody, displacement: Array) -> LocalState:
+    def state(self, body: FiniteBody, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
         wide = (slice(None), *([None] * (displacement.ndim - 2)))
         held, place = np.unique(self.element, return_inverse=True)

@@ -32,14 +32,14 @@ class Still:
 def stills(finger: FingerModel, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
     """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
     displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
-    energies = sketch.energies(displacement)
+    values = sketch.values(displacement)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     rows = finger.row.average(mesh, elastic, displacement)
     ending = finger.ending.average(mesh, elastic, displacement)[0]
     return tuple(
         Still(
             instant,
-            sketch.fields(displacement[:, :, number], instant.depth, energies[:, number]),
+            sketch.fields(displacement[:, :, number], instant.depth, values[:, :, number]),
             skin_of(finger, instant.state),
             rows[:, number],
             float(ending[number]),
