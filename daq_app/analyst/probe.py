@@ -1,5 +1,6 @@
 """The value of a field at a place in the finger, along its skin, and along a line."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,6 +76,25 @@ def along_line(frame: Frame, parts: Parts, field: FieldChoice, line: Line) -> tu
         if at is not None:
             out[i] = np.dot(values[list(at.nodes)], at.shares)
     return part * float(np.hypot(*(ends[1] - ends[0]))), out
+
+
+def read_out(unit: str, across: Array, at: float, curves: Sequence[tuple[str, str, Array]]) -> str:
+    """Return the sample of `across` (m,) nearest to `at`, and the name, value and unit of each curve (m,) there.
+
+    It is empty beyond the curves' ends. A value that is not known is a dash.
+
+    >>> curves = [("N", "N", np.array([0.0, 1.5, 3.0])), ("µ", "", np.full(3, np.nan))]
+    >>> read_out("s", np.array([0.0, 0.1, 0.2]), 0.12, curves)
+    '0.100 s · N 1.5 N · µ –'
+    """
+    if not len(across) or not across[0] <= at <= across[-1]:
+        return ""
+    near = int(np.argmin(np.abs(across - at)))
+    parts = [f"{across[near]:.3f} {unit}"]
+    for name, of, values in curves:
+        value = f"{values[near]:.4g} {of}" if np.isfinite(values[near]) else "–"
+        parts.append(f"{name} {value}".strip())
+    return " · ".join(parts).replace("-", "−")
 
 
 def _cross(one: Array, other: Array) -> Array:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Frame, Parts
-from daq_app.analyst.probe import Line, along_line, along_skin
+from daq_app.analyst.probe import Line, along_line, along_skin, read_out
 from daq_app.qt.parts import button, choice
 from daq_app.qt.tokens import GRID, MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
@@ -39,6 +39,8 @@ class FieldPlot(QWidget):
         self.draw = button("Line", "draw a line over the finger with the mouse", lambda: None, "small")
         self.draw.setCheckable(True)
         self.plot = ZoomedPlot(tokens)
+        self.plot.read = self._read
+        self.values, self._unit = (np.empty(0), np.empty(0)), ""
         self._curve = pg.PlotDataItem(pen=pg.mkPen(MODEL, width=2), connect="finite", symbolSize=4, symbolPen=None)
         self._here = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
         self.plot.addItem(self._curve)
@@ -75,4 +77,9 @@ class FieldPlot(QWidget):
         self._here.setVisible(source != LINE)
         self.plot.getPlotItem().setLabel("bottom", f"{axis} {words}" if len(place) else words)
         self.plot.setAccessibleName(f"{axis}: {words}")
-        self.values = (place, values)
+        self.values, self._unit = (place, values), "kPa" if source == RECEPTORS else field.unit.removesuffix("-")
+
+    def _read(self, at: float) -> str:
+        """Return what the curve says at a place [mm]."""
+        place, values = self.values
+        return read_out("mm", place, at, [("", self._unit, values)])

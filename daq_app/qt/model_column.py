@@ -20,6 +20,7 @@ from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
+from solver.quantities import SED
 
 FINGER, SESSION, COMPARISON = range(3)  # tabs
 STEPS_A_SECOND = 10.0  # of a history that plays: its steps are told, for pressing takes long and sliding little time
@@ -44,7 +45,7 @@ class ModelColumn(QWidget):
         self.fields, self.plot, self.probe = FieldBar(), FieldPlot(tokens), Shortened("quiet")
         self.fields.changed.connect(self._paint)
         self.plot.changed.connect(self._paint)
-        self.plot.draw.toggled.connect(lambda on: self._draw_line(on=on))
+        self.plot.draw.toggled.connect(self._draw_line)
         self.finger.probed.connect(self.probe.show_whole)
         self.finger.cut.connect(self._cut)
         self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
@@ -160,10 +161,10 @@ class ModelColumn(QWidget):
         self.plot.show_field(frame, parts, arcs, field, self.finger.line)
         self._name_saves()
 
-    def _draw_line(self, *, on: bool) -> None:
+    def _draw_line(self) -> None:
         """Let the mouse draw a line, and plot along it."""
-        self.finger.draws_line = on
-        if on:
+        self.finger.draws_line = self.plot.draw.isChecked()
+        if self.finger.draws_line:
             self.plot.source.setCurrentIndex(LINE)
 
     def _cut(self) -> None:
@@ -196,7 +197,8 @@ class ModelColumn(QWidget):
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"
         at = "" if self._film is None or self._at is None else f" {self._at}"  # of the history that is shown
-        self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
+        drawn = self._name and self.fields.field.name == SED.name  # the figures of a report know no other field
+        self.save.set_name(f"{kind}{self._name}{at}" if drawn else "")
 
     def _save(self, name: str, path: str) -> None:
         self.asked.emit(m.Write(f"picture {name}", path))

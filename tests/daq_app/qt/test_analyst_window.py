@@ -1,5 +1,6 @@
 """The analyst's window, driven as a person does, on a recorded session that is analysed by the real work."""
 
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -253,6 +254,26 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     assert not player.playing
     window.model.near.click()
     assert not canvas.grab().isNull()
+
+
+def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    view.show_all()
+    application.processEvents()
+    trace = chosen(window.state).stroke.trace
+    i = len(trace.time) // 2
+    at = plot.getPlotItem().getViewBox().mapViewToScene(QPointF(trace.time[i], trace.normal[i]))
+    QTest.mouseMove(plot.viewport(), plot.mapFromScene(at))
+    application.processEvents()
+    pattern = r"([\d.]+) s · N ([\d.]+) N · T ([\d.]+) N · µ ([\d.]+)"
+    time_s, normal, tangential, mu = map(float, re.fullmatch(pattern, plot.words.text()).groups())
+    assert plot.words.isVisible()
+    near = list(np.round(trace.time, 3)).index(time_s)
+    assert abs(near - i) <= 1
+    assert (normal, tangential, mu) == pytest.approx(
+        (trace.normal[near], trace.tangential[near], trace.mu[near]), rel=1e-3
+    )
 
 
 def small_finger(application, window):
