@@ -1,7 +1,6 @@
 """The value of a field at a place in the finger, along its skin, and along a line."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Frame, Parts
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # by the number of their region in the mesh
@@ -17,45 +17,44 @@ POINTS = 201  # along a line: finer than any element it crosses
 OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both triangles, whatever round-off says [-]
 
 
-@dataclass(frozen=True, slots=True)
-class Corners:
-    """The triangle that holds a place."""
+def corners_at(frame: Frame, parts: Parts, points: Array) -> tuple[Indices, Array]:
+    """Return the triangle that holds each of `points` (p, 2) [mm] and the share of each of its corners (p, 3).
 
-    triangle: int
-    nodes: tuple[int, int, int]
-    shares: tuple[float, float, float]  # of each corner; their sum is one
-
-
-def corners_at(frame: Frame, parts: Parts, x: float, y: float) -> Corners | None:
-    """Return the triangle that holds a place [mm], or None outside of the tissue."""
-    if not len(parts.triangles):
-        return None
-    points = frame.nodes[parts.triangles]  # (t, 3, 2)
-    low, high = points.min(axis=1), points.max(axis=1)
-    near = np.flatnonzero((low[:, 0] <= x) & (x <= high[:, 0]) & (low[:, 1] <= y) & (y <= high[:, 1]))
-    a, b, c = np.moveaxis(points[near], 1, 0)
-    area = _cross(b - a, c - a)
-    place = np.array([x, y])
+    The triangle is -1, and the shares are nan, outside of the tissue.
+    """
+    triangle, out = np.full(len(points), -1), np.full((len(points), 3), np.nan)
+    corners = frame.nodes[parts.triangles]  # (t, 3, 2)
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    some = np.flatnonzero(((low <= points.max(axis=0)) & (high >= points.min(axis=0))).all(axis=1))
+    boxed = (low[some] <= points[:, None]) & (points[:, None] <= high[some])
+    point, near = np.nonzero(boxed.all(axis=2))
+    a, b, c = np.moveaxis(corners[some[near]], 1, 0)
+    place = points[point]
     with np.errstate(invalid="ignore", divide="ignore"):  # a triangle without an area holds no place
-        shares = np.column_stack([_cross(b - place, c - place), _cross(c - place, a - place)]) / area[:, None]
+        area = _cross(b - a, c - a)
+        shares = np.column_stack([_cross(b - place, c - place) / area, _cross(c - place, a - place) / area])
     shares = np.column_stack([shares, 1.0 - shares.sum(axis=1)])
-    inside = np.flatnonzero(shares.min(axis=1) >= OUTSIDE)
-    if not len(inside):
-        return None
-    triangle = int(near[inside[0]])
-    nodes, parts_of = parts.triangles[triangle].tolist(), shares[inside[0]].tolist()
-    return Corners(triangle, (nodes[0], nodes[1], nodes[2]), (parts_of[0], parts_of[1], parts_of[2]))
+    inside = shares.min(axis=1, initial=np.inf) >= OUTSIDE
+    triangle[point[inside]], out[point[inside]] = some[near[inside]], shares[inside]
+    return triangle, out
+
+
+def value_at(frame: Frame, parts: Parts, field: FieldChoice, points: Array) -> tuple[Array, Indices]:
+    """Return a field at `points` (p, 2) [mm], nan outside of the tissue, and the triangles that hold them (p,)."""
+    triangle, shares = corners_at(frame, parts, points)
+    if not len(parts.triangles):
+        return np.full(len(points), np.nan), triangle
+    return np.sum(field.of(frame)[parts.triangles[triangle]] * shares, axis=1), triangle
 
 
 def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: float) -> str:
     """Return what is at a place [mm]: the field with its unit, where it is, and the tissue."""
     where = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
-    at = corners_at(frame, parts, x, y)
-    if at is None:
+    values, triangles = value_at(frame, parts, field, np.array([[x, y]]))
+    triangle = int(triangles[0])
+    if triangle < 0:
         return f"{where} · no tissue"
-    value = float(np.dot(field.of(frame)[list(at.nodes)], at.shares))
-    tissue = TISSUES[int(parts.region[at.triangle])] if at.triangle < len(parts.region) else "tissue"
-    return f"{field.words(value)} · {where} · {tissue}"
+    return f"{field.words(float(values[0]))} · {where} · {TISSUES[int(parts.region[triangle])]}"
 
 
 def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:
@@ -70,12 +69,8 @@ def along_line(frame: Frame, parts: Parts, field: FieldChoice, line: Line) -> tu
     """Return the distance from the first end (m,) [mm] and the field there (m,); nan where there is no tissue."""
     ends = np.array(line)
     part = np.linspace(0.0, 1.0, POINTS)
-    values, out = field.of(frame), np.full(POINTS, np.nan)
-    for i, (x, y) in enumerate((ends[0] + part[:, None] * (ends[1] - ends[0])).tolist()):
-        at = corners_at(frame, parts, x, y)
-        if at is not None:
-            out[i] = np.dot(values[list(at.nodes)], at.shares)
-    return part * float(np.hypot(*(ends[1] - ends[0]))), out
+    values, _ = value_at(frame, parts, field, ends[0] + part[:, None] * (ends[1] - ends[0]))
+    return part * float(np.hypot(*(ends[1] - ends[0]))), values
 
 
 def read_out(unit: str, across: Array, at: float, curves: Sequence[tuple[str, str, Array]]) -> str:

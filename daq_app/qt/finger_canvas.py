@@ -61,6 +61,7 @@ class FingerCanvas(QWidget):
         self._words = ""
         self._kept: QPixmap | None = None
         self._view: View | None = None  # None: all of it
+        self._pointer: QPointF | None = None
         self._held: QPointF | None = None  # where a button was pressed, or moved to since
         self._drawing = False  # what is held is the end of a line
         self.draws_line = False  # the mouse draws a line in place of moving the picture
@@ -84,6 +85,7 @@ class FingerCanvas(QWidget):
         self._frame, self._parts, self._words, self._look = frame, parts, words, look
         self.setAccessibleName(words or "finger of the model: none")
         self._renew()
+        self._probe()
 
     def view(self) -> View | None:
         """Return what is shown, or None without a finger."""
@@ -137,9 +139,8 @@ class FingerCanvas(QWidget):
             self.show_view(view.moved(at.x() - self._held.x(), at.y() - self._held.y()))
             self._held = at
             return
-        inside = self._box().contains(at)
-        words = probe_words(self._frame, self._parts, self._look.field, *view.place(at.x(), at.y())) if inside else ""
-        self.probed.emit(words)
+        self._pointer = at
+        self._probe()
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Let go; a line without a length is taken away."""
@@ -154,7 +155,8 @@ class FingerCanvas(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
         """Say nothing of a place any more."""
-        self.probed.emit("")
+        self._pointer = None
+        self._probe()
         super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
@@ -194,6 +196,13 @@ class FingerCanvas(QWidget):
         if self.hasFocus():
             painter.setPen(QPen(QColor(self._tokens.act), 2))
             painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
+
+    def _probe(self) -> None:
+        """Say what is under the pointer."""
+        view, at, words = self.view(), self._pointer, ""
+        if self._frame is not None and view is not None and at is not None and self._box().contains(at):
+            words = probe_words(self._frame, self._parts, self._look.field, *view.place(at.x(), at.y()))
+        self.probed.emit(words)
 
     def _renew(self) -> None:
         self._kept = None

@@ -5,7 +5,7 @@ import pytest
 
 from daq_app.analyst.field_list import FIELD_CHOICES, automatic_range, ticks
 from daq_app.analyst.frame import Contact, Frame, Parts, SkinLine
-from daq_app.analyst.probe import along_line, along_skin, corners_at, probe_words
+from daq_app.analyst.probe import along_line, along_skin, probe_words, value_at
 from daq_app.analyst.viewport import LEAST, MOST, View
 
 NONE = np.empty(0)
@@ -41,10 +41,9 @@ def test_zoom_ends_where_nothing_more_can_be_seen():
 
 def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
     field = BY_NAME["sed"]
-    rng = np.random.default_rng(3)
-    for x, y in rng.uniform(0.0, 4.0, (20, 2)).tolist():
-        at = corners_at(frame(), PARTS, x, y)
-        assert np.dot(PLANE[list(at.nodes)], at.shares) == pytest.approx(0.001 * (2.0 * x - y), abs=1e-12)
+    points = np.random.default_rng(3).uniform(0.0, 4.0, (20, 2))
+    values, _ = value_at(frame(), PARTS, field, points)
+    np.testing.assert_allclose(values, 2.0 * points[:, 0] - points[:, 1], atol=1e-9)
     away, values = along_line(frame(), PARTS, field, ((1.0, 1.0), (4.0, 5.0)))
     inside = away <= 3.75  # of its 5 mm: there it leaves the square, at y = 4
     np.testing.assert_allclose(values[inside], 1.0 + (2.0 * 0.6 - 0.8) * away[inside], atol=1e-9)
@@ -55,6 +54,13 @@ def test_the_probe_names_field_unit_place_and_tissue():
     words = probe_words(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
     assert words == "SED 5 kPa · x 3.500 mm, y 2.000 mm · dermis"
     assert probe_words(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
+
+
+def test_a_finger_without_triangles_has_no_field_anywhere():
+    bare = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
+    assert probe_words(frame(), bare, BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
+    assert np.isnan(along_line(frame(), bare, BY_NAME["sed"], ((0.0, 0.0), (1.0, 1.0)))[1]).all()
+    assert along_skin(frame(), bare, BY_NAME["sed"])[0].size == 0
 
 
 def test_a_strain_has_no_unit_and_a_negative_number_a_minus():

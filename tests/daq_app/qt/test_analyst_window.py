@@ -350,6 +350,8 @@ def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_po
     words = window.model.probe.accessibleName()
     assert words.startswith("SED 3 kPa · x 0.2")
     assert words.endswith("dermis")
+    QTest.keyClick(window.model.player, Qt.Key.Key_Left)  # another state under the pointer at rest
+    assert window.model.probe.accessibleName().startswith("SED 2 kPa · x 0.2")
     QTest.mouseMove(canvas, pixel(0.9, 0.9))
     application.processEvents()
     assert window.model.probe.accessibleName().endswith("no tissue")
