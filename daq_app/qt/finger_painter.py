@@ -120,12 +120,21 @@ class FingerPainter:
             painter.setPen(QPen(ink if name in ("skin", "bone") else QColor("black"), 1.4 if name == "skin" else 0.7))
             if name == "bone":
                 painter.setBrush(QColor(self.tokens.surface))
-                painter.drawPolygon(QPolygonF(self._placed(outline)))
-                painter.drawText(self._placed(outline.mean(axis=0)[None])[0], "bone")
+                bone = QPolygonF(self._placed(outline))
+                painter.drawPolygon(bone)
                 painter.setBrush(Qt.BrushStyle.NoBrush)
+                self._name_bone(bone, self._placed(outline.mean(axis=0)[None])[0])
             else:
                 painter.drawPolyline(QPolygonF(self._placed(outline)))
         self._in_two(QPolygonF(self._placed(self.frame.patch)))
+
+    def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
+        """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
+        words = self.painter.fontMetrics().boundingRect("bone").toRectF()
+        words.moveCenter(middle)
+        corners = (words.topLeft(), words.topRight(), words.bottomLeft(), words.bottomRight())
+        if all(bone.containsPoint(corner, Qt.FillRule.OddEvenFill) for corner in corners):
+            self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, "bone")
 
     def _paint_line(self, line: Line) -> None:
         ends = self._placed(np.array(line))

@@ -94,6 +94,7 @@ class ModelColumn(QWidget):
         said = None if row is None else row.prediction
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
         self.why.show_text(film_words(film))
+        self.why.setVisible(bool(film_words(film)))
         self._ask_where(state, film)
         drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
