@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
-TOP = 0.97  # of the corners' SED lies below the end of the colour scale
+TOP = 0.97  # of the corners' values lies below the end of the colour scale
 STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 
@@ -31,11 +31,25 @@ class Frame:
     """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
 
     nodes: Array  # (n, 2) deformed
-    sed: Array  # (n,) [MPa]
+    values: Mapping[str, Array]  # (n,) each field by its name in `solver.quantities` [MPa or -]; displacement [mm]
     outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
     patch: Array  # (m, 2) outline of the ending
     contact: Contact
     row: Array  # (r,) SED of the receptors along the skin [MPa]; nan where there is none
+
+    @property
+    def sed(self) -> Array:
+        """SED at the nodes (n,) [MPa]."""
+        return self.values["sed"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkinLine:
+    """m points of the skin's surface, by which values at the nodes are read along it."""
+
+    arc: Array  # (m,) along the skin at rest, 0 over the receptor, towards the tip [mm]
+    nodes: Indices  # (m, 9)
+    shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +58,8 @@ class Parts:
 
     triangles: Indices  # (t, 3)
     elements: Indices  # (e, 8) along the sides of each element of the mesh
+    region: Indices  # (t,) number of the material of each triangle
+    skin: SkinLine | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,20 +121,14 @@ def step_above(value: float) -> float:
     return float(next((s * power for s in STEPS if s * power >= value * (1.0 - 1e-9)), 10.0 * power))
 
 
-def top(frame: Frame) -> float:
-    """Return the SED [kPa] at which the colours of a frame alone would end: few nodes lie above."""
-    known = frame.sed[np.isfinite(frame.sed)]
-    return step_above(1000.0 * float(np.quantile(known, TOP)) if len(known) else 0.0)
-
-
 def seen(
-    nodes: Array, sed: Array, triangles: Indices, box: tuple[float, float, float, float]
+    nodes: Array, values: Array, triangles: Indices, box: tuple[float, float, float, float]
 ) -> tuple[Array, Array, Indices]:
-    """Return nodes (n, 2), their SED and those of the triangles (t, 3) that reach into left, right, below, above."""
+    """Return nodes (n, 2), their values and those of the triangles (t, 3) that reach into left, right, below, above."""
     left, right, below, above = box
     x, y = nodes[triangles, 0], nodes[triangles, 1]
     inside = (x.max(axis=1) >= left) & (x.min(axis=1) <= right) & (y.max(axis=1) >= below) & (y.min(axis=1) <= above)
-    return nodes, sed, triangles[inside]
+    return nodes, values, triangles[inside]
 
 
 def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
+from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts, SkinLine
 from sessions.prediction import Way
 from sessions.report import Field
 from solver import Cancelled, Prediction
@@ -21,9 +21,7 @@ Told = Callable[[float], bool]
 def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
     """Return the settled finger of a prediction."""
     drawn = fields_of(prediction, sketch)
-    return Finger(
-        Parts(sketch.triangles, sketch.elements), _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc
-    )
+    return Finger(_parts(sketch), _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc)
 
 
 def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, told: Told) -> Film:
@@ -34,7 +32,7 @@ def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, told: Told) -> F
         if not told(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
     frames = tuple(_frame(still.fields, still.skin, still.row) for still in made)
-    return Film(Parts(sketch.triangles, sketch.elements), frames, tuple(_instant(still) for still in made), ROW)
+    return Film(_parts(sketch), frames, tuple(_instant(still) for still in made), ROW)
 
 
 def lost_film(way: Way, sketch: Sketch, told: Told) -> tuple[Film, str]:
@@ -72,9 +70,14 @@ def _pairs(points: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
     return tuple((float(x), float(y)) for x, y in points)
 
 
+def _parts(sketch: Sketch) -> Parts:
+    skin = sketch.skin
+    return Parts(sketch.triangles, sketch.elements, sketch.region, SkinLine(skin.arc, skin.nodes, skin.shape))
+
+
 def _frame(drawn: Fields, skin: Skin, row: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Frame:
     contact = Contact(skin.x, skin.gap, skin.pressure, skin.traction, skin.state)
-    return Frame(drawn.nodes, drawn.sed, dict(drawn.outlines), drawn.patch, contact, row)
+    return Frame(drawn.nodes, dict(drawn.values), dict(drawn.outlines), drawn.patch, contact, row)
 
 
 def _instant(still: Still) -> Instant:

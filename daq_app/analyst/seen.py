@@ -1,7 +1,8 @@
 """What is said of the finger that is shown, and with which colours."""
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.frame import Frame, step_above, top
+from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
+from daq_app.analyst.frame import Frame
 from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
 from sessions.report.contents import PredictionFinding
@@ -14,10 +15,9 @@ PHASES = {
 }
 
 
-def common_top(state: AnalystState | None) -> float:
-    """Return the SED [kPa] at which the colours of all trials of a session end."""
-    tops = [] if state is None else [top(finger.frame) for finger in state.fingers.values()]
-    return step_above(max(tops, default=1.0))
+def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
+    """Return where the colours of all trials of a session begin and end."""
+    return automatic_range(field, () if state is None else (finger.frame for finger in state.fingers.values()))
 
 
 def shown_film(state: AnalystState) -> m.Filmed | None:

@@ -6,17 +6,21 @@ from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
-from daq_app.analyst.frame import top
-from daq_app.analyst.seen import common_top, film_words, finger_words, shown_film, was_tried
+from daq_app.analyst.field_list import automatic_range
+from daq_app.analyst.seen import common_range, film_words, finger_words, shown_film, was_tried
 from daq_app.analyst.shown import scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
-from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas, Look
-from daq_app.qt.parts import Wrapped, button, choice
+from daq_app.qt.field_bar import OWN, FieldBar
+from daq_app.qt.field_plot import LINE, FieldPlot
+from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
+from daq_app.qt.finger_painter import Look
+from daq_app.qt.parts import Shortened, Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
+from solver.quantities import SED
 
 FINGER, SESSION, COMPARISON = range(3)  # tabs
 STEPS_A_SECOND = 10.0  # of a history that plays: its steps are told, for pressing takes long and sliding little time
@@ -38,10 +42,15 @@ class ModelColumn(QWidget):
         self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
         self._at: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens, scale)
+        self.fields, self.plot, self.probe = FieldBar(), FieldPlot(tokens), Shortened("quiet")
+        self.fields.changed.connect(self._paint)
+        self.plot.changed.connect(self._paint)
+        self.plot.draw.toggled.connect(self._draw_line)
+        self.finger.probed.connect(self.probe.show_whole)
+        self.finger.cut.connect(self._cut)
         self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
-        self.free = button("Own scale", "colours that fit this trial alone", self._paint, "small")
         self.mesh = button("Mesh", "show the mesh", self._paint, "small")
-        for made in (self.near, self.free, self.mesh):
+        for made in (self.near, self.mesh):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
@@ -85,6 +94,7 @@ class ModelColumn(QWidget):
         said = None if row is None else row.prediction
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
         self.why.show_text(film_words(film))
+        self.why.setVisible(bool(film_words(film)))
         self._ask_where(state, film)
         drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
@@ -143,11 +153,26 @@ class ModelColumn(QWidget):
             frame = None if finger is None else finger.frame
             parts, arcs = (NO_PARTS, np.empty(0)) if finger is None else (finger.parts, finger.arcs)
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
-        own = 1.0 if frame is None else top(frame)
-        high = own if self.free.isChecked() else max(common_top(state), own if lost else 0.0)
-        look = Look(high, self.near.isChecked(), self.mesh.isChecked(), lost)
-        self.finger.show_frame(frame, parts, arcs, words, look)
+        field = self.fields.field
+        own = automatic_range(field, () if frame is None else (frame,))
+        common = common_range(state, field)
+        ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
+        look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
+        self.finger.show_frame(frame, parts, words, look)
+        self.plot.show_field(frame, parts, arcs, field, self.finger.line)
         self._name_saves()
+
+    def _draw_line(self) -> None:
+        """Let the mouse draw a line, and plot along it."""
+        self.finger.draws_line = self.plot.draw.isChecked()
+        if self.finger.draws_line:
+            self.plot.source.setCurrentIndex(LINE)
+
+    def _cut(self) -> None:
+        """Plot along the line that was just drawn."""
+        if self.finger.line is not None:
+            self.plot.source.setCurrentIndex(LINE)
+        self._paint()
 
     def _moved(self, at: int) -> None:
         self._at = at
@@ -173,7 +198,8 @@ class ModelColumn(QWidget):
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"
         at = "" if self._film is None or self._at is None else f" {self._at}"  # of the history that is shown
-        self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
+        drawn = self._name and self.fields.field.name == SED.name  # the figures of a report know no other field
+        self.save.set_name(f"{kind}{self._name}{at}" if drawn else "")
 
     def _save(self, name: str, path: str) -> None:
         self.asked.emit(m.Write(f"picture {name}", path))
@@ -181,12 +207,15 @@ class ModelColumn(QWidget):
     def _finger_page(self) -> QWidget:
         page = QWidget()
         bar = QHBoxLayout()
-        for part in (self.near, self.free, self.mesh, self.history):
+        for part in (self.near, self.mesh, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.finger, 1)
+        layout.addWidget(self.fields)
+        layout.addWidget(self.finger, 3)
+        layout.addWidget(self.probe)
+        layout.addWidget(self.plot, 1)
         layout.addWidget(self.why)
         layout.addWidget(self.player)
         layout.addLayout(bar)

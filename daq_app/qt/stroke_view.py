@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from daq_app.analyst.edges import edges_of, within
 from daq_app.analyst.messages import EDGES, Edge
+from daq_app.analyst.probe import read_out
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.edge_handle import EdgeHandle
 from daq_app.qt.tokens import GRID, MU, N, T, Tokens
@@ -39,7 +40,7 @@ class StrokeView(QWidget):
         self._plots = [_plot(tokens, name) for name in ("N and T [N]", "µ = T/N [-]")]
         for plot in self._plots:
             layout.addWidget(plot, 1)
-            plot.reset = self.show_all
+            plot.reset, plot.read = self.show_all, self._read
         self._plots[0].getPlotItem().getAxis("bottom").setLabel("")
         self._plots[1].setXLink(self._plots[0])
         fill = QColor(tokens.act)
@@ -97,6 +98,12 @@ class StrokeView(QWidget):
             self._plots[0].setXRange(self._time[0], self._time[-1], padding=0.09)
             known = self._columns[2][np.isfinite(self._columns[2])]
             self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
+
+    def _read(self, time: float) -> str:
+        """Return what was felt at a time since contact [s]."""
+        names = (("N", "N"), ("T", "N"), ("µ", ""))
+        curves = [(name, unit, column) for (name, unit), column in zip(names, self._columns, strict=True)]
+        return read_out("s", self._time, time, curves)
 
     def put_back(self) -> None:
         """Show every edge where it is."""

@@ -1,21 +1,23 @@
-"""A plot that the wheel zooms and the mouse moves; Home or a double-click shows all of it again."""
+"""A plot that the wheel zooms and the mouse moves, and that says what is under the pointer."""
 
 from collections.abc import Callable
 from typing import Any
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
 
-from daq_app.qt.tokens import Tokens
+from daq_app.qt.parts import label
+from daq_app.qt.tokens import GRID, Tokens
 
 pg: Any = pyqtgraph  # it has no types
 
 
 class ZoomedPlot(pg.PlotWidget):
-    """A plot in the colours of a theme; `reset` shows all of it."""
+    """A plot in the colours of a theme; `reset` shows all of it, `read` says what stands at a place across."""
 
     reset: Callable[[], None]
+    read: Callable[[float], str] | None = None
 
     def __init__(self, tokens: Tokens) -> None:
         """Show nothing yet."""
@@ -26,6 +28,13 @@ class ZoomedPlot(pg.PlotWidget):
         self.setToolTip("Wheel: zoom. Drag: move. Home or double-click: show all.")
         item: Any = self.getPlotItem()
         self.reset = item.enableAutoRange
+        self._pointer = pg.InfiniteLine(angle=90, pen=pg.mkPen(tokens.text, width=1))
+        item.addItem(self._pointer, ignoreBounds=True)
+        self.words = label("", "tight")
+        self.words.setParent(self)
+        self.words.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.words.setStyleSheet(f"background: {tokens.surface}; padding: 0 {GRID // 2}px;")
+        self._hide_words()
         item.setMenuEnabled(False)
         item.hideButtons()
         for side in ("left", "bottom"):
@@ -39,6 +48,38 @@ class ZoomedPlot(pg.PlotWidget):
             self.reset()
         else:
             event.ignore()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Say what stands at the pointer, as far as the plot knows it."""
+        base: Any = super()
+        base.mouseMoveEvent(event)
+        item: Any = self.getPlotItem()
+        box = item.getViewBox()
+        scene = self.mapToScene(event.position().toPoint())
+        inside = box.sceneBoundingRect().contains(scene)
+        x = float(box.mapSceneToView(scene).x())
+        words = self.read(x) if self.read is not None and inside else ""
+        if not words:
+            self._hide_words()
+            return
+        self._pointer.setPos(x)
+        self._pointer.show()
+        self.words.setText(words)
+        self.words.adjustSize()
+        room = box.sceneBoundingRect()
+        left = room.left() if scene.x() > room.center().x() else room.right() - self.words.width()
+        self.words.move(round(left), round(room.top()))
+        self.words.show()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Say nothing of a place any more."""
+        self._hide_words()
+        base: Any = super()
+        base.leaveEvent(event)
+
+    def _hide_words(self) -> None:
+        self.words.hide()
+        self._pointer.hide()
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Show all."""

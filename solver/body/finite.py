@@ -266,11 +266,11 @@ class FinitePatches:
 
     def responses(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
-        state = self._state(displacement)
+        state = self.state(displacement)
         values = (quantity.finite(state) for quantity in QUANTITIES)
         return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
 
-    def _state(self, displacement: Array) -> LocalState:
+    def state(self, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
         body = self.body
         wide = (slice(None), *([None] * (displacement.ndim - 2)))

@@ -9,5 +9,15 @@ from solver.quantities.local_state import LocalState, Quantity
 QUANTITIES: tuple[Quantity, ...] = (*energy.QUANTITIES, *strain.QUANTITIES, *stress.QUANTITIES)
 NAMES: tuple[str, ...] = tuple(quantity.name for quantity in QUANTITIES)
 SED = energy.SED
+# What is drawn over the whole tissue. Principal stresses are drawn only: no receptor is said to answer to them.
+FIELDS: tuple[Quantity, ...] = (
+    SED,
+    strain.GREATEST,
+    strain.LEAST,
+    stress.GREATEST,
+    stress.LEAST,
+    stress.VON_MISES,
+    stress.PRESSURE,
+)
 
-__all__ = ["NAMES", "QUANTITIES", "SED", "LocalState", "Quantity"]
+__all__ = ["FIELDS", "NAMES", "QUANTITIES", "SED", "LocalState", "Quantity"]

@@ -43,6 +43,13 @@ def _von_mises(stress: Stress) -> Array:
     return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2.0 + 3.0 * xy**2)
 
 
+def _principal(stress: Stress) -> tuple[Array, Array]:
+    """Return the greatest and the least of the three principal stresses [MPa]."""
+    xx, yy, xy, zz = stress
+    middle, radius = (xx + yy) / 2.0, np.hypot((xx - yy) / 2.0, xy)
+    return np.maximum(middle + radius, zz), np.minimum(middle - radius, zz)
+
+
 PRESSURE = Quantity(
     "pressure",
     "pressure",
@@ -58,5 +65,21 @@ VON_MISES = Quantity(
     "von Mises stress",
     lambda at: _von_mises(_small(at)),
     lambda at: _von_mises(_finite(at)),
+)
+GREATEST = Quantity(
+    "principal_stress_greatest",
+    "greatest principal stress",
+    "MPa",
+    "greatest of the three principal stresses, tension positive",
+    lambda at: _principal(_small(at))[0],
+    lambda at: _principal(_finite(at))[0],
+)
+LEAST = Quantity(
+    "principal_stress_least",
+    "least principal stress",
+    "MPa",
+    "least of the three principal stresses, tension positive",
+    lambda at: _principal(_small(at))[1],
+    lambda at: _principal(_finite(at))[1],
 )
 QUANTITIES = (PRESSURE, VON_MISES)

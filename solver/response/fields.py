@@ -1,4 +1,4 @@
-"""A prediction as a picture: the deformed finger in triangles with the SED at their corners, and its outlines."""
+"""A prediction as a picture: the deformed finger in triangles with its fields at their corners, and its outlines."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,11 +13,13 @@ from solver.element import Q2P1
 from solver.mesh import Mesh
 from solver.mesh.outline import Outline
 from solver.prediction import Prediction
+from solver.quantities import FIELDS, SED
 from solver.scene import Scene
 
 # Eight triangles of each element, in its nine nodes
 _AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element
 _SPLIT = np.array([[8, 0, 4], [8, 4, 1], [8, 1, 5], [8, 5, 2], [8, 2, 6], [8, 6, 3], [8, 3, 7], [8, 7, 0]])
+DISPLACEMENT = "displacement"  # its name among the fields: how far a node moved relative to the bone [mm]
 _INSIDE = float(Q2P1.points.max())  # outermost point of quadrature, as a share of the way to the node [-]
 
 
@@ -27,9 +29,25 @@ class Fields:
 
     nodes: Array  # (n, 2) deformed positions [mm]; a node between layers is there once for each
     triangles: Indices  # (t, 3)
-    sed: Array  # (n,) SED, averaged over the elements of one layer that meet at the node [MPa]
+    values: Mapping[
+        str, Array
+    ]  # (n,) each of `FIELDS`, a mean over the elements of one layer at the node; displacement
     outlines: Mapping[str, Array]  # "skin", "epidermis", "dermis", "bone": (m, 2) deformed lines [mm]
     patch: Array  # (m, 2) outline of the reference ending, deformed [mm]
+
+    @property
+    def sed(self) -> Array:
+        """SED at the nodes (n,) [MPa]."""
+        return self.values[SED.name]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkinLine:
+    """m points of the skin's surface, by which values at the nodes that are drawn are read along it."""
+
+    arc: Array  # (m,) along the skin at rest, 0 over the reference ending, towards the tip [mm]
+    nodes: Indices  # (m, 9) that are drawn
+    shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +57,8 @@ class Sketch:
     mesh: Mesh
     triangles: Indices  # (t, 3) of the nodes that are drawn
     elements: Indices  # (e, 8) of those nodes, along the sides of each element
+    region: Indices  # (t,) number of the material of each triangle
+    skin: SkinLine
     probes: Probes  # at the nodes of every element, one element after the other
     elastic: Elastic
     _kept: Indices  # (n,) node of the mesh behind each node that is drawn
@@ -61,64 +81,74 @@ class Sketch:
         depths = {"skin": 0.0, "epidermis": skin, "dermis": skin + scene.finger.dermis}
         lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
         lines["patch"] = _patch(outline, scene)
+        followed = {name: _followed(mesh, line) for name, line in lines.items()}
+        element, shape = followed["skin"]
         return Sketch(
             mesh=mesh,
             triangles=place[:, _SPLIT].reshape(-1, 3),
             elements=place[:, _AROUND],
+            region=np.repeat(mesh.region, len(_SPLIT)),
+            skin=SkinLine(arcs, place[element], shape),
             probes=Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
             elastic=elastic,
             _kept=kept % len(mesh.nodes),
             _place=place,
-            _lines={name: _followed(mesh, line) for name, line in lines.items()},
+            _lines=followed,
             _bone=outline.bone(arcs),
         )
 
-    def energies(self, displacement: Array) -> Array:
-        """Return the SED at the nodes of every element (9 e, m) [MPa] of displacements (nodes, 2, m), small strain."""
-        return self.probes.energy(self.mesh, self.elastic, displacement)
+    def values(self, displacement: Array) -> Array:
+        """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
+        state = self.probes.state(self.mesh, self.elastic, displacement)
+        return np.stack([field.small(state) for field in FIELDS])
 
-    def fields(self, displacement: Array, indentation: float, energies: Array) -> Fields:
-        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `energies` (9 e,)."""
+    def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
+        """Return the picture of displacements (nodes, 2) [mm] relative to the bone, with their `values` (f, 9 e)."""
         lowered = self.mesh.nodes + displacement - [0.0, indentation]
-        mean = np.bincount(self._place.ravel(), energies) / np.bincount(self._place.ravel())
+        place = self._place.ravel()
+        count = np.bincount(place)
+        means = {field.name: np.bincount(place, one) / count for field, one in zip(FIELDS, values, strict=True)}
+        means[DISPLACEMENT] = np.hypot(*displacement[self._kept].T)
         drawn = {
             name: (shape[:, None] @ lowered[self.mesh.elements[element]])[:, 0]
             for name, (element, shape) in self._lines.items()
         }
         patch = drawn.pop("patch")
         bone = self._bone - [0.0, indentation]
-        return Fields(lowered[self._kept], self.triangles, mean, drawn | {"bone": bone}, patch)
+        return Fields(lowered[self._kept], self.triangles, means, drawn | {"bone": bone}, patch)
 
 
 def fields_of(prediction: Prediction, sketch: Sketch | None = None) -> Fields:
     """Return the picture of `prediction`; `sketch` is that of its mesh, where it was made before."""
     drawn = sketch or Sketch.of(prediction.mesh, prediction.scene)
-    return drawn.fields(prediction.displacement, prediction.indentation, _energies(prediction, drawn))
+    return drawn.fields(prediction.displacement, prediction.indentation, _values(prediction, drawn))
 
 
-def _energies(prediction: Prediction, sketch: Sketch) -> Array:
-    """Return the SED at the nodes of every element, one element after the other (9 e,) [MPa]."""
+def _values(prediction: Prediction, sketch: Sketch) -> Array:
+    """Return `FIELDS` at the nodes of every element, one element after the other (f, 9 e)."""
     scene = prediction.scene
     if scene.solve.kinematics == "small":
-        return sketch.energies(prediction.displacement[:, :, None])[:, 0]
+        return sketch.values(prediction.displacement[:, :, None])[:, :, 0]
     # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
     from solver.body.finite import FiniteBody, FinitePatches
 
     body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
     count = len(sketch.probes.element)
 
-    def energies(probes: Probes) -> Array:
+    def values(probes: Probes) -> Array:
         places = Endings(probes, np.ones(count), np.arange(count), count, np.tile([1.0, 0.0], (count, 1)))
-        return FinitePatches.of(body, places).energy(prediction.displacement)
+        with np.errstate(invalid="ignore", divide="ignore"):  # a node turned inside out has no energy
+            state = FinitePatches.of(body, places).state(prediction.displacement)
+            return np.stack([field.finite(state) for field in FIELDS])
 
-    found = energies(sketch.probes)
-    if np.isfinite(found).all():
+    found = values(sketch.probes)
+    sound = np.isfinite(found).all(axis=0)
+    if sound.all():
         return found
     # In a sharp corner, as where bone ends at the skin, an element's own shape functions may turn its node inside out,
     # although no point over which the element is integrated is. The nearest such point then stands for the node.
     points = np.tile(_INSIDE * Q2P1.positions, (len(sketch.mesh.elements), 1))
-    inside = energies(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points))
-    return np.where(np.isfinite(found), found, inside)
+    return np.where(sound, found, values(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points)))
 
 
 def _patch(outline: Outline, scene: Scene) -> Array:

@@ -32,13 +32,13 @@ class Still:
 def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
     """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
     displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
-    energies = sketch.energies(displacement)
+    values = sketch.values(displacement)
     rows = finger.row.average(displacement)
     ending = finger.ending.average(displacement)[0]
     return tuple(
         Still(
             instant,
-            sketch.fields(displacement[:, :, number], instant.depth, energies[:, number]),
+            sketch.fields(displacement[:, :, number], instant.depth, values[:, :, number]),
             skin_of(finger, instant.state),
             rows[:, number],
             float(ending[number]),

@@ -31,8 +31,8 @@ from tests.sessions.report_example import example
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
 NOTHING = np.empty(0)
 FINGER = Finger(
-    Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64)),
-    Frame(np.zeros((1, 2)), np.zeros(1), {}, np.zeros((1, 2)), Contact(*[NOTHING] * 4, ()), NOTHING),
+    Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64)),
+    Frame(np.zeros((1, 2)), {"sed": np.zeros(1)}, {}, np.zeros((1, 2)), Contact(*[NOTHING] * 4, ()), NOTHING),
     NOTHING,
 )
 

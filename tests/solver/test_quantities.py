@@ -6,12 +6,12 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.constitutive.hyperelastic import NeoHooke, Ogden, energy, stress
 from solver.constitutive.linear import Hooke
-from solver.quantities import NAMES, QUANTITIES, LocalState
+from solver.quantities import FIELDS, QUANTITIES, LocalState
 
 E, NU = 0.08, 0.48
 LAWS = [NeoHooke(E, NU), Ogden(E, NU)]
-BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
-EVERY = pytest.mark.parametrize("name", NAMES)
+BY_NAME = {quantity.name: quantity for quantity in (*QUANTITIES, *FIELDS)}
+EVERY = pytest.mark.parametrize("name", BY_NAME)
 
 
 def state(grad, law=LAWS[0], angle=0.3, small=False):
@@ -127,9 +127,19 @@ def test_every_quantity_of_a_prediction_lies_within_its_error_of_a_mesh_three_ti
         solve(Scene(friction=Friction(0.5, 0.02), loading=Loading(1.2, "-x"), solve=Solve(kinematics, "steady", size)))
         for size in (0.05, 0.002)
     )
-    for name in NAMES:
+    for name in (quantity.name for quantity in QUANTITIES):
         value, error = coarse.responses[name]
         truth, rest = fine.responses[name]
         assert abs(value - truth) < error + rest, name
     assert coarse.responses["sed"].value == pytest.approx(coarse.sed_ending, rel=1e-12)
     assert coarse.responses["sed"].error == pytest.approx(coarse.error_estimate * coarse.sed_ending, rel=1e-9)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_principal_stresses_of_simple_states_are_as_closed_forms_say(law):
+    """Pure shear by an angle g has G g and -G g; a stretch e with the sides held has (lambda + 2 G) e and lambda e."""
+    shear, lame = float(law.shear), float(law.lame)
+    at = state([[[0.0, 0.01], [0.01, 0.0]], [[0.01, 0.0], [0.0, 0.0]]], law, small=True)
+    greatest, least = (BY_NAME[f"principal_stress_{which}"].small(at) for which in ("greatest", "least"))
+    np.testing.assert_allclose(greatest, [0.02 * shear, 0.01 * (lame + 2.0 * shear)], rtol=1e-12)
+    np.testing.assert_allclose(least, [-0.02 * shear, 0.01 * lame], rtol=1e-12)

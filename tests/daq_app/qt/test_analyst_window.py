@@ -1,5 +1,6 @@
 """The analyst's window, driven as a person does, on a recorded session that is analysed by the real work."""
 
+import re
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -8,11 +9,12 @@ import numpy as np
 import pyqtgraph
 import pytest
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
 from daq_app.analyst import messages as m
+from daq_app.analyst.field_list import FIELD_CHOICES
 from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
@@ -20,6 +22,7 @@ from daq_app.analyst.seen import finger_words
 from daq_app.analyst.shown import numbers, points
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow
+from daq_app.qt.field_bar import ALL_TRIALS, FIXED
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.tokens import LIGHT
 from tests.sessions.report_example import example
@@ -76,10 +79,10 @@ def until(application, condition):
 def frame(sed):
     square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     contact = Contact(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
-    return Frame(square, np.full(3, sed), {"skin": square}, square, contact, np.array([sed, sed]))
+    return Frame(square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.array([sed, sed]))
 
 
-PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]])), np.array([0.0, 1.0])
+PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]), np.array([1])), np.array([0.0, 1.0])
 
 
 def film(**more):
@@ -251,6 +254,134 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     assert not player.playing
     window.model.near.click()
     assert not canvas.grab().isNull()
+
+
+def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    view.show_all()
+    application.processEvents()
+    trace = chosen(window.state).stroke.trace
+    i = len(trace.time) // 2
+    at = plot.getPlotItem().getViewBox().mapViewToScene(QPointF(trace.time[i], trace.normal[i]))
+    QTest.mouseMove(plot.viewport(), plot.mapFromScene(at))
+    application.processEvents()
+    pattern = r"([\d.]+) s · N ([\d.]+) N · T ([\d.]+) N · µ ([\d.]+)"
+    time_s, normal, tangential, mu = map(float, re.fullmatch(pattern, plot.words.text()).groups())
+    assert plot.words.isVisible()
+    near = list(np.round(trace.time, 3)).index(time_s)
+    assert abs(near - i) <= 1
+    assert (normal, tangential, mu) == pytest.approx(
+        (trace.normal[near], trace.tangential[near], trace.mu[near]), rel=1e-3
+    )
+
+
+def small_finger(application, window):
+    """Return the canvas with the triangle of `film`, its settled state, and where it paints a place [mm]."""
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    application.processEvents()
+    canvas = window.model.finger
+    canvas.show_view(None)
+    canvas.set_line(None)
+
+    def pixel(x, y):
+        return QPointF(*canvas.view().placed(np.array([[x, y]]))[0]).toPoint()
+
+    return canvas, pixel
+
+
+def drag(application, widget, begin, end, held=Qt.KeyboardModifier.NoModifier):
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, held, begin)
+    QTest.mouseMove(widget, end)
+    application.processEvents()
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, held, end)
+
+
+def wheel(application, widget, at, notches):
+    turned, still = QPoint(0, 120 * notches), QPoint()
+    event = QWheelEvent(
+        QPointF(at),
+        QPointF(widget.mapToGlobal(at)),
+        still,
+        turned,
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    application.sendEvent(widget, event)
+
+
+def test_the_wheel_zooms_the_finger_about_the_pointer_and_home_or_a_double_click_shows_all(application, window):
+    canvas, pixel = small_finger(application, window)
+    whole, at = canvas.view(), pixel(0.5, 0.25)
+    wheel(application, canvas, at, 3)
+    assert canvas.view().per_mm == pytest.approx(1.25**3 * whole.per_mm)
+    assert canvas.view().place(at.x(), at.y()) == pytest.approx(whole.place(at.x(), at.y()))
+    QTest.keyClick(canvas, Qt.Key.Key_Home)
+    assert canvas.view() == whole
+    QTest.keyClick(canvas, Qt.Key.Key_Plus)
+    assert canvas.view().per_mm == pytest.approx(1.25 * whole.per_mm)
+    QTest.keyClick(canvas, Qt.Key.Key_Minus)
+    assert canvas.view().per_mm == pytest.approx(whole.per_mm)
+    QTest.keyClick(canvas, Qt.Key.Key_Right)
+    assert canvas.view().x > whole.x
+    QTest.mouseDClick(canvas, Qt.MouseButton.LeftButton)
+    assert canvas.view() == whole
+
+
+def test_a_drag_moves_the_finger_and_the_next_step_of_its_history_leaves_it_there(application, window):
+    canvas, _ = small_finger(application, window)
+    before = canvas.view()
+    drag(application, canvas, QPoint(60, 80), QPoint(90, 60))
+    after = canvas.view()
+    assert (before.x - after.x) * before.per_mm == pytest.approx(30.0)
+    assert (before.y - after.y) * before.per_mm == pytest.approx(20.0)
+    QTest.keyClick(window.model.player, Qt.Key.Key_Left)
+    assert canvas.view() == after
+    assert canvas.line is None
+
+
+def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_pointer(application, window):
+    canvas, pixel = small_finger(application, window)
+    at = pixel(0.25, 0.25)
+    QTest.mouseMove(canvas, at)
+    application.processEvents()
+    words = window.model.probe.accessibleName()
+    assert words.startswith("SED 3 kPa · x 0.2")
+    assert words.endswith("dermis")
+    QTest.keyClick(window.model.player, Qt.Key.Key_Left)  # another state under the pointer at rest
+    assert window.model.probe.accessibleName().startswith("SED 2 kPa · x 0.2")
+    QTest.mouseMove(canvas, pixel(0.9, 0.9))
+    application.processEvents()
+    assert window.model.probe.accessibleName().endswith("no tissue")
+
+
+def test_a_line_that_is_drawn_with_shift_plots_the_field_along_it(application, window):
+    canvas, pixel = small_finger(application, window)
+    drag(application, canvas, pixel(0.1, 0.3), pixel(0.6, 0.3), Qt.KeyboardModifier.ShiftModifier)
+    place, values = window.model.plot.values
+    assert place[-1] == pytest.approx(0.5, abs=2.0 / canvas.view().per_mm)
+    np.testing.assert_allclose(values, 3.0)
+    assert window.model.plot.plot.accessibleName() == "SED [kPa]: from A to B [mm]"
+
+
+def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees_them(application, window):
+    canvas, _ = small_finger(application, window)
+    fields = window.model.fields
+    fields.ranges.setCurrentIndex(FIXED)
+    fields.low.setValue(1.0)
+    fields.high.setValue(2.5)
+    for _ in range(2):
+        assert canvas._look.range == (1.0, 2.5)
+        QTest.keyClick(window.model.player, Qt.Key.Key_Left)
+    fields.low.setValue(2.5)  # no range: the automatic one is shown
+    assert canvas._look.range != (2.5, 2.5)
+    fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    assert fields.mode == ALL_TRIALS
+    assert canvas._look.field.unit == "mm"
+    assert not canvas.grab().isNull()
+    fields.which.setCurrentIndex(0)
 
 
 def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):

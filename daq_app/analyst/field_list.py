@@ -1,0 +1,82 @@
+"""The fields that are drawn over the finger: their names, units and ranges of colour."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from daq_app.analyst.frame import TOP, Frame, step_above
+from solver.quantities import FIELDS, SED
+
+Array = NDArray[np.float64]
+Range = tuple[float, float]
+
+NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")
+TICKS = 7  # at most, in a colour bar
+
+
+@dataclass(frozen=True, slots=True)
+class FieldChoice:
+    """A field as people read it."""
+
+    name: str  # among the values of a frame
+    label: str
+    unit: str  # "kPa", "mm", or "-" for a strain
+    factor: float  # from the solver's unit to this one
+    signed: bool
+
+    def of(self, frame: Frame) -> Array:
+        """Return the field at the nodes of a frame (n,), in its own unit; nan where the frame has none."""
+        values = frame.values.get(self.name)
+        return np.full(len(frame.nodes), np.nan) if values is None else self.factor * values
+
+    def words(self, value: float) -> str:
+        """Return a value with its unit."""
+        return f"{self.label} {value:.4g} {self.unit}".removesuffix(" -").replace(" -", " −")
+
+    @property
+    def axis(self) -> str:
+        """What an axis of it says."""
+        return f"{self.label} [{self.unit}]"
+
+
+FIELD_CHOICES = (
+    *(
+        FieldChoice(
+            one.name,
+            one.label,
+            "kPa" if one.unit == "MPa" else one.unit,
+            1000.0 if one.unit == "MPa" else 1.0,
+            one.name not in NEVER_NEGATIVE,
+        )
+        for one in FIELDS
+    ),
+    FieldChoice("displacement", "displacement from the bone", "mm", 1.0, signed=False),
+)
+
+
+def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
+    """Return where the colours of frames begin and end: few nodes lie beyond; nought is the middle of signed ones."""
+    tops = [0.0]
+    for frame in frames:
+        values = np.abs(field.of(frame))
+        known = values[np.isfinite(values)]
+        if len(known):
+            tops.append(float(np.quantile(known, TOP)))
+    high = step_above(max(tops))
+    return (-high if field.signed else 0.0), high
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Return round numbers from `low` to `high`, at most `TICKS` of them; none where `low` is not below `high`.
+
+    >>> ticks(0.0, 15.0), ticks(-0.3, 0.3)
+    ([0.0, 5.0, 10.0, 15.0], [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])
+    """
+    if not low < high:
+        return []
+    power = 10.0 ** np.floor(np.log10((high - low) / TICKS))
+    step = next(s * power for s in (1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / (s * power) <= TICKS - 1 + 1e-9)
+    numbers = range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)
+    return [float(f"{number * step:.12g}") for number in numbers]

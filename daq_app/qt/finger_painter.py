@@ -1,0 +1,180 @@
+"""Paints a state of the model's finger: a field in colour, layers, and the contact with its tractions."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
+
+from daq_app.analyst.field_list import FieldChoice, Range
+from daq_app.analyst.frame import Frame, Parts, halved, seen
+from daq_app.analyst.probe import Line
+from daq_app.analyst.viewport import Box, View
+from daq_app.qt.indicators import paint_lost
+from daq_app.qt.shapes import faces
+from daq_app.qt.tokens import Tokens
+
+Array = NDArray[np.float64]
+
+ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
+NEAR = (4.6, -2.6, 4.4)  # half width, below and above of the close view [mm]
+COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
+STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
+STATE_WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a state is shown."""
+
+    field: FieldChoice
+    range: Range  # where the colours begin and end, in the field's own unit
+    near: bool = False  # the contact alone
+    mesh: bool = False
+    lost: tuple[float, float] | None = None  # a place that is marked [mm]
+
+
+def whole_box(frame: Frame, look: Look) -> Box:
+    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm]."""
+    if not look.near:
+        x, y = frame.nodes[:, 0], frame.nodes[:, 1]
+        return float(x.min()) - 0.5, float(x.max()) + 0.5, -3.2, float(y.max()) + 0.3
+    places: list[float] = frame.contact.x.tolist()
+    touching = [x for x, state in zip(places, frame.contact.state, strict=True) if state != "open"]
+    middle = (min(touching) + max(touching)) / 2.0 if touching else 0.0
+    half, below, above = NEAR
+    return middle - half, middle + half, below, above
+
+
+@dataclass(frozen=True, slots=True)
+class FingerPainter:
+    """Paints one frame as a view shows it."""
+
+    painter: QPainter
+    tokens: Tokens
+    view: View
+    box: QRectF
+    frame: Frame
+    parts: Parts
+
+    def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
+        """Paint everything inside the box."""
+        painter, ink = self.painter, QColor(self.tokens.text)
+        ground = self._placed(np.array([[0.0, 0.0]]))[0].y()
+        painter.save()
+        painter.setClipRect(self.box)
+        below = QColor(self.tokens.quiet)
+        below.setAlpha(40)
+        top = max(ground, self.box.top())
+        painter.fillRect(QRectF(self.box.left(), top, self.box.width(), self.box.bottom() - top), below)
+        self._paint_tissue(look, shades)
+        if look.mesh:
+            self._paint_mesh()
+        self._paint_outlines()
+        painter.setPen(QPen(ink, 1.4))
+        painter.drawLine(QPointF(self.box.left(), ground), QPointF(self.box.right(), ground))
+        self._paint_contact(ground)
+        if look.lost is not None:
+            paint_lost(painter, self._placed(np.array([look.lost]))[0], self.tokens)
+        if line is not None:
+            self._paint_line(line)
+        painter.restore()
+
+    def _placed(self, points: Array) -> list[QPointF]:
+        rows: list[list[float]] = self.view.placed(points).tolist()
+        return [QPointF(x, y) for x, y in rows]
+
+    def _paint_tissue(self, look: Look, shades: list[QColor]) -> None:
+        frame, box = self.frame, self.box
+        shown = self.view.visible(box.left(), box.top(), box.width(), box.height())
+        nodes, values, triangles = seen(frame.nodes, look.field.of(frame), self.parts.triangles, shown)
+        if len(triangles) and box.width() * box.height() / len(triangles) > COARSE:
+            nodes, values, triangles = halved(nodes, values, triangles)
+        low, high = look.range
+        part = (values[triangles].mean(axis=1) - low) / (high - low)
+        wanted = (np.clip(np.nan_to_num(part), 0.0, 1.0) * (len(shades) - 1)).astype(np.int64)
+        self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        for number, path in faces(self.view.placed(nodes)[triangles], wanted):
+            self.painter.setPen(QPen(shades[number], 0))
+            self.painter.setBrush(shades[number])
+            self.painter.drawPath(path)
+        self.painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
+        self.painter.setBrush(Qt.BrushStyle.NoBrush)
+
+    def _paint_mesh(self) -> None:
+        ink = QColor("black")
+        ink.setAlpha(110)
+        self.painter.setPen(QPen(ink, 0.6))
+        points = self._placed(self.frame.nodes)
+        around: list[list[int]] = self.parts.elements.tolist()
+        for element in around:
+            if any(self.box.contains(points[node]) for node in element):
+                self.painter.drawPolygon([points[node] for node in element])
+
+    def _paint_outlines(self) -> None:
+        painter, ink = self.painter, QColor(self.tokens.text)
+        for name, outline in self.frame.outlines.items():
+            # what lies on the tissue's colours is black in both themes: they are pale where most lines are
+            painter.setPen(QPen(ink if name in ("skin", "bone") else QColor("black"), 1.4 if name == "skin" else 0.7))
+            if name == "bone":
+                painter.setBrush(QColor(self.tokens.surface))
+                bone = QPolygonF(self._placed(outline))
+                painter.drawPolygon(bone)
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                self._name_bone(bone, self._placed(outline.mean(axis=0)[None])[0])
+            else:
+                painter.drawPolyline(QPolygonF(self._placed(outline)))
+        self._in_two(QPolygonF(self._placed(self.frame.patch)))
+
+    def _name_bone(self, bone: QPolygonF, middle: QPointF) -> None:
+        """Write the bone's name where all of it lies on the bone: on the colours around it could not be read."""
+        words = self.painter.fontMetrics().boundingRect("bone").toRectF()
+        words.moveCenter(middle)
+        corners = (words.topLeft(), words.topRight(), words.bottomLeft(), words.bottomRight())
+        if all(bone.containsPoint(corner, Qt.FillRule.OddEvenFill) for corner in corners):
+            self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, "bone")
+
+    def _paint_line(self, line: Line) -> None:
+        ends = self._placed(np.array(line))
+        self._in_two(QPolygonF(ends))
+        for name, end in zip("AB", ends, strict=True):
+            self.painter.setBrush(QColor("white"))
+            self.painter.drawEllipse(end, 8.0, 8.0)
+            self.painter.setBrush(Qt.BrushStyle.NoBrush)
+            self.painter.drawText(QRectF(end.x() - 9, end.y() - 9, 18, 18), Qt.AlignmentFlag.AlignCenter, name)
+
+    def _in_two(self, polygon: QPolygonF) -> None:
+        """Draw a line black on white, to be seen on every colour."""
+        for colour, width in ((QColor("white"), 3.2), (QColor("black"), 1.4)):
+            self.painter.setPen(QPen(colour, width))
+            self.painter.drawPolyline(polygon)
+
+    def _paint_contact(self, ground: float) -> None:
+        """Draw tractions as arrows that end where they act, and under them what each stretch of skin does."""
+        painter, contact, ink = self.painter, self.frame.contact, QColor(self.tokens.text)
+        touching = [i for i, state in enumerate(contact.state) if state != "open"]
+        if not touching:
+            return
+        places: list[float] = self.view.placed(np.column_stack([contact.x, np.zeros(len(contact.x))]))[:, 0].tolist()
+        strongest = float(np.hypot(contact.pressure, contact.traction)[touching].max())
+        painter.setPen(QPen(ink, 1.0))
+        for i in touching[:: max(1, -(-len(touching) // ARROWS))] if strongest > 0.0 else ():
+            reach = self.view.per_mm * LONGEST / strongest
+            tip = QPointF(places[i], ground + 2.0)
+            tail = QPointF(tip.x() - reach * contact.traction[i], tip.y() + reach * contact.pressure[i])
+            painter.drawLine(tail, tip)
+            painter.drawLine(tip, QPointF(tip.x() - 2.5, tip.y() + 4.0))
+            painter.drawLine(tip, QPointF(tip.x() + 2.5, tip.y() + 4.0))
+        level = ground + self.view.per_mm * (LONGEST + 0.3)
+        for state, run in itertools.groupby(zip(contact.state, places, strict=True), key=lambda one: one[0]):
+            if state == "open":
+                continue
+            ends = [place for _, place in run]
+            painter.setPen(QPen(ink, 3.0, STYLES[state], Qt.PenCapStyle.FlatCap))
+            painter.drawLine(QPointF(ends[0] - 1.5, level), QPointF(ends[-1] + 1.5, level))
+            words = STATE_WORDS[state]
+            if ends[-1] - ends[0] > painter.fontMetrics().horizontalAdvance(words):
+                box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
+                painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)

@@ -1,0 +1,92 @@
+"""What the finger's picture shows, and what is read from it: places, fields at them and along lines."""
+
+import numpy as np
+import pytest
+
+from daq_app.analyst.field_list import FIELD_CHOICES, automatic_range, ticks
+from daq_app.analyst.frame import Contact, Frame, Parts, SkinLine
+from daq_app.analyst.probe import along_line, along_skin, probe_words, value_at
+from daq_app.analyst.viewport import LEAST, MOST, View
+
+NONE = np.empty(0)
+BY_NAME = {field.name: field for field in FIELD_CHOICES}
+BOX = (-2.0, 8.0, -1.0, 4.0)
+
+# A square of four triangles about its middle; a field that is linear in x and y is then the same inside each.
+NODES = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]])
+TRIANGLES = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+PLANE = 0.001 * (2.0 * NODES[:, 0] - NODES[:, 1])  # [MPa]
+SIDE = SkinLine(np.array([-1.0, 1.0]), np.array([[0] * 9, [1] * 9]), np.full((2, 9), 1.0 / 9.0))
+PARTS = Parts(TRIANGLES, np.empty((0, 8), np.int64), np.array([0, 1, 2, 2]), SIDE)
+
+
+def frame(**values):
+    return Frame(NODES, {"sed": PLANE, **values}, {}, NODES, Contact(NONE, NONE, NONE, NONE, ()), NONE)
+
+
+def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back_to_its_place():
+    view = View.fitted(BOX, 10.0, 20.0, 100.0, 200.0)
+    assert view.per_mm == 10.0
+    assert view.visible(10.0, 20.0, 100.0, 200.0) == pytest.approx((-2.0, 8.0, -1.0, 19.0))
+    points = np.array([[0.0, 0.0], [3.0, 2.5]])
+    places = [view.place(*pixel) for pixel in view.placed(points).tolist()]
+    np.testing.assert_allclose(places, points, atol=1e-12)
+
+
+def test_zoom_ends_where_nothing_more_can_be_seen():
+    view = View.fitted(BOX, 0.0, 0.0, 100.0, 50.0)
+    assert view.zoomed(1e9, 5.0, 5.0).per_mm == MOST
+    assert view.zoomed(1e-9, 5.0, 5.0).per_mm == LEAST
+
+
+def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
+    field = BY_NAME["sed"]
+    points = np.random.default_rng(3).uniform(0.0, 4.0, (20, 2))
+    values, _ = value_at(frame(), PARTS, field, points)
+    np.testing.assert_allclose(values, 2.0 * points[:, 0] - points[:, 1], atol=1e-9)
+    away, values = along_line(frame(), PARTS, field, ((1.0, 1.0), (4.0, 5.0)))
+    inside = away <= 3.75  # of its 5 mm: there it leaves the square, at y = 4
+    np.testing.assert_allclose(values[inside], 1.0 + (2.0 * 0.6 - 0.8) * away[inside], atol=1e-9)
+    assert np.isnan(values[~inside]).all()
+
+
+def test_the_probe_names_field_unit_place_and_tissue():
+    words = probe_words(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
+    assert words == "SED 5 kPa · x 3.500 mm, y 2.000 mm · dermis"
+    assert probe_words(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
+
+
+def test_a_finger_without_triangles_has_no_field_anywhere():
+    bare = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
+    assert probe_words(frame(), bare, BY_NAME["sed"], 1.0, 1.0).endswith("no tissue")
+    assert np.isnan(along_line(frame(), bare, BY_NAME["sed"], ((0.0, 0.0), (1.0, 1.0)))[1]).all()
+    assert along_skin(frame(), bare, BY_NAME["sed"])[0].size == 0
+
+
+def test_a_strain_has_no_unit_and_a_negative_number_a_minus():
+    strained = frame(principal_strain_least=np.full(5, -0.125))
+    words = probe_words(strained, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
+    assert words == "least principal strain −0.125 · x 2.000 mm, y 0.500 mm · epidermis"
+
+
+def test_the_field_along_the_skin_is_that_of_the_skin_s_own_nodes():
+    place, values = along_skin(frame(), PARTS, BY_NAME["sed"])
+    assert place.tolist() == [-1.0, 1.0]
+    np.testing.assert_allclose(values, 1000.0 * PLANE[:2], atol=1e-12)
+
+
+def test_colours_of_a_signed_field_have_nought_in_their_middle_and_others_begin_there():
+    shown = frame(pressure=np.array([-0.02, 0.0, 0.0, 0.0, 0.01]), von_mises=np.full(5, 0.009))
+    low, high = automatic_range(BY_NAME["pressure"], [shown])
+    assert low == -high < 0.0
+    assert automatic_range(BY_NAME["von_mises"], [shown]) == (0.0, 10.0)
+    assert automatic_range(BY_NAME["displacement"], [shown]) == (0.0, 1.0)  # the frame has none
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-30.0, 30.0), (0.137, 0.1425), (-7e-4, 9e5)])
+def test_ticks_are_few_and_round_and_lie_in_the_range(low, high):
+    marks = ticks(low, high)
+    assert 3 <= len(marks) <= 7
+    assert low <= marks[0] < marks[-1] <= high
+    np.testing.assert_allclose(np.diff(marks), marks[1] - marks[0])
+    assert ticks(high, low) == []
