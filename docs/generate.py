@@ -33,7 +33,7 @@ def command_line() -> str:
     """Return the help of every verb, as argparse prints it."""
     lines = ["# Command line", "", "`daq-app VERB --help` prints the same.", ""]
     for name, does in main.VERBS.items():
-        verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_')}")
+        verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
         parser = main._parser(name, verb)  # noqa: SLF001 - the one place that makes a verb's parser
         lines += [
             f"## {name}",

@@ -161,9 +161,10 @@ def compiled(function: Loop) -> Loop:
 
     What a loop calls is copied into it before it is compiled. To compile that by itself too would take as long again
     for each level of calls; and of two versions of it in two loops, the one that a process loads first would serve
-    both, so that the last bits of a result would depend on what was called before.
+    both, so that the last bits of a result would depend on what was called before. A division by zero makes infinity:
+    to raise would take a branch each time, and a sixth more time to compile.
     """
-    loop = _numba.njit(fastmath=_FAST, inline="always")(function)
+    loop = _numba.njit(fastmath=_FAST, inline="always", error_model="numpy")(function)
     loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
     return cast("Loop", loop)
 

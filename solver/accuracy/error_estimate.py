@@ -95,7 +95,8 @@ def _moved(
         return None
     deeper, along = newton.system.motion.tolist() if given is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
-    return newton.moved(begin, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    after = newton.moved(begin, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    return replace(after, state=states, sense=senses)  # and not those that the moved edge would call for
 
 
 def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: Steps | None) -> Errors:

@@ -22,7 +22,7 @@ def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
     return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)  # a search for a tolerance plans 8 meshes: 4 made each anew, 32 gain nothing more
 def _planned(count: int, *numbers: bytes) -> SymbolicFactorization:
     """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)

@@ -128,7 +128,7 @@ class FiniteMeshed:
 
     def numbers(self, state: State) -> Array:
         """Return SED, normal force and drag."""
-        return np.array([self.finger.sed_ending(state), state.force[1], abs(state.force[0])])
+        return np.array([self.finger.sed_ending(state.u), state.force[1], abs(state.force[0])])
 
     def numbers_together(self, states: Sequence[State]) -> Array:
         """Return them for several states (n, 3)."""
