@@ -172,7 +172,8 @@ class LivePanel(QFrame):
         drawn = (trace, now, end, self._seconds, self._columns(), seen)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._show_until(self.plots[:3], end, seen, clock)
+            if end == newest or trace.holds(end - self._seconds):  # else the stroke stays as it was drawn last
+                self._show_until(self.plots[:3], end, seen, clock)
             self._show_until(self.plots[3:], now, seen, clock)
             frozen = newest is not None and end < newest
             for plot in (*self.plots[:3], self._model_plot):

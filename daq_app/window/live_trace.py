@@ -36,11 +36,13 @@ class LiveTrace:
         self._values = np.full((channels, 2 * self._capacity), np.nan, np.float32)
         self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
         self._start = 0
+        self._full = False  # whether readings were dropped for newer ones
         self._made = self._none_made()
 
     def add(self, time: Array, values: Array) -> None:
         """Take readings: time (n,) [s, device time, rising] and values (channels, n)."""
         n = len(time)
+        self._full |= self._end - self._start + n > self._capacity
         if n > self._capacity:
             time, values, n = time[-self._capacity :], values[:, -self._capacity :], self._capacity
         if self._end + n > len(self._time):
@@ -59,9 +61,14 @@ class LiveTrace:
         """Return the time of the newest reading [s]; None before the first."""
         return float(self._time[self._end - 1]) if self._end > self._start else None
 
+    def holds(self, first: float) -> bool:
+        """Return whether no reading since `first` [s] was dropped for a newer one."""
+        return not self._full or float(self._time[self._start]) <= first
+
     def clear(self) -> None:
         """Forget every reading, as at a new connection."""
         self._start = self._end = 0
+        self._full = False
         self._made = self._none_made()
 
     def between(self, first: float, last: float, every: int = 1) -> tuple[Array, Array]:

@@ -10,6 +10,8 @@ from daq_app.qt.inspected_trial import InspectedTrial
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
 from daq_app.qt.trial_strip import TrialStrip
+from daq_app.window.course_state import Mark
+from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.stroke_quality import StrokePicture
 from daq_app.window.view_trials import Inspection, Tile
 from sessions.run import steps
@@ -151,3 +153,28 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
     assert all(made.width() >= made.sizeHint().width() for made in strip.tiles)
     assert all(made.height() >= made.sizeHint().height() for made in strip.tiles)
     strip.hide()
+
+
+def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
+    class Feed:
+        trace = LiveTrace(100.0)
+
+    panel = LivePanel(Feed, driver.window.bridge.model, tokens.LIGHT, 1.0)
+    panel.resize(800, 600)
+    panel.show()
+    driver.application.processEvents()
+    marks = (Mark("onset", 2.0, 2.0), Mark("lift", 5.0, 5.0))
+
+    def fed(first, last):
+        time = np.arange(first, last, 0.01)
+        inside = (time > 2.0) & (time < 5.0)
+        Feed.trace.add(time, np.tile(np.where(inside, 3.0, 0.0), (len(CHANNELS), 1)))
+        panel.draw(marks, last)
+        return panel.plots[0]._columns.values
+
+    drawn = fed(0.0, 20.0)
+    assert np.nanmax(drawn) == 3.0
+    for minute in range(4):
+        awaited = fed(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
+    np.testing.assert_array_equal(awaited, drawn)
+    panel.hide()

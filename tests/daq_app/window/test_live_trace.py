@@ -73,3 +73,14 @@ def test_a_new_connection_begins_with_an_empty_picture():
     trace.clear()
     assert trace.newest is None
     assert len(trace.columns(0.0, 5.0, 100).time) == 0
+
+
+def test_the_ring_says_which_readings_were_dropped_for_newer_ones():
+    trace = LiveTrace(200.0)
+    fed(trace, 100.0 + np.arange(2000) / 200.0, np.ones(2000))
+    assert trace.holds(0.0)  # nothing came before, and nothing was dropped
+    fed(trace, 110.0 + np.arange(30_000) / 200.0, np.ones(30_000))
+    assert not trace.holds(150.0)
+    assert trace.holds(250.0)
+    trace.clear()
+    assert trace.holds(0.0)
