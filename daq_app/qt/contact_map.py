@@ -90,7 +90,8 @@ class ContactMap(PaintedWidget):
         for edge, text in ((Qt.AlignmentFlag.AlignTop, "distal"), (Qt.AlignmentFlag.AlignBottom, "proximal")):
             painter.drawText(beside, Qt.AlignmentFlag.AlignRight | edge, text)
         beside.moveLeft(box.right() + 2 * MARGIN)
-        painter.drawText(beside, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, "10 mm grid")
+        low = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom | Qt.TextFlag.TextWordWrap
+        painter.drawText(beside, low, "10 mm grid")
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm

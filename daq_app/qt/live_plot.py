@@ -144,6 +144,7 @@ class LivePlot(PaintedWidget):
     def _paint_times(self, painter: QPainter, inside: QRectF) -> None:
         metrics = QFontMetricsF(painter.font())
         widest = metrics.horizontalAdvance("−00 s ")
+        end = inside.right() - metrics.horizontalAdvance(self._end)  # its words may begin so far left
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
             painter.setPen(fine(self.tokens.line))
@@ -153,6 +154,8 @@ class LivePlot(PaintedWidget):
             text = f"{_number(value)} s" if value else self._end
             width = metrics.horizontalAdvance(text)
             left = min(max(x - width / 2.0, 0.0), self.width() - width - 1)
+            if value and left + width > end:
+                continue
             painter.setPen(QColor(self.tokens.quiet))
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
@@ -163,19 +166,23 @@ class LivePlot(PaintedWidget):
         x, baseline = inside.left() + 6, inside.top() + metrics.ascent() + 1
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
+        unit = self._name[self._name.index("[") :] if several else self._name
+        words = sum(4 + metrics.horizontalAdvance(f"{curve.channel}  ") for curve in named)
+        room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
+        sample = max(min(SAMPLE * self._type_scale, room), 0.0)
         for curve in named if several else ():
             pen = QPen(QColor(self._colour(curve.colour)), 3)
             if curve.dashed:
                 pen.setDashPattern([1.6, 1.2])
             painter.setPen(pen)
-            end = x + SAMPLE * self._type_scale
+            end = x + sample
             middle = baseline - metrics.xHeight() / 2.0
             painter.drawLine(QPointF(x, middle), QPointF(end, middle))
             painter.setPen(QColor(self.tokens.quiet))
             painter.drawText(QPointF(end + 4, baseline), curve.channel)
             x = end + 4 + metrics.horizontalAdvance(f"{curve.channel}  ")
         painter.setPen(QColor(self.tokens.quiet))
-        painter.drawText(QPointF(x, baseline), self._name[self._name.index("[") :] if several else self._name)
+        painter.drawText(QPointF(x, baseline), unit)
 
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
         """Mark what was found: a line for onset and lift, a shaded stretch for the steady window."""
