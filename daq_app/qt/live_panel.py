@@ -182,7 +182,7 @@ class LivePanel(QFrame):
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
                 self.map.show_trail(values[CHANNELS.index("x") : CHANNELS.index("y") + 1].T)
-        self._draw_model(end, clock)
+        self._draw_model(end, clock, still=end != newest)
         if clock - self._read_at >= READ_EVERY:
             self._read_at = clock
             _, values = trace.between(now - 0.1, np.nextafter(now, np.inf))
@@ -205,9 +205,9 @@ class LivePanel(QFrame):
         shown = next((plot for plot in self.plots if plot.isVisible()), self.plots[0])
         return max(shown.width() // 2, 100)
 
-    def _draw_model(self, now: float, clock: float) -> None:
+    def _draw_model(self, now: float, clock: float, *, still: bool) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
-        if self._model_plot.isVisible():
+        if self._model_plot.isVisible() and (not still or self._model_trace.holds(now - self._seconds)):
             last = np.nextafter(now, np.inf)
             columns = self._model_trace.columns(now - self._seconds, last, self._columns())
             self._model_plot.show_columns(columns, now, (), clock)

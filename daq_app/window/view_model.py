@@ -76,6 +76,10 @@ class ModelTrace:
         sed = 1000.0 * said.sed
         self._trace.add(said.time, np.stack([np.where(said.instead, np.nan, sed), np.where(said.instead, sed, np.nan)]))
 
+    def holds(self, first: float) -> bool:
+        """Return whether nothing said since `first` [s] was dropped."""
+        return self._trace.holds(first)
+
     def columns(self, first: float, last: float, count: int) -> Columns:
         """Return the SED [kPa] from `first` to `last` [s, device time] in about `count` columns; a gap stays a gap."""
         return self._trace.columns(first, last, count)
