@@ -1,7 +1,11 @@
 """The clock everything in a session is timed by: real, or told to run faster than real."""
 
+import math
+import threading
 import time
 from typing import Protocol
+
+LONGEST_STEP = 0.1  # of a clock that all of a simulated bench share, shorter than people take to react [s]
 
 
 class Clock(Protocol):
@@ -38,18 +42,30 @@ class RealClock:
 class PacedClock:
     """A clock that runs `factor` times as fast as the machine's, for simulated benches only."""
 
-    def __init__(self, factor: float) -> None:
-        """Start at the machine's monotonic time, then run `factor` (> 0) times as fast."""
+    def __init__(self, factor: float, longest_step: float = math.inf) -> None:
+        """Start at the machine's monotonic time, then run `factor` (> 0) times as fast.
+
+        Between two looks at it the clock moves by `longest_step` [s of this clock] at most. A machine that halts all
+        who share the clock for an instant then halts their time too. Those on two clocks must let them run freely.
+        """
         self.factor = factor
-        self._origin_ns = time.monotonic_ns()
+        self._longest_ns = longest_step * 1e9
+        self._machine_ns = self._now_ns = time.monotonic_ns()
+        self._lock = threading.Lock()
 
     def now_ns(self) -> int:
-        """Return the told time [ns]."""
-        return self._origin_ns + int((time.monotonic_ns() - self._origin_ns) * self.factor)
+        """Return the time of this clock [ns]."""
+        with self._lock:
+            machine_ns = time.monotonic_ns()
+            self._now_ns += int(min((machine_ns - self._machine_ns) * self.factor, self._longest_ns))
+            self._machine_ns = machine_ns
+            return self._now_ns
 
     def sleep(self, seconds: float) -> None:
-        """Wait for `seconds` of told time."""
-        time.sleep(max(seconds, 0.0) / self.factor)
+        """Wait for `seconds` of this clock."""
+        until = self.now_ns() + int(max(seconds, 0.0) * 1e9)
+        while (remaining := until - self.now_ns()) > 0:
+            time.sleep(min(remaining, self._longest_ns) * 1e-9 / self.factor)
 
 
 class ToldClock:

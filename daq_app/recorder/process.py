@@ -25,7 +25,7 @@ from daq_app.recorder.messages import (
 )
 from daq_app.recorder.pipes import Inbox, Outbox
 from daq_app.recorder.session import Prepared, begun, gone_on, run
-from drivers.clock import Clock, PacedClock, RealClock
+from drivers.clock import LONGEST_STEP, Clock, PacedClock, RealClock
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from sessions.recording import RecordingError
 
@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> None:
     pace = float(arguments[0]) if arguments else 1.0
     outbox = Outbox(writing)
     inbox = Inbox(reading)
-    clock = RealClock() if pace == 1.0 else PacedClock(pace)
+    clock = RealClock() if pace == 1.0 else PacedClock(pace, LONGEST_STEP)
     try:
         Recorder(inbox, outbox, clock).serve()
     finally:

@@ -15,7 +15,7 @@ from daq_app.batch.derived import analysed, predicted
 from daq_app.cli.main import FLAWED
 from daq_app.console import Console, WrongValue, number, table
 from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
-from drivers.clock import PacedClock, RealClock
+from drivers.clock import LONGEST_STEP, PacedClock, RealClock
 from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.recording import Recording
 from sessions.statistics.scores import mean_scores
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if not 0 <= options.seed <= LARGEST_SEED:
         raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {LARGEST_SEED}")
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    clock = RealClock() if options.real_time else PacedClock(PACE)
+    clock = RealClock() if options.real_time else PacedClock(PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:
         study = simulated_study(out, options.seed, clock, console)
