@@ -109,7 +109,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
         return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     off = FROM_HALVING * np.abs(nested.numbers - numbers) + FROM_EDGES * nested.of_edges
     if steps is not None:
-        off += steps.error(numbers)
+        off += steps.error
     relative = np.where(off > 0.0, np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0), 0.0)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
     found = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])

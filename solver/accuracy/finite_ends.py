@@ -6,7 +6,7 @@ from solver.continuation.finite_states import course, depends_on_way
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import HALF, Steps
+from solver.equilibrium.step_error import Steps
 from solver.scene import Scene
 
 
@@ -29,10 +29,11 @@ def steps_asked(scene: Scene, finger: FiniteFinger, shape: EquilibriumState, sto
     """
     if not depends_on_way(scene, shape):
         return None
-    whole = end(finger, scene, stop) if relaxes(scene) else shape
-    half = end(finger, scene, stop, HALF)
-    whole_numbers, half_numbers = finger.all_numbers([whole, half])
-    return Steps.of(whole_numbers, half_numbers, scene.solve.tolerance)
+
+    def after(times: float) -> EquilibriumState:
+        return shape if times == 1.0 and not relaxes(scene) else end(finger, scene, stop, times)
+
+    return Steps.asked(after, finger.all_numbers, scene.solve.tolerance)
 
 
 def times_on_way(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> int:

@@ -9,7 +9,7 @@ from solver.continuation.small_states import end, nearest
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.loads import forces_of, load_of
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import HALF, Steps
+from solver.equilibrium.step_error import Steps
 from solver.failures import SolveFailure
 from solver.prediction import COUNT, NestedNumbers
 from solver.scene import Scene
@@ -18,10 +18,9 @@ from solver.scene import Scene
 def steps_asked(scene: Scene, finger: LinearFinger) -> Steps:
     """Return the load steps that a scene asks for whose end depends on its way, judged on a mesh."""
     try:
-        whole, half = finger.all_numbers([end(scene, finger, times) for times in (1.0, HALF)])
+        return Steps.asked(lambda times: end(scene, finger, times), finger.all_numbers, scene.solve.tolerance)
     except SolveFailure:
-        return Steps(1, np.full(COUNT, np.nan), np.zeros(COUNT))  # nor will there be an estimate
-    return Steps.of(whole, half, scene.solve.tolerance)
+        return Steps(1, np.zeros(COUNT), np.zeros(COUNT))  # nor will there be an estimate
 
 
 def times_on_way(scene: Scene, finger: LinearFinger) -> int:

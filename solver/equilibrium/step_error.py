@@ -1,26 +1,26 @@
 """How many load steps a course takes, and by how much its end may be off for not taking more.
 
 A press with friction, or a drag that friction carries, depends on its way: where in a step a point comes to touch is
-where it is held from then on. The error falls with the number of steps, and is nearly the same on every mesh, so that
-it is measured on a coarse one: by how much half as many steps change the end. A settled slide has none.
+where it is held from then on. The error so falls with the number of steps, on average, and irregularly: each point
+touches at some part of its step. It is nearly the same on every mesh, so that it is measured on a coarse one, by two
+courses of fewer steps. With an error c of the usual steps and c/p of a part p of them, the end changes by c (1/p - 1).
+Either course may agree with the usual one by chance, which is why both estimates of c are added. A settled slide has no
+such error.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
 from solver.arrays import Array
-from solver.quantities import NAMES
+from solver.equilibrium.newton import EquilibriumState
 
-HALF = 0.5
-MOST = 16  # times the usual steps, at most
-USUAL = 0.003  # tolerance that steps are chosen for where none is asked for
-SHARE = 0.3  # part of a tolerance that the error of the steps may take
-FROM_HALF = 1.2  # of what half as many steps change
-_OF_SED = 4e-4
-# of each number, since two courses can agree by chance; quantities at the ending as the SED there
-LEAST = np.array([_OF_SED, 1e-4, 4e-3, 1e-4, 3e-3, 5e-4, *[_OF_SED] * (1 + len(NAMES))])
+PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
+MOST = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
+USUAL = 0.003  # tolerance that steps are chosen for where none is asked for, as the default meshes' errors
+SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,23 +28,36 @@ class Steps:
     """The steps of one course. Numbers are those of `all_numbers` (c,)."""
 
     times: int  # the usual ones
-    whole: Array  # (c,) the numbers after the usual steps, on a coarse mesh
-    change: Array  # (c,) of them from half the usual steps on
+    excess: Array  # (c,) of the numbers after the usual steps over those after many
+    bound: Array  # (c,) of its size
 
     @staticmethod
-    def of(whole: Array, half: Array, tolerance: float | None) -> "Steps":
+    def of(usual: Array, fewer: Array, tolerance: float | None) -> "Steps":
         """Return the fewest that a tolerance asks for.
 
-        `whole` (c,) and `half` (c,) are the numbers after the usual steps and after half of them, on a coarse mesh.
+        `usual` (c,) and `fewer` (2, c) are numbers after the usual steps and after PARTS of them, on a coarse mesh.
         """
-        once = Steps(1, whole, whole - half)
-        off = float(once.error(whole)[0] / max(abs(float(whole[0])), np.finfo(float).tiny))
-        return Steps(min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST), whole, once.change)
+        excess = (fewer - usual) / (1.0 / PARTS - 1.0)[:, None]
+        bound = np.abs(excess).sum(axis=0)
+        off = float(bound[0]) / max(abs(float(usual[0])), np.finfo(float).tiny)
+        times = min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST)
+        return Steps(times, excess.mean(axis=0), bound)
 
-    def error(self, numbers: Array) -> Array:
-        """Return by how much `numbers` (c,) may be off for not taking more steps (c,)."""
-        return (FROM_HALF * np.abs(self.change) + LEAST * np.abs(numbers)) / self.times
+    @staticmethod
+    def asked(
+        end: Callable[[float], EquilibriumState],
+        numbers: Callable[[Sequence[EquilibriumState]], Array],
+        tolerance: float | None,
+    ) -> "Steps":
+        """Return those that a tolerance asks for; `end` returns that of the course in so many times the usual steps."""
+        usual, *fewer = numbers([end(times) for times in (1.0, *PARTS.tolist())])
+        return Steps.of(usual, np.array(fewer), tolerance)
 
-    def taken(self, whole: Array) -> Array:
-        """Return what the numbers (c,) after the usual steps, `whole`, would be after these."""
-        return whole + (1.0 - 1.0 / self.times) * self.change
+    @property
+    def error(self) -> Array:
+        """By how much numbers may be off for not taking more steps (c,)."""
+        return self.bound / self.times
+
+    def taken(self, usual: Array) -> Array:
+        """Return what the numbers (c,) after the usual steps would be after these."""
+        return usual - (1.0 - 1.0 / self.times) * self.excess

@@ -8,26 +8,38 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.continuation.small_states import end
 from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.step_error import Steps
+from solver.equilibrium.step_error import PARTS, Steps
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
 from solver.quantities import NAMES
 from solver.scene.published import SLIPPERINESS, scene
 
-WHOLE = np.ones(COUNT)
+USUAL = np.ones(COUNT)
 
 
-@pytest.mark.parametrize(("tolerance", "times"), [(0.02, 1), (0.01, 2), (0.005, 3), (1e-4, 16)])
+def after(parts, excess):
+    """Return numbers (len(parts), COUNT) after parts of the usual steps: an excess in proportion to the step."""
+    return np.array([USUAL - excess + excess / part for part in parts])
+
+
+@pytest.mark.parametrize(("tolerance", "times"), [(0.02, 1), (0.01, 2), (0.005, 4), (1e-4, 16)])
 def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, times):
-    half = WHOLE * 1.003  # 0.3 % from half the steps, so that a fifth more and 0.04 % may be missing: 0.4 %
-    assert Steps.of(WHOLE, half, tolerance).times == times
+    fewer = after(PARTS, 0.0028 * USUAL)  # two estimates of 0.28 %: 0.56 %, three tenths of a tolerance at most
+    assert Steps.of(USUAL, fewer, tolerance).times == times
 
 
 def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_says():
-    true, first = WHOLE, np.resize([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3], COUNT)  # what the usual steps add
-    steps = Steps.of(true + first, true + 2.0 * first, 0.003)
-    np.testing.assert_allclose(steps.taken(true + first), true + first / steps.times, rtol=1e-12)
-    assert (steps.error(true) >= np.abs(first) / steps.times).all()
+    excess = np.resize([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3], COUNT)
+    steps = Steps.of(USUAL, after(PARTS, excess), 0.003)
+    np.testing.assert_allclose(steps.taken(USUAL), USUAL - excess + excess / steps.times, rtol=1e-12)
+    np.testing.assert_allclose(steps.error, 2.0 * np.abs(excess) / steps.times, atol=1e-15)
+
+
+def test_a_course_that_agrees_with_the_usual_one_by_chance_leaves_the_others_estimate():
+    excess = 0.004 * USUAL
+    fewer = after(PARTS, excess)
+    fewer[0] = USUAL
+    assert Steps.of(USUAL, fewer, 0.5).error == pytest.approx(excess)
 
 
 def finely(asked, fineness, shift):
