@@ -6,6 +6,7 @@ where tissues relax, in time (`solver.equilibrium.relaxation`).
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -36,6 +37,11 @@ YIELDS = (
     "follows it down, this slide would not last; held at this depth, the finger slides under less force."
 )
 
+BEYOND_THE_SKIN = NotConverged(
+    "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+    "for less friction, drag or depth."
+)
+
 Answer = Prediction | SolveFailure
 Way = tuple[Instant, ...]
 Watch = Callable[[int, Answer, LinearFinger, Way | None], None]  # told each answer as it is found, and how
@@ -44,13 +50,12 @@ Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Shared:
-    """What scenes solved together share, and each one's part of what it took [s]."""
+    """What scenes solved together share."""
 
     mesh: LinearFinger
-    nested: LinearFinger
+    nested: Callable[[], LinearFinger]  # made when first asked for
     setup_s: float
-    solve_s: float
-    estimate_s: float
+    count: int  # of scenes
     widest: bool  # whether contact was looked for wherever it can be
 
 
@@ -88,39 +93,55 @@ def answers(
 ) -> list[Answer]:
     """Solve all scenes on one mesh, and on its nested one for the estimate; look wider where contact reaches out."""
     fingers.begin(fineness)
-    done: list[Answer | None] = []
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
-    for margin, deep in ((1.0, depth), (4.0, depth), (WIDE, depth), (WIDE, most)):
-        sizing = Sizing(fineness, deep, margin=margin)
+    sizings = [Sizing(fineness, depth, margin=margin) for margin in (1.0, 4.0, WIDE)]
+    for sizing in (*sizings, last := Sizing(fineness, most, margin=WIDE)):
         try:
             mesh, took = fingers.of(sizing)
-            nested, more = fingers.of(replace(sizing, halved=True))
+            shared = _Shared(
+                mesh, partial(_nested, fingers, sizing), took - mesh.solve_s, len(scenes), widest=sizing.margin == WIDE
+            )
+            done = _on_mesh(scenes, shared, progress, watch, all_of_them=sizing is last)
         except NotConverged as failure:
             return [failure] * len(scenes)
-        solve = mesh.solve_s / len(scenes)
-        shared = _Shared(mesh, nested, took - mesh.solve_s, solve, more / len(scenes), widest=margin == WIDE)
-        done = []
-        # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
-        together = 1 if any(scene.solve.course == "history" for scene in scenes) else len(scenes)
-        for first in range(0, len(scenes), together):
-            states: list[tuple[Solved, Way | None] | SolveFailure | None] = []
-            for number, scene in enumerate(scenes[first : first + together], first):
-                _report(progress, number / len(scenes))
-                try:
-                    states.append(_solved(scene, shared, _of_all(progress, number, len(scenes))))
-                except SolveFailure as failure:
-                    states.append(failure)
-            for number, (answer, way) in enumerate(_estimated(states, shared), first):
-                if watch is not None and answer is not None:
-                    watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, mesh, way)
-                done.append(answer)
-        if all(answer is not None for answer in done):
-            break
-    lost = NotConverged(
-        "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
-        "for less friction, drag or depth."
-    )
-    return [lost if answer is None else answer for answer in done]
+        if done is not None:
+            return done
+    raise AssertionError  # the last mesh answers all
+
+
+def _nested(fingers: Fingers, sizing: Sizing) -> LinearFinger:
+    return fingers.of(replace(sizing, halved=True))[0]
+
+
+def _on_mesh(
+    scenes: list[Scene], shared: _Shared, progress: Progress | None, watch: Watch | None, *, all_of_them: bool
+) -> list[Answer] | None:
+    """Return the answers on one mesh; None where contact must be looked for on more of the skin than this.
+
+    The steepest friction, whose contact reaches farthest, comes first. Where `all_of_them` must be answered, what
+    reaches out nevertheless has no answer. Raises NotConverged where a mesh does not stand for a body.
+    """
+    done: dict[int, Answer] = {}
+    # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
+    together = 1 if any(scene.solve.course == "history" for scene in scenes) else len(scenes)
+    order = sorted(range(len(scenes)), key=lambda number: -float(scenes[number].friction.mu))
+    for batch in (order[first : first + together] for first in range(0, len(scenes), together)):
+        states: list[tuple[Solved, Way | None] | SolveFailure] = []
+        for number in batch:
+            position = len(done) + len(states)
+            _report(progress, position / len(scenes))
+            try:
+                state = _solved(scenes[number], shared, _of_all(progress, position, len(scenes)))
+            except SolveFailure as failure:
+                state = failure
+            if state is None and not all_of_them:
+                return None
+            states.append(BEYOND_THE_SKIN if state is None else state)
+        for number, (answer, way) in zip(batch, _estimated(states, shared), strict=True):
+            if watch is not None and answer is not BEYOND_THE_SKIN:
+                watch(number, answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer, shared.mesh, way)
+            done[number] = answer
+    return [done[number] for number in range(len(scenes))]
 
 
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
@@ -193,14 +214,14 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
             checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
     warnings = tuple(filter(None, [inside_out(checks), YIELDS if gives_way(scene, finger, contact) else ""]))
     course = None if way is None else history(scene, finger, way, over_time)
-    took = perf_counter() - begun + shared.solve_s
+    took = perf_counter() - begun + finger.solve_s / shared.count
     solved = Solved(scene, contact, displacement, checks, steps, course, warnings, took, shared.setup_s)
     return solved, way if over_time is None else None
 
 
 def _estimated(
-    states: Sequence[tuple[Solved, Way | None] | SolveFailure | None], shared: _Shared
-) -> list[tuple[Answer | None, Way | None]]:
+    states: Sequence[tuple[Solved, Way | None] | SolveFailure], shared: _Shared
+) -> list[tuple[Answer, Way | None]]:
     """Return the prediction of each state that was solved, and its way where that can be drawn from forces alone."""
     solved = [one[0] for one in states if isinstance(one, tuple)]
     if not solved:
@@ -211,8 +232,8 @@ def _estimated(
     numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
     numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
     rows = finger.row.average(displacements)
-    nested = on_nested(shared.nested, [(one.scene, one.steps) for one in solved])
-    took = (perf_counter() - begun) / len(solved) + shared.estimate_s
+    nested = on_nested(shared.nested(), [(one.scene, one.steps) for one in solved])
+    took = (perf_counter() - begun) / len(solved)
     made = (
         prediction(one, finger, numbers[number], rows[:, number], nested[number], took)
         for number, one in enumerate(solved)
