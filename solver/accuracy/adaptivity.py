@@ -27,9 +27,6 @@ MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and st
 WIDER = 6.0  # the same where contact was met at the end of that skin
 
 
-Maker = Callable[[Scene, Sizing], FiniteFinger]  # of meshes; whoever wants may keep what it makes
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshSolution:
     """A settled state on the mesh made for it."""
@@ -49,14 +46,53 @@ class NestedSolution:
     steps: Steps | None = None  # those that the course takes, where the state depends on its way
 
 
-def nested_solution(
-    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], make: Maker = FiniteFinger.of
-) -> NestedSolution:
+class Meshes:
+    """The meshes of one finger and the states on coarse ones, each made once; scenes that share them slide alike."""
+
+    def __init__(self) -> None:
+        """Make none yet."""
+        self._fingers: dict[Sizing, FiniteFinger] = {}
+        self._coarse: dict[tuple[Scene, Sizing], MeshSolution | SolveFailure] = {}
+        self._last: MeshSolution | None = None
+
+    def keep(self, fineness: float) -> None:
+        """Forget meshes that are neither coarse nor of this fineness."""
+        self._fingers = {sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (COARSE, fineness)}
+
+    def finger(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
+        """Return the finger on a mesh. Raises SceneError where it cannot be meshed."""
+        if sizing not in self._fingers:
+            self._fingers[sizing] = FiniteFinger.of(scene, sizing)
+        return self._fingers[sizing]
+
+    def coarse(self, scene: Scene, sizing: Sizing, stop: Callable[[], bool]) -> MeshSolution:
+        """Return a state of a scene on a coarse mesh, sought first from the one found last there. Raises SolveFailure.
+
+        It is the settled one, or the slide where a given drag nearly makes the finger slide.
+        """
+        if (scene, sizing) not in self._coarse:
+            begun = perf_counter()
+            finger = self.finger(scene, sizing)
+            setup = perf_counter() - begun
+            near = None if self._last is None or self._last.finger is not finger else self._last.shape
+            try:
+                self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, stop, near), setup)
+                self._coarse[scene, sizing] = self._last
+            except SolveFailure as failure:
+                self._coarse[scene, sizing] = failure
+        found = self._coarse[scene, sizing]
+        if isinstance(found, SolveFailure):
+            raise found
+        return found
+
+
+def nested_solution(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool]) -> NestedSolution:
     """Return the settled state of a scene on a mesh made for it; for the arguments see `coarse_solution`.
 
     Raises NoSteadyState, NotConverged, Cancelled.
     """
-    return refine(scene, fineness, coarse_solution(scene, expected, fineness, stop, make), stop, make)
+    meshes = Meshes()
+    return refine(scene, fineness, coarse_solution(scene, expected, fineness, stop, meshes), stop, meshes)
 
 
 def coarse_solution(
@@ -64,24 +100,22 @@ def coarse_solution(
     expected: float,
     fineness: float,
     stop: Callable[[], bool],
-    make: Maker = FiniteFinger.of,
-    near: MeshSolution | None = None,
+    meshes: Meshes,
 ) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which finer ones begin.
 
     `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
     a little elsewhere on each mesh, it is the slide. A coarse mesh will do where its state is sound. Near a limit, only
-    a mesh of `fineness` itself can tell. From `near`, where it is of the same mesh, it is begun. Raises NoSteadyState,
-    NotConverged, Cancelled.
+    a mesh of `fineness` itself can tell. Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
     sizing = Sizing(min(COARSE, fineness), depth, margin=MARGIN)
     beyond = False
     try:
-        low = _coarse(scene, sizing, stop, make, near)
+        low = meshes.coarse(scene, sizing, stop)
         if low.finger.runs_out(low.shape):
             sizing = replace(sizing, margin=WIDER)
-            low = _coarse(scene, sizing, stop, make, near)
+            low = meshes.coarse(scene, sizing, stop)
         if sound(low.finger, low.shape):
             return low
         beyond = folded(low.finger, low.shape)
@@ -96,30 +130,20 @@ def coarse_solution(
         refuse_far_beyond(scene, sliding_load(scene), stop)
     sizing = replace(sizing, fineness=fineness)
     try:
-        return _plain(scene, sizing, stop, make)
+        return _plain(scene, sizing, stop, meshes)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _plain(scene.undragged(), sizing, stop, make)
+        return _plain(scene.undragged(), sizing, stop, meshes)
 
 
-def _coarse(
-    scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker, near: MeshSolution | None
-) -> MeshSolution:
+def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], meshes: Meshes) -> MeshSolution:
     begun = perf_counter()
-    finger = make(scene, sizing)
-    setup = perf_counter() - begun
-    start = near.shape if near is not None and near.finger is finger else None
-    return MeshSolution(finger, sizing, _on_coarse(finger, scene, stop, start), setup)
-
-
-def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], make: Maker) -> MeshSolution:
-    begun = perf_counter()
-    finger = make(scene, sizing)
+    finger = meshes.finger(scene, sizing)
     setup = perf_counter() - begun
     shape = settled(finger, scene, stop)
     if sizing.margin < WIDER and finger.runs_out(shape):
-        return _plain(scene, replace(sizing, margin=WIDER), stop, make)
+        return _plain(scene, replace(sizing, margin=WIDER), stop, meshes)
     return MeshSolution(finger, sizing, shape, setup)
 
 
@@ -138,15 +162,15 @@ def _on_coarse(
 
 
 def refine(
-    scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+    scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], meshes: Meshes
 ) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
     steps = steps_asked(scene, low.finger, low.shape, stop)
     sizing = replace(low.sizing, fineness=fineness)
-    top = solution_on(scene, sizing, low, stop, make, 1 if steps is None else steps.times)
+    top = solution_on(scene, sizing, low, stop, meshes, 1 if steps is None else steps.times)
     if top.sizing.margin < WIDER and top.finger.runs_out(top.shape):
         wider = replace(sizing, margin=WIDER)
-        top = solution_on(scene, wider, low, stop, make, 1 if steps is None else steps.times)
+        top = solution_on(scene, wider, low, stop, meshes, 1 if steps is None else steps.times)
     return NestedSolution(low, top, steps)
 
 
@@ -155,7 +179,7 @@ def solution_on(
     sizing: Sizing,
     below: MeshSolution,
     stop: Callable[[], bool],
-    make: Maker = FiniteFinger.of,
+    meshes: Meshes,
     times: int = 1,
 ) -> MeshSolution:
     """Return the settled state on a mesh of `sizing`, begun at the state `below`.
@@ -163,20 +187,20 @@ def solution_on(
     A course takes so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
     neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    begun = _begun(scene, sizing, below, make)
+    begun = _begun(scene, sizing, below, meshes)
     try:
         return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
-    begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, make)
+    begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, meshes)
     return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
 
 
-def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, make: Maker) -> MeshSolution:
+def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
     """Return a mesh above the state `below`, with the shape that a settled one is sought from."""
     begun = perf_counter()
-    finger = make(scene, sizing)
+    finger = meshes.finger(scene, sizing)
     if finger is below.finger:
         return below
     start = finger.transfer(below.shape, below.finger)
@@ -184,13 +208,13 @@ def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, make: Maker) -> Me
 
 
 def on_nested(
-    scene: Scene, top: MeshSolution, steps: Steps | None, stop: Callable[[], bool], make: Maker = FiniteFinger.of
+    scene: Scene, top: MeshSolution, steps: Steps | None, stop: Callable[[], bool], meshes: Meshes
 ) -> tuple[NestedNumbers | None, Steps | None]:
     """Return the numbers of a scene on the nested mesh of `top`, None where it has no state there, and its steps.
 
     `steps` are those taken where the state depends on its way. Raises Cancelled.
     """
-    begun = _begun(scene, replace(top.sizing, halved=True), top, make)
+    begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
     try:
         if depends_on_way(scene, top.shape):

@@ -6,12 +6,11 @@ where tissues relax, in time (`solver.equilibrium.finite_relaxation`).
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import groupby
 from time import perf_counter
 
 import numpy as np
 
-from solver.accuracy.adaptivity import Maker, MeshSolution, NestedSolution, coarse_solution, on_nested, refine
+from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.audits import audits, course_audits, forces_missed, refuse_unsound, unbalanced
 from solver.accuracy.finite_ends import times_on_way
 from solver.continuation.existence import doubts
@@ -22,7 +21,6 @@ from solver.equilibrium.finite_relaxation import RelaxingCourse, RelaxingNewton
 from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
-from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.progress import report_progress
 from solver.response.answer import Solved, history, prediction
@@ -33,51 +31,51 @@ CORRECTIONS = 4  # at most
 
 Answer = Prediction | SolveFailure
 Progress = Callable[[float], bool]
+Pressed = tuple[float, float, str]  # how deep or hard, and which way: `Scene.pressed`
 
 
 def answers(
-    scenes: Sequence[Scene], expected: float, fineness: float, progress: Progress | None = None
+    scenes: Sequence[Scene],
+    expected: float,
+    fineness: float,
+    progress: Progress | None,
+    kept: dict[Pressed, Meshes],
 ) -> list[Answer]:
     """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 
     Those pressed alike and moved the same way share one mesh and are solved one after the other, friction rising, each
-    begun at the one before. `expected` is the depth [mm] that they reach, or about it where forces are given. Raises
-    SceneError where the finger cannot be meshed, Cancelled where `progress` (told the part done) says so.
+    begun at the one before. `expected` is the depth [mm] that they reach, or about it where forces are given. Coarse
+    meshes and their states are `kept` for the next fineness. Raises SceneError where the finger cannot be meshed,
+    Cancelled where `progress` (given the part done) says so.
     """
     found: dict[int, Answer] = {}
 
     def stop() -> bool:
         return progress is not None and not progress(len(found) / len(scenes))
 
-    keys = [alike(scene) for scene in scenes]
-    for _, group in groupby(sorted(range(len(scenes)), key=lambda n: keys[n]), lambda n: keys[n][0]):
-        meshes: dict[Sizing, FiniteFinger] = {}
-
-        def make(scene: Scene, sizing: Sizing, meshes: dict[Sizing, FiniteFinger] = meshes) -> FiniteFinger:
-            if sizing not in meshes:
-                meshes[sizing] = FiniteFinger.of(scene, sizing)
-            return meshes[sizing]
-
-        low: MeshSolution | None = None
-        for number in group:
-            if stop():
-                raise Cancelled
-            begun, scene = perf_counter(), scenes[number]
-            report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
-            try:
-                low = coarse_solution(scene, expected, fineness, stop, make, low)
-                found[number] = _predicted(scene, refine(scene, fineness, low, stop, make), stop, make, begun)
-            except SolveFailure as failure:
-                found[number] = failure
+    for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
+        if stop():
+            raise Cancelled
+        begun, scene = perf_counter(), scenes[number]
+        report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
+        meshes = kept.setdefault(scene.pressed, Meshes())
+        meshes.keep(fineness)
+        try:
+            low = coarse_solution(scene, expected, fineness, stop, meshes)
+            found[number] = _predicted(scene, refine(scene, fineness, low, stop, meshes), stop, meshes, begun)
+        except SolveFailure as failure:
+            found[number] = failure
     return [found[number] for number in range(len(scenes))]
 
 
-def alike(scene: Scene) -> tuple[tuple[float, float, str], float]:
+def alike(scene: Scene) -> tuple[Pressed, float]:
     """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
     return scene.pressed, float(scene.friction.mu)
 
 
-def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], make: Maker, begun: float) -> Prediction:
+def _predicted(
+    scene: Scene, nested: NestedSolution, stop: Callable[[], bool], meshes: Meshes, begun: float
+) -> Prediction:
     at = nested.top
     finger, shape = at.finger, at.shape
     setup = nested.coarse.setup_s + at.setup_s
@@ -106,7 +104,7 @@ def _predicted(scene: Scene, nested: NestedSolution, stop: Callable[[], bool], m
     marched = history(scene, finger, way.instants[1:], over_time) if way else None
     solved = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    finer, steps = on_nested(scene, at, steps, stop, make)
+    finer, steps = on_nested(scene, at, steps, stop, meshes)
     row = finger.row.average(shape.u)
     took = perf_counter() - solved
     told = doubts(finger, shape, stop)

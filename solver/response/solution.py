@@ -1,8 +1,9 @@
 """From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import sqrt
+from typing import TYPE_CHECKING
 
 from solver.accuracy import contrasts as differences
 from solver.accuracy.contrasts import Off
@@ -18,6 +19,10 @@ from solver.progress import report_progress
 from solver.response import small_solution
 from solver.response.small_solution import Answer, Fingers, Progress, Watch
 from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.accuracy.adaptivity import Meshes
+    from solver.response.finite_solution import Pressed
 
 KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
@@ -288,7 +293,8 @@ class _Meshing:
 
     depth: float  # that they reach, or about [mm]
     progress: Progress | None
-    fingers: Fingers
+    fingers: Fingers  # at small strain
+    kept: "dict[Pressed, Meshes]" = field(default_factory=dict)  # at finite strain
 
     def __call__(self, scenes: list[Scene], fineness: float, watch: Watch | None) -> list[Answer]:
         """Return the answers on meshes of that fineness."""
@@ -296,7 +302,7 @@ class _Meshing:
             # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
             from solver.response.finite_solution import answers as finite_answers
 
-            return finite_answers(scenes, self.depth, fineness, self.progress)
+            return finite_answers(scenes, self.depth, fineness, self.progress, self.kept)
         return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 

@@ -1,22 +1,26 @@
 """Every way of solving a scene that the project keeps, behind one face, so that all are measured alike."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from solver.accuracy.adaptivity import MARGIN, coarse_solution
+from solver.accuracy.adaptivity import COARSE, MARGIN
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.body.tissues import settled_moduli
 from solver.continuation.existence import steady
+from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
 from solver.element import Q2P1
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
+from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.verification.asked import clock
@@ -106,24 +110,17 @@ class FiniteMeshed:
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""
-        self._made: dict[Sizing, FiniteFinger] = {}
-        self._fineness = fineness
-        self.setup_s = 0.0
-        self.finger = self._make(scene, Sizing(fineness, scene.loading.depth, shift, margin=MARGIN))
+        begun, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=MARGIN)
+        self.finger = FiniteFinger.of(scene, sizing)
+        self._coarse = FiniteFinger.of(scene, Sizing(min(COARSE, fineness), scene.loading.depth, margin=MARGIN))
+        self.setup_s = clock() - begun
         self.dofs = self.finger.newton.body.dofs
-
-    def _make(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
-        if sizing not in self._made:
-            begun = clock()
-            self._made[sizing] = FiniteFinger.of(scene, sizing)
-            self.setup_s += clock() - begun
-        return self._made[sizing]
 
     def solve(self, scene: Scene, before: State | None = None) -> State:
         """Return the settled shape, from `before` where it is given."""
         if before is None:
-            low = coarse_solution(scene, scene.loading.depth, self._fineness, lambda: False, self._make)
-            before = self.finger.transfer(low.shape, low.finger)
+            with suppress(SolveFailure):  # a steep slide may fold the skin of a coarse mesh alone
+                before = self.finger.transfer(roughly(self._coarse, scene, never), self._coarse)
         return steady(self.finger, load_of(scene), start=before)
 
     def numbers(self, state: State) -> Array:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
-from solver.accuracy.adaptivity import coarse_solution, refine
+from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.accuracy.audits import audits, refuse_unsound, rounding
-from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import LoadState
 from solver.response import finite_solution
@@ -110,17 +109,15 @@ def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves
 
 
 def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeformed_finger_does():
-    made = {}
-
-    def make(scene, sizing):
-        return made.setdefault(sizing, FiniteFinger.of(scene, sizing))
-
     one, other = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
-    before = coarse_solution(one, 1.5, 4.0, lambda: False, make)
-    fresh = coarse_solution(other, 1.5, 4.0, lambda: False, make)
-    warm = coarse_solution(other, 1.5, 4.0, lambda: False, make, before)
-    assert warm.shape.iterations < fresh.shape.iterations
-    tops = [refine(other, 6.0, low, lambda: False, make).top.shape for low in (warm, fresh)]
+    alone, after_one = Meshes(), Meshes()
+    coarse_solution(one, 1.5, 4.0, lambda: False, after_one)
+    lows = [coarse_solution(other, 1.5, 4.0, lambda: False, meshes) for meshes in (after_one, alone)]
+    assert lows[0].shape.iterations < lows[1].shape.iterations
+    tops = [
+        refine(other, 6.0, low, lambda: False, meshes).top.shape
+        for low, meshes in zip(lows, (after_one, alone), strict=True)
+    ]
     np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(tops[0].reaction, tops[1].reaction, rtol=0.0, atol=1e-11)
 
