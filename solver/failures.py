@@ -45,9 +45,9 @@ class SolveFailure(Exception):
         >>> str(SolveFailure("no equilibrium within 25 iterations").in_a_sentence())
         'No equilibrium within 25 iterations.'
         """
-        told = str(self)
+        words = str(self)
         return type(self)(
-            told[:1].upper() + told[1:] + ("" if told.endswith(".") else "."),
+            words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."),
             limit_mu=self.limit_mu,
             limit_indentation=self.limit_indentation,
             limit_normal_force=self.limit_normal_force,

@@ -1,4 +1,4 @@
-"""What the solver is at, told by the way to whoever listens, since nobody knows how long a hard scene takes.
+"""What the solver is at: for whoever listens, since nobody knows how long a hard scene takes.
 
 with listening(lambda doing, part: print(f"{doing}: {part:.0%} of it")):
     solve(scene)
@@ -9,28 +9,31 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-Listener = Callable[[str, float], None]  # told what is being done, and which part of that is done, 0 to 1
+from solver.failures import Cancelled
+
+Listener = Callable[[str, float], None]  # called with what is being done, and the part of it done, 0 to 1
+Progress = Callable[[float], bool]  # called with the part done, 0 to 1; returns False to stop the work
 
 
 @dataclass(slots=True)
-class _Told:
+class _Audience:
     """Who listens, and what was said last."""
 
     listener: Listener
     doing: str = ""
 
 
-_TOLD: ContextVar[_Told | None] = ContextVar("told", default=None)
+_AUDIENCE: ContextVar[_Audience | None] = ContextVar("audience", default=None)
 
 
 @contextmanager
 def listening(listener: Listener) -> Generator[None]:
     """Let `listener` hear what the solver is at in this thread, until the block ends."""
-    before = _TOLD.set(_Told(listener))
+    before = _AUDIENCE.set(_Audience(listener))
     try:
         yield
     finally:
-        _TOLD.reset(before)
+        _AUDIENCE.reset(before)
 
 
 def report_progress(doing: str, part: float = 0.0) -> None:
@@ -43,10 +46,16 @@ def report_progress(doing: str, part: float = 0.0) -> None:
     >>> heard
     [('following sliding to its largest friction', 0.25)]
     """
-    told = _TOLD.get()
-    if told is not None:
-        told.doing = doing
-        told.listener(doing, part)
+    audience = _AUDIENCE.get()
+    if audience is not None:
+        audience.doing = doing
+        audience.listener(doing, part)
+
+
+def report_part(progress: Progress | None, part: float) -> None:
+    """Call `progress`, where there is one, with the part done. Raises Cancelled where it says so."""
+    if progress is not None and not progress(part):
+        raise Cancelled
 
 
 @contextmanager
@@ -61,8 +70,8 @@ def aside(doing: str) -> Generator[None]:
     >>> heard
     ['solving', 'compiling', 'solving']
     """
-    told = _TOLD.get()
-    before = told.doing if told is not None else ""
+    audience = _AUDIENCE.get()
+    before = audience.doing if audience is not None else ""
     report_progress(doing)
     try:
         yield

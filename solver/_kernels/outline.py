@@ -5,7 +5,7 @@ import numpy as np
 from solver._kernels.compiling import OPEN, compiled
 from solver.arrays import Array, Flags, Indices, Narrow
 
-SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
+SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 
 
 @compiled
@@ -70,6 +70,6 @@ def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
 def _overlap(at: Array, i: int, j: int) -> bool:
     """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
 
-    Pieces of a straight line do not; on which sides of each other they lie is told by rounding alone.
+    Pieces of a straight line do not; rounding alone decides on which sides of each other they lie.
     """
     return max(at[i], at[i + 1]) >= min(at[j], at[j + 1]) and max(at[j], at[j + 1]) >= min(at[i], at[i + 1])

@@ -54,7 +54,7 @@ def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -
 
 @compiled
 def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
-    """Return whether a bound acts on the part of an edge, told by its middle, that one of its nodes stands for.
+    """Return whether a bound acts on the part of an edge, judged at its middle, that one of its nodes stands for.
 
     Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
     an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however

@@ -86,15 +86,6 @@ class Meshes:
         return found
 
 
-def nested_solution(scene: Scene, expected: float, fineness: float, stop: Callable[[], bool]) -> NestedSolution:
-    """Return the settled state of a scene on a mesh made for it; for the arguments see `coarse_solution`.
-
-    Raises NoSteadyState, NotConverged, Cancelled.
-    """
-    meshes = Meshes()
-    return refine(scene, fineness, coarse_solution(scene, expected, fineness, stop, meshes), stop, meshes)
-
-
 def coarse_solution(
     scene: Scene,
     expected: float,
@@ -121,7 +112,7 @@ def coarse_solution(
         beyond = folded(low.finger, low.shape)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
-            raise  # told on a mesh of its own, whatever this one is
+            raise  # decided on a mesh of its own, whatever this one is
     except NotConverged:
         beyond = True
     except SolveFailure:

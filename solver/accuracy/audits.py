@@ -15,8 +15,8 @@ from solver.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
-DOUBTED = 1e-8  # and from which it is told
-PIERCED = 1e-7  # part of the indentation by which skin may lie too low without it being told [-]
+DOUBTED = 1e-8  # and from which a warning says so
+PIERCED = 1e-7  # part of the indentation by which skin may lie too low without a warning [-]
 MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 
 
@@ -101,12 +101,12 @@ def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
 
 def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
     """Return a sentence for each of `audits` that shows more round-off than answers usually have."""
-    told: list[str] = []
+    warnings: list[str] = []
     if (left := unbalanced(checks)) > DOUBTED:
-        told.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
+        warnings.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
     if (low := checks["penetration"]) > PIERCED:
-        told.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")
-    return tuple(told)
+        warnings.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")
+    return tuple(warnings)
 
 
 def inside_out(checks: Mapping[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""How well surfaces solved together are told apart: what the differences between them may be off by.
+"""How well surfaces solved together are distinguished: what the differences between them may be off by.
 
 Much of what a mesh makes wrong is the same for all surfaces of one finger and falls out of their differences. What is
 left is estimated as for one number (`solver.accuracy.error_estimate`): from what halving every element changes in a
@@ -15,14 +15,14 @@ from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING
 from solver.prediction import Prediction
 from solver.scene import Scene
 
-NAMES = ("SED", "normal force", "drag", "indentation")  # what is told apart: the first four of all numbers
-TOLD = 0.05  # part of their range from which on what differences may be off by is told
+NAMES = ("SED", "normal force", "drag", "indentation")  # what is compared: the first four of all numbers
+WARNED = 0.05  # part of their range from which on a warning says how far differences may be off
 LEAST = 1e-5  # part of the numbers below which nobody minds
 NOTICED = 1e-3  # part of a force or depth that a sensor may tell
 
 
 def together(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return the sets of scenes that are told apart: two or more surfaces of one finger, pressed and moved alike.
+    """Return the sets of scenes that are compared: two or more surfaces of one finger, pressed and moved alike.
 
     Scenes asked for with quick evidence are variants of one surface, whose differences have their own ways
     (`solver.response.nearby`), and belong to none.
@@ -58,10 +58,10 @@ def off(found: Sequence[Prediction]) -> Off:
     worst = FROM_HALVING * np.abs(change[pairs[0]] - change[pairs[1]])
     worst += FROM_EDGES * np.hypot(edges[pairs[0]], edges[pairs[1]])
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
-    shares = off_by / np.maximum(np.maximum(np.ptp(numbers, axis=0), LEAST * mean / TOLD), np.finfo(float).tiny)
+    shares = off_by / np.maximum(np.maximum(np.ptp(numbers, axis=0), LEAST * mean / WARNED), np.finfo(float).tiny)
     minded = off_by > NOTICED * mean
     minded[0] = True
-    warned = np.where((shares > TOLD) & minded, shares, 0.0)
+    warned = np.where((shares > WARNED) & minded, shares, 0.0)
     first = int(warned.argmax())
     return Off(float(shares[0]), _in_a_sentence(NAMES[first], float(warned[first])) if warned.any() else "")
 

@@ -33,7 +33,7 @@ def measured(found: Prediction, answers: Answers) -> Prediction:
             if name in left_out:
                 estimated = left_out[name]["estimate"]
                 left_out[name] |= {"estimated": estimated, **entry}
-    kept = tuple(told for told in found.warnings if told not in warnings(found.scene, found.model["left_out"]))
+    kept = tuple(one for one in found.warnings if one not in warnings(found.scene, found.model["left_out"]))
     return replace(
         found,
         model={**found.model, "left_out": left_out},

@@ -79,9 +79,9 @@ def model(
 
 def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a sentence for everything left out that this scene would have needed."""
-    told: list[str] = []
+    found: list[str] = []
     if "finite strain" in left_out:
-        told += _of_strain(left_out["finite strain"])
+        found += _of_strain(left_out["finite strain"])
     needs = {
         "bone compliance": 'ask for finger.bone = "meshed"',
         "history": 'ask for solve.course = "history"',
@@ -94,8 +94,8 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
         if change is not None and change > WORTH_TELLING:
-            told.append(f"Leaving out {name} may have changed the ending's SED by {100 * change:.2g} %: {cure}.")
-    return tuple(told)
+            found.append(f"Leaving out {name} may have changed the ending's SED by {100 * change:.2g} %: {cure}.")
+    return tuple(found)
 
 
 def _of_strain(entry: Mapping[str, Any]) -> list[str]:

@@ -82,7 +82,7 @@ def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Pr
         f"{whose}: press and slide marched on a coarse mesh in few steps",
     }
     left_out = {**before, "viscosity": entry}
-    kept = tuple(told for told in found.warnings if told not in warnings(scene, before))
+    kept = tuple(one for one in found.warnings if one not in warnings(scene, before))
     return replace(
         found,
         model={**found.model, "left_out": left_out},

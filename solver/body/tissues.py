@@ -4,18 +4,6 @@ from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
 from solver.constitutive.linear import Moduli, Prony
 from solver.scene import Material, Materials
 
-STIFF = 8.0  # epidermis by fat, from which skin carries the drag to the cut (published: 4)
-
-
-def stiff(materials: Materials) -> bool:
-    """Return whether the skin is stiff beside fat."""
-    return max(materials.epidermis.E, materials.dermis.E) > STIFF * materials.fat.E
-
-
-def strains_the_cut(materials: Materials) -> bool:
-    """Return whether the skin is stiff, or becomes it, and carries the drag to the cut."""
-    return stiff(materials) or "ogden" in (materials.epidermis.law, materials.dermis.law)
-
 
 def settled_moduli(materials: Materials) -> list[Moduli]:
     """Return the small-strain moduli of a settled response: those that a tissue has once it has relaxed."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.arrays import Array, Flags
 
-SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink is told of
+SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 
 
 def crosses_itself(outline: Array) -> bool:

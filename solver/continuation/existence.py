@@ -130,7 +130,7 @@ def doubts(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], boo
 def _followed(scene: Scene, load: LoadState, stop: Callable[[], bool]) -> Reach:
     """Return how far the branch goes as friction grows, or as depth does where that alone leads to what `load` asks.
 
-    Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is badly told.
+    Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is hardly known.
     """
     proof = reach.of_friction(scene, load, load.mu, stop)
     if proof.limited:

@@ -200,7 +200,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Calla
 def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
 
-    How deep sliding goes, and how hard it presses there, is told by `limit_point`; but only where driven a little
+    How deep sliding goes, and how hard it presses there, is found by `limit_point`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
     proof = reach.of_depth(finger.scene, shape.load._replace(depth=BEYOND * shape.load.depth), stop)

@@ -1,4 +1,4 @@
-"""How far settled sliding goes, told on meshes made for it.
+"""How far settled sliding goes, on meshes made for it.
 
 A rough mesh is followed along the branch to near its end, and tells where the skin is squeezed most. Skin folds within
 some tenths of a millimetre: on a mesh with small elements there the branch is followed on. What that mesh is good to is

@@ -13,11 +13,12 @@ from solver.equilibrium.expected_depth import DEEPEST, within_reach
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
 from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, Progress, march
+from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, march
 from solver.equilibrium.loads import forces_of, load_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
+from solver.progress import Progress
 from solver.scene import Scene
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
@@ -156,9 +157,3 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
         if reached is None:
             raise
         return reached
-
-
-def shift_of(scene: Scene, state: EquilibriumState) -> float | None:
-    """Return how far the bone was shifted along +x [mm] by a given drag; None where it slides or is only pressed."""
-    held = scene.loading.dragged and state.load.sense == 0 and not state.load.frictionless
-    return 0.0 - state.load.travel if held else None

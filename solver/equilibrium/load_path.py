@@ -10,7 +10,8 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_stepping import StepControl, advance, never
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
-from solver.failures import Cancelled, NotConverged, followed_to
+from solver.failures import NotConverged, followed_to
+from solver.progress import Progress, report_part
 from solver.scene import Loading
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
@@ -53,9 +54,6 @@ class Aim(NamedTuple):
         return Aim(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
-Progress = Callable[[float], bool]  # told the part done, 0 to 1; False asks to stop
-
-
 def march(
     newton: Newton, friction: LoadState, loading: Loading, progress: Progress | None = None, times: float = 1.0
 ) -> tuple[Instant, ...]:
@@ -74,7 +72,7 @@ def course(way: "Way", loading: Loading, progress: Progress | None = None, times
     """Press, and slide or drag, along `way`, in so many `times` the usual steps. Raises as `march`."""
 
     def report(part: float) -> None:
-        _report(progress, part if loading.dragged else part / 2.0)
+        report_part(progress, part if loading.dragged else part / 2.0)
 
     press_and_drag(way, loading, report, round(PRESSING_STEPS * times), round(DRAGGING_STEPS * times))
     if not loading.dragged:
@@ -96,11 +94,6 @@ def press_and_drag(way: "Way", loading: Loading, report: Callable[[float], None]
             part = number / dragging
             way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
             report((pressing + number) / count)
-
-
-def _report(progress: Progress | None, part: float) -> None:
-    if progress is not None and not progress(part):
-        raise Cancelled
 
 
 class Way:
@@ -179,7 +172,7 @@ def slide(way: Way, direction: int, speed: float, progress: Progress | None, tim
         distance += step
         way.go(at(distance))
         step = min(step * 1.2, largest)
-        _report(progress, 0.5 + 0.5 * min(distance / (LONG * depth), 1.0))
+        report_part(progress, 0.5 + 0.5 * min(distance / (LONG * depth), 1.0))
     message = f"sliding had not settled after {distance:.1f} mm at {depth:.4g} mm indentation"
     raise NotConverged(
         f"{message}: the drag still grew, as it does where the finger wedges itself in; ask for less friction or depth."

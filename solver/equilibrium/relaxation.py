@@ -22,9 +22,10 @@ from solver.body.receptor import Endings, patch_means
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_terms
 from solver.constitutive.linear import Moduli, Prony, kept
-from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Progress, Way, course
+from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Way, course
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh import Mesh
+from solver.progress import Progress
 from solver.scene import Loading
 
 KEPT = 4  # lengths of steps that a body is kept ready for, factors and all

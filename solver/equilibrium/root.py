@@ -12,7 +12,7 @@ UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 def find_root(at: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
     """Return the state in which what `at` tells of a place is 0 to `close`, sought from `start` on; None where none is.
 
-    What is told grows with the place, and comes with the state there: strides that double find two ends, and regula
+    The function grows with the place, and comes with the state there: strides that double find two ends, and regula
     falsi with the Illinois rule (Dowell and Jarratt 1971) what lies between.
 
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)

@@ -8,11 +8,12 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.load_path import Instant, Progress, Way, course
+from solver.equilibrium.load_path import Instant, Way, course
 from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
 from solver.prediction import Skin
+from solver.progress import Progress
 from solver.response.answer import skin_of
 from solver.response.fields import Fields, Sketch
 from solver.scene import Scene

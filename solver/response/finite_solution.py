@@ -22,7 +22,7 @@ from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.prediction import Prediction
-from solver.progress import report_progress
+from solver.progress import Progress, report_progress
 from solver.response.answer import Solved, history, prediction
 from solver.scene import Scene
 
@@ -30,7 +30,6 @@ ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corre
 CORRECTIONS = 4  # at most
 
 Answer = Prediction | SolveFailure
-Progress = Callable[[float], bool]
 Pressed = tuple[float, float, str]  # how deep or hard, and which way: `Scene.pressed`
 
 
@@ -107,8 +106,9 @@ def _predicted(
     finer, steps = on_nested(scene, at, steps, stop, meshes)
     row = finger.row.average(shape.u)
     took = perf_counter() - solved
-    told = doubts(finger, shape, stop)
-    done = Solved(scene, shape, shape.u, checks, steps, marched, told, solved - begun - setup, setup)
+    done = Solved(
+        scene, shape, shape.u, checks, steps, marched, doubts(finger, shape, stop), solved - begun - setup, setup
+    )
     return prediction(done, finger, numbers, row, finer, took)
 
 

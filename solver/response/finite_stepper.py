@@ -14,12 +14,12 @@ from solver.equilibrium.force_control import corrected
 from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given
 from solver.response.stepper import SLIDING, Stepper
 
-MET = 0.02  # part of the normal force by which a state may miss the forces and still be told of
+MET = 0.02  # part of the normal force by which a state may miss the forces and still be shown
 EASED = 0.7  # of the normal force at which the state was lost and led to in vain: from there it is sought again [-]
 STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
-ARRIVING, NEAR = 8, 0.01  # iterations on the last, as after a state that was not told of, until one is so small [mm]
-FOLDING = 0.65  # least stretch of the skin that is told of: it folds from 0.544 on, and a coarse mesh squeezes it less
-CREASING = 0.3  # largest kink that is told of: where skin folds behind the last node that touches, that mesh has this
+ARRIVING, NEAR = 8, 0.01  # iterations on the last, as after a state that was not shown, until one is so small [mm]
+FOLDING = 0.65  # least stretch of the skin that is shown: it folds from 0.544 on, and a coarse mesh squeezes it less
+CREASING = 0.3  # largest kink that is shown: where skin folds behind the last node that touches, that mesh has this
 FAR, HURRIED = 0.15, 3  # displacement in one iteration from which on there is another [mm], and how many at most
 STIFF = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
 FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
@@ -47,7 +47,7 @@ class FiniteStepper(Stepper):
 
         A state is lost where contact leaves the skin that may touch, and where skin is squeezed so far that it may have
         folded. The next reading leads to it from nothing. Where that is in vain, it is tried again once the normal
-        force has eased. One that has not caught up with the forces is not told of.
+        force has eased. One that has not caught up with the forces is not shown.
         """
         if self._lost_at is None:
             return self._followed(normal, tangential)

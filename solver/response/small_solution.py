@@ -23,10 +23,11 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
-from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import FORCES_AND_PLACES, Prediction
+from solver.progress import Progress, report_part
 from solver.response.answer import Solved, history, prediction
 from solver.scene import Scene, SceneError
 
@@ -44,8 +45,7 @@ BEYOND_THE_SKIN = NotConverged(
 
 Answer = Prediction | SolveFailure
 Way = tuple[Instant, ...]
-Watch = Callable[[int, Answer, LinearFinger, Way | None], None]  # told each answer as it is found, and how
-Progress = Callable[[float], bool]  # told the part done, 0 to 1; returns False to stop the work (Cancelled is raised)
+Watch = Callable[[int, Answer, LinearFinger, Way | None], None]  # called with each answer as it is found, and how
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,7 +129,7 @@ def _on_mesh(
         states: list[tuple[Solved, Way | None] | SolveFailure] = []
         for number in batch:
             position = len(done) + len(states)
-            _report(progress, position / len(scenes))
+            report_part(progress, position / len(scenes))
             try:
                 state = _solved(scenes[number], shared, _of_all(progress, position, len(scenes)))
             except SolveFailure as failure:
@@ -145,13 +145,8 @@ def _on_mesh(
 
 
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
-    """Return what is told the part done of one of `count` scenes."""
+    """Return `progress` for one of `count` scenes."""
     return None if progress is None else lambda part: progress((number + part) / count)
-
-
-def _report(progress: Progress | None, part: float) -> None:
-    if progress is not None and not progress(part):
-        raise Cancelled
 
 
 def _meshed(scene: Scene, sizing: Sizing) -> LinearFinger:

@@ -15,9 +15,9 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
-from solver.progress import report_progress
+from solver.progress import Progress, report_progress
 from solver.response import small_solution
-from solver.response.small_solution import Answer, Fingers, Progress, Watch
+from solver.response.small_solution import Answer, Fingers, Watch
 from solver.scene import Scene
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ FINEST = {"small": 24.0, "finite": 14.0}  # their nested meshes have 100,000 and
 SAFETY = 1.1  # times the fineness that errors falling with its square ask for
 GROWTH = (1.2, 3.0)  # of the fineness from mesh to mesh
 NOT_KNOWN = 4.0  # times the tolerance, that an error is taken for of which nothing is known: twice the fineness
-Rough = Callable[[Prediction], None]  # told an answer before more is made of it: what there is, should work be stopped
+Rough = Callable[[Prediction], None]  # called with an answer before it is refined: what there is, should work stop
 
 
 def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None) -> Prediction:
@@ -70,7 +70,7 @@ def solve_many(
     tolerance sends to a finer mesh, or that await their evidence. Raises SceneError where a finger cannot be meshed,
     Cancelled where `progress` says so.
     """
-    known: dict[int, tuple[Answer, Answer]] = {}  # what was told is not looked into again
+    known: dict[int, tuple[Answer, Answer]] = {}  # an answer's evidence is made once
 
     def evident(answer: Answer) -> Answer:
         if id(answer) not in known:
@@ -98,8 +98,8 @@ def _answers(
     for group in _groups(scenes):
         found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
         out |= dict(zip(group, found, strict=True))
-    told = {i: answer.in_a_sentence() if isinstance(answer, SolveFailure) else answer for i, answer in out.items()}
-    return tuple(told[i] for i in range(len(scenes)))
+    answers = (out[i] for i in range(len(scenes)))
+    return tuple(one.in_a_sentence() if isinstance(one, SolveFailure) else one for one in answers)
 
 
 def _with_evidence(found: Answer, progress: Progress | None) -> Answer:
@@ -120,10 +120,10 @@ def _with_earlier_slides(found: Prediction, solved: Answers) -> Prediction:
     before = found.scene.earlier_slides() if found.scene.solve.course == "steady" else ()
     quick = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in before]
     lost = [leg for leg in solved(quick) if isinstance(leg, SolveFailure)] if quick else []
-    told = (
+    more = (
         f"A slide before this one, the other way, has no settled state that it could come from: {leg}" for leg in lost
     )
-    return replace(found, warnings=(*found.warnings, *told))
+    return replace(found, warnings=(*found.warnings, *more))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -134,7 +134,7 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
-    """Return what is told of a group's scenes by their positions in it."""
+    """Return `watch` for a group, called with positions in the group."""
     if watch is None:
         return None
     return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
@@ -153,11 +153,11 @@ def _solve_group(
     if marched and (asked or differences.together(scenes)):
         return _marched(scenes, fineness, on_mesh, watch)
     found = _refined(scenes, fineness, on_mesh, watch, rough)
-    return [_saying(answer, told) for answer, told in zip(found.answers, found.told, strict=True)]
+    return [_warned(answer, more) for answer, more in zip(found.answers, found.warnings, strict=True)]
 
 
 def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None) -> list[Answer]:
-    """March courses on the mesh that their settled ends ask for, so that each is marched, and told, once.
+    """March courses on the mesh that their settled ends ask for, so that each is marched, and watched, once.
 
     What is to be said of an end is said of its course.
     """
@@ -166,7 +166,7 @@ def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: W
     out: dict[int, Answer] = {}
 
     def noted(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
-        out[number] = _saying(answer, ended.told[number])
+        out[number] = _warned(answer, ended.warnings[number])
         if watch is not None:
             watch(number, out[number], finger, way)
 
@@ -179,7 +179,7 @@ class _Refined:
     """What was found of scenes that share a mesh."""
 
     answers: list[Answer]
-    told: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
+    warnings: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
     fineness: float  # of the last mesh
 
 
@@ -189,12 +189,12 @@ def _refined(
     """Refine until every estimate is known and meets its tolerance, of differences too, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
-    is told if it `_stands`.
+    is the answer if it `_stands`.
     """
     surfaces = differences.together(scenes)
     first, kind = fineness, scenes[0].solve.kinematics
     found: dict[int, Answer] = {}
-    lost: dict[int, SolveFailure] = {}  # what finer meshes made of those told as a coarser one has them
+    lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
     todo = list(range(len(scenes)))
     while True:
         solved = on_mesh([scenes[i] for i in todo], fineness, watch)
@@ -227,8 +227,8 @@ def _refined(
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, found, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    told = [_undone(of.get(i), missed[i], found[i], lost.get(i)) for i in range(len(scenes))]
-    return _Refined([found[i] for i in range(len(scenes))], told, fineness)
+    warnings = [_undone(of.get(i), missed[i], found[i], lost.get(i)) for i in range(len(scenes))]
+    return _Refined([found[i] for i in range(len(scenes))], warnings, fineness)
 
 
 def _fallen_back(
@@ -258,10 +258,10 @@ def _doubtful(scene: Scene, failure: SolveFailure) -> bool:
 
 
 def _stands(coarser: Answer, failure: SolveFailure) -> bool:
-    """Return whether the answer of a coarser mesh is told where a finer one has none.
+    """Return whether the answer of a coarser mesh counts where a finer one has none.
 
     Where the finer one is sure that there is none it is not; nor near a limit at which numbers grow so that the coarser
-    mesh knows little of them: then the limit is told.
+    mesh knows little of them: then the limit is the answer.
     """
     if not isinstance(coarser, Prediction) or not _doubtful(coarser.scene, failure):
         return False
@@ -270,21 +270,21 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
 
 def _undone(off: Off | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
     """Return what is to be said of an answer for what the finest mesh has left undone."""
-    told: list[str] = []
+    warnings: list[str] = []
     if lost is not None:
-        told.append("A finer mesh did not find this state; told is the coarser one's, with its own error estimate.")
+        warnings.append("A finer mesh did not find this state: this is the coarser one's, with its own error estimate.")
         if lost.limit_mu is not None:
-            told.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
+            warnings.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
     if missed > 1.0:
-        told.append(UNKNOWN if isinstance(answer, Prediction) and answer.error_estimate >= 1.0 else MISSES)
+        warnings.append(UNKNOWN if isinstance(answer, Prediction) and answer.error_estimate >= 1.0 else MISSES)
     if off is not None and off.warning:
-        told.append(off.warning)
-    return tuple(told)
+        warnings.append(off.warning)
+    return tuple(warnings)
 
 
-def _saying(answer: Answer, told: tuple[str, ...]) -> Answer:
+def _warned(answer: Answer, more: tuple[str, ...]) -> Answer:
     """Return the answer with more warnings."""
-    return replace(answer, warnings=(*answer.warnings, *told)) if told and isinstance(answer, Prediction) else answer
+    return replace(answer, warnings=(*answer.warnings, *more)) if more and isinstance(answer, Prediction) else answer
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,7 +53,7 @@ class Stepper(ABC):
         return 0.0 - self.state.load.travel
 
     def step(self, normal: float, tangential: float) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where no state can be told of.
+        """Take one reading and return the SED averaged over the ending [MPa]; nan where there is no state to show.
 
         `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. At small strain
         the next reading starts afresh from the untouched finger; at finite strain, where that is in vain, the first

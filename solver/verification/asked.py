@@ -22,7 +22,7 @@ clock = thread_time if PROCESSOR_TIME else perf_counter
 class LeftOut:
     """Something that was not measured, and why: one sentence."""
 
-    told: str
+    reason: str
 
 
 @dataclass(frozen=True, slots=True)

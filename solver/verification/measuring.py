@@ -40,7 +40,7 @@ KINDS = {
         HardCase, Target,
     )
 }  # fmt: skip
-ALWAYS = ("machine", "targets")  # cost nothing, and are told of what there is even when stopped
+ALWAYS = ("machine", "targets")  # cost nothing, and follow even after a stop
 Progress = Callable[[float, str], None]
 
 
@@ -106,7 +106,7 @@ def measured(
     stopped = False
     for number, subject in enumerate(subjects):
         if stopped and subject.name not in ALWAYS:
-            left_out.append(f"Stopped before: {subject.told}.")
+            left_out.append(f"Stopped before: {subject.doing}.")
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
         now = clock()
@@ -114,17 +114,17 @@ def measured(
         mine: list[DataclassInstance] = []
         try:
             for row in subject.measure(asked, found):
-                progress(min((clock() - start) / (end - start), 0.99), subject.told)
+                progress(min((clock() - start) / (end - start), 0.99), subject.doing)
                 if isinstance(row, LeftOut):
-                    left_out.append(row.told)
+                    left_out.append(row.reason)
                 else:
                     mine.append(row)
                     found.rows.append(row)
         except KeyboardInterrupt:
             stopped = True
-            left_out.append(f"Stopped during: {subject.told}.")
+            left_out.append(f"Stopped during: {subject.doing}.")
         except (SolveFailure, ArithmeticError, ValueError) as failure:
-            left_out.append(f"{subject.told.capitalize()} broke off: {failure}")
+            left_out.append(f"{subject.doing.capitalize()} broke off: {failure}")
         rows[subject.name], took[subject.name] = tuple(mine), clock() - now
     return Measured(begun, quick, stopped, took, rows, tuple(left_out))
 

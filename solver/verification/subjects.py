@@ -30,7 +30,7 @@ class Subject:
     """One file's measurement."""
 
     name: str  # key in the JSON file
-    told: str  # while it runs
+    doing: str  # as shown while it runs
     share: float  # of the time; what a subject does not use is left to the later ones
     quick_share: float
     measure: "Callable[[Asked, Found], Iterator[DataclassInstance]]"

@@ -84,7 +84,7 @@ def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterat
     solves = overkill(max(chosen, key=lambda scene: scene.loading.depth), quick=asked.quick)
     shared = (clock() - begun) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
-        if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be told
+        if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
             yield LeftOut(
                 f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
             )

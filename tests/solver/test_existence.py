@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
-from solver.accuracy.adaptivity import nested_solution
+from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.continuation.existence import steady
 from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import LoadState
 from tests.solver.finite_examples import published
 
@@ -14,6 +15,12 @@ TOWARDS_TIP = -1
 
 
 SLOW = pytest.mark.slow
+
+
+def refined(scene, depth, fineness):
+    """Return the state of a scene on a mesh of `fineness`, begun on a coarse one."""
+    meshes = Meshes()
+    return refine(scene, fineness, coarse_solution(scene, depth, fineness, never, meshes), never, meshes).top
 
 
 @pytest.mark.parametrize(
@@ -89,12 +96,12 @@ def drawn(mu, tolerance=None):
 @pytest.mark.parametrize("mu", [0.8, 0.85, 0.9])
 def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu, fineness):
     with pytest.raises(NoSteadyState):
-        nested_solution(drawn(mu), 1.8, fineness, lambda: False)
+        refined(drawn(mu), 1.8, fineness)
 
 
 @SLOW
 def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
-    found = [nested_solution(drawn(0.71), 1.8, fineness, lambda: False).top for fineness in (7.0, 10.0, 14.0, 20.0)]
+    found = [refined(drawn(0.71), 1.8, fineness) for fineness in (7.0, 10.0, 14.0, 20.0)]
     np.testing.assert_allclose([top.finger.sed_ending(top.shape.u) for top in found], 0.00286, rtol=0.01)
 
 
@@ -135,7 +142,7 @@ def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(finenes
             solve=Solve("finite"),
         )
 
-    assert nested_solution(at(0.84), 1.0997, fineness, lambda: False).top.shape.touching.any()
+    assert refined(at(0.84), 1.0997, fineness).shape.touching.any()
     with pytest.raises(NoSteadyState) as refused:
-        nested_solution(at(0.91), 1.0997, fineness, lambda: False)
+        refined(at(0.91), 1.0997, fineness)
     assert refused.value.limit_mu == pytest.approx(0.88, rel=0.03)

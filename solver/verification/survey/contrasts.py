@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from solver.accuracy.contrasts import TOLD
+from solver.accuracy.contrasts import WARNED
 from solver.arrays import Array
 from solver.failures import SolveFailure
 from solver.response.solution import solve_many
@@ -77,7 +77,7 @@ def errors(numbers: Array, solves: Array) -> Array:
     """
     truth = solves.mean(axis=0)
     span = np.ptp(truth, axis=0)
-    known = np.ptp(solves - truth, axis=1).max(axis=0) <= TOLD / 3.0 * span
+    known = np.ptp(solves - truth, axis=1).max(axis=0) <= WARNED / 3.0 * span
     return np.where(known, np.ptp(numbers - truth, axis=0) / span, np.nan)
 
 
@@ -91,7 +91,7 @@ def report(rows: Sequence[Row]) -> Iterator[str]:
         answers = [row.answers[place] for row in solved]
         pairs = zip(answers, solved, strict=True)
         off = np.array([errors(np.array(one.numbers), np.array(row.truth)) for one, row in pairs])
-        far = np.nan_to_num(off) > TOLD
+        far = np.nan_to_num(off) > WARNED
         silent = [
             row.number for row, one, bad in zip(solved, answers, far, strict=True) if bad.any() and not one.warned
         ]
