@@ -156,7 +156,7 @@ def refine(
     scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], meshes: Meshes
 ) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
-    steps = steps_asked(scene, low.finger, low.shape, stop)
+    steps = steps_asked(scene, low.finger, stop, low.shape)
     sizing = replace(low.sizing, fineness=fineness)
     top = solution_on(scene, sizing, low, stop, meshes, 1 if steps is None else steps.times)
     if top.sizing.margin < WIDER and top.finger.runs_out(top.shape):
@@ -210,7 +210,7 @@ def on_nested(
     try:
         if depends_on_way(scene, top.shape):
             if steps is None:  # since it slid on the coarse mesh
-                judged = steps_asked(scene, top.finger, top.shape, stop)
+                judged = steps_asked(scene, top.finger, stop, top.shape)
                 steps = None if judged is None else replace(judged, times=1)
             shape = end(finger, scene, stop)
         else:

@@ -22,27 +22,19 @@ def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: flo
     return course(scene, finger, stop, times).last
 
 
-def steps_asked(scene: Scene, finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]) -> Steps | None:
-    """Return the load steps that a scene asks for, judged on a mesh on which it has led to `shape`.
+def steps_asked(
+    scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], shape: EquilibriumState | None = None
+) -> Steps | None:
+    """Return the load steps that a scene asks for, judged on a mesh, on which it may have led to `shape` already.
 
     None where that is a settled slide. Raises NotConverged, Cancelled.
     """
-    if not depends_on_way(scene, shape):
+    usual = end(finger, scene, stop) if shape is None else shape
+    if not depends_on_way(scene, usual):
         return None
 
     def after(times: float) -> EquilibriumState:
-        return shape if times == 1.0 and not relaxes(scene) else end(finger, scene, stop, times)
+        settled_only = shape is not None and relaxes(scene)
+        return usual if times == 1.0 and not settled_only else end(finger, scene, stop, times)
 
     return Steps.asked(after, finger.all_numbers, scene.solve.tolerance)
-
-
-def times_on_way(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool]) -> int:
-    """Return how many times the usual load steps a history takes whose end does not depend on them.
-
-    Those that a tolerance asks for at the end of its press, judged on a mesh. Raises NotConverged, Cancelled.
-    """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.mu == 0.0:
-        return 1
-    press = scene.pressed_only()
-    steps = steps_asked(press, finger, end(finger, press, stop), stop)
-    return 1 if steps is None else steps.times

@@ -7,7 +7,7 @@ import numpy as np
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.continuation.small_states import end, nearest
 from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.loads import forces_of, load_of
+from solver.equilibrium.loads import forces_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import SolveFailure
@@ -21,16 +21,6 @@ def steps_asked(scene: Scene, finger: LinearFinger) -> Steps:
         return Steps.asked(lambda times: end(scene, finger, times), finger.all_numbers, scene.solve.tolerance)
     except SolveFailure:
         return Steps(1, np.zeros(COUNT), np.zeros(COUNT))  # nor will there be an estimate
-
-
-def times_on_way(scene: Scene, finger: LinearFinger) -> int:
-    """Return how many times the usual load steps a history takes whose end does not depend on them.
-
-    Those that a tolerance asks for at the end of its press, judged on a mesh.
-    """
-    if scene.solve.course == "steady" or scene.solve.tolerance is None or load_of(scene).frictionless:
-        return 1
-    return steps_asked(scene.pressed_only(), finger).times
 
 
 def on_nested(mesh: LinearFinger, asked: Sequence[tuple[Scene, Steps | None]]) -> list[NestedNumbers | None]:

@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol, cast
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.linear import lame_modulus, shear_modulus
+from solver.constitutive.linear import Isotropic
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
@@ -42,7 +42,7 @@ class Law(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class NeoHooke:
+class NeoHooke(Isotropic):
     """W = G/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984, Comput. Meth. Appl. Mech. Eng. 46, 201).
 
     P = G (F - F^-T) + lambda ln J F^-T. A dermis held at its sides and pressed to 0.8 of its height:
@@ -52,18 +52,6 @@ class NeoHooke:
     """
 
     name: ClassVar[str] = "neo-Hooke"
-    E: float  # Young's modulus of the undeformed tissue [MPa]
-    nu: float  # its Poisson's ratio [-]
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus [MPa]."""
-        return shear_modulus(self.E, self.nu)
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant [MPa]."""
-        return lame_modulus(self.E, self.nu)
 
     @property
     def stiffening(self) -> float:
@@ -72,7 +60,7 @@ class NeoHooke:
 
 
 @dataclass(frozen=True, slots=True)
-class Ogden:
+class Ogden(Isotropic):
     """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, that stiffens as it is strained.
 
     Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches as
@@ -87,19 +75,7 @@ class Ogden:
     """
 
     name: ClassVar[str] = "Ogden"
-    E: float  # Young's modulus of the undeformed tissue [MPa]
-    nu: float  # its Poisson's ratio [-]
     stiffening: float = HUMAN_SKIN  # a [-]
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus [MPa]."""
-        return shear_modulus(self.E, self.nu)
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant [MPa]."""
-        return lame_modulus(self.E, self.nu)
 
 
 def log1p(x: Array) -> Array:

@@ -26,8 +26,8 @@ def lame_modulus(E: float, nu: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Hooke:
-    """Isotropic linear elasticity at small strain, in plane strain."""
+class Isotropic:
+    """An elastic tissue of two constants, those of its small strains."""
 
     E: float  # Young's modulus [MPa]
     nu: float  # Poisson's ratio [-]
@@ -41,6 +41,11 @@ class Hooke:
     def lame(self) -> float:
         """Lamé's first constant [MPa]."""
         return lame_modulus(self.E, self.nu)
+
+
+@dataclass(frozen=True, slots=True)
+class Hooke(Isotropic):
+    """Isotropic linear elasticity at small strain, in plane strain."""
 
     def energy(self, gradient: Array) -> Array:
         """Return the strain-energy density (...) [MPa] for displacement gradients (..., 2, 2).

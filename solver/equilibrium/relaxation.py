@@ -176,13 +176,16 @@ class RelaxingWay(Way):
     ) -> None:
         """Start at rest; `first` is the length of the first step [s]."""
         self.body = body
-        self._ending, self._point = ending, point
+        self._ending, self._point, self._ready = ending, point, first
         super().__init__(Newton(body.ready(first)), friction, loading)
         self.sed: list[tuple[float, float]] = [(0.0, 0.0)]
 
     def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
-        self.newton = Newton(self.body.ready(aim.time - self.aim.time))
+        step = aim.time - self.aim.time
+        if step != self._ready:
+            self.newton = Newton(self.body.ready(step))
+        self._ready = 0.0  # what comes next has another past
         state = super().found(before, aim)
         self.body.advance(state.u)
         self.sed.append((float(self.body.average(self._ending)[0]), float(self.body.average(self._point)[0])))

@@ -15,7 +15,9 @@ from math import ceil
 import numpy as np
 
 from solver.arrays import Array
+from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState
+from solver.scene import Scene
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
 MOST = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
@@ -61,3 +63,14 @@ class Steps:
     def taken(self, usual: Array) -> Array:
         """Return what the numbers (c,) after the usual steps would be after these."""
         return usual - (1.0 - 1.0 / self.times) * self.excess
+
+
+def times_on_way(scene: Scene, asked: Callable[[Scene], Steps | None]) -> int:
+    """Return how many times the usual load steps a history takes whose end does not depend on them.
+
+    Those that a tolerance asks for at the end of its press; `asked` returns the steps of that. Raises as it does.
+    """
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or load_of(scene).frictionless:
+        return 1
+    steps = asked(scene.pressed_only())
+    return 1 if steps is None else steps.times

@@ -12,7 +12,7 @@ import numpy as np
 
 from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.audits import audits, course_audits, forces_missed, refuse_unsound, unbalanced
-from solver.accuracy.finite_ends import times_on_way
+from solver.accuracy.finite_ends import steps_asked
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
@@ -20,6 +20,7 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse, RelaxingNewton
 from solver.equilibrium.load_path import Way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
+from solver.equilibrium.step_error import times_on_way
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
@@ -79,7 +80,8 @@ def _predicted(
     finger, shape = at.finger, at.shape
     setup = nested.coarse.setup_s + at.setup_s
     steps = nested.steps
-    times = times_on_way(scene, nested.coarse.finger, stop) if steps is None else steps.times
+    coarse = nested.coarse.finger
+    times = times_on_way(scene, lambda press: steps_asked(press, coarse, stop)) if steps is None else steps.times
     way: Way | None = None
     relaxing: RelaxingCourse | None = None
     if scene.solve.course == "history":

@@ -14,7 +14,7 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels import STICK
 from solver.accuracy.audits import MIXED, audits, course_audits, forces_missed, inside_out, refuse_unsound, unbalanced
-from solver.accuracy.small_errors import on_nested, steps_asked, times_on_way
+from solver.accuracy.small_errors import on_nested, steps_asked
 from solver.arrays import Array
 from solver.continuation.small_existence import direct
 from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined
@@ -22,7 +22,7 @@ from solver.continuation.wedging import WIDE
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps
+from solver.equilibrium.step_error import Steps, times_on_way
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.grid import MeshError
 from solver.mesh.mesher import Sizing
@@ -183,7 +183,7 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
     contact, steps = _in_steps(scene, shared)
     if contact is None:
         return None
-    times = times_on_way(scene, shared.mesh) if steps is None else steps.times
+    times = times_on_way(scene, lambda press: steps_asked(press, finger)) if steps is None else steps.times
     way: Way | None = None
     over_time: Array | None = None
     direct = contact
