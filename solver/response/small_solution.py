@@ -118,14 +118,15 @@ def _on_mesh(
 ) -> list[Answer] | None:
     """Return the answers on one mesh; None where contact must be looked for on more of the skin than this.
 
-    The steepest friction, whose contact reaches farthest, comes first. Where `all_of_them` must be answered, what
+    Of settled slides the steepest, whose contact reaches farthest, comes first. Where `all_of_them` must be answered, what
     reaches out nevertheless has no answer. Raises NotConverged where a mesh does not stand for a body.
     """
     done: dict[int, Answer] = {}
     # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
-    together = 1 if any(scene.solve.course == "history" for scene in scenes) else len(scenes)
-    order = sorted(range(len(scenes)), key=lambda number: -float(scenes[number].friction.mu))
-    for batch in (order[first : first + together] for first in range(0, len(scenes), together)):
+    every = range(len(scenes))
+    steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
+    marched = any(scene.solve.course == "history" for scene in scenes)
+    for batch in [[number] for number in every] if marched else [steepest_first]:
         states: list[tuple[Solved, Way | None] | SolveFailure] = []
         for number in batch:
             position = len(done) + len(states)
