@@ -118,8 +118,8 @@ def _on_mesh(
 ) -> list[Answer] | None:
     """Return the answers on one mesh; None where contact must be looked for on more of the skin than this.
 
-    Of settled slides the steepest, whose contact reaches farthest, comes first. Where `all_of_them` must be answered, what
-    reaches out nevertheless has no answer. Raises NotConverged where a mesh does not stand for a body.
+    Of settled slides the steepest, whose contact reaches farthest, comes first. Where `all_of_them` must be answered,
+    what reaches out nevertheless has no answer. Raises NotConverged where a mesh does not stand for a body.
     """
     done: dict[int, Answer] = {}
     # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
