@@ -167,7 +167,7 @@ def test_what_the_stroke_does_not_tell_is_missing_with_its_reason(tables):
 
 @pytest.mark.slow
 def test_a_surface_without_a_settled_slide_keeps_its_row_with_the_solver_s_sentence(tables):
-    sticky = analysis([*tables.friction[:2], parameters(3, 5.0, 9e9, 1)], tables.strokes[:3])
+    sticky = analysis([*tables.friction[:2], parameters(3, 5.0, 9e9, -1)], tables.strokes[:3])
     found = predict(sticky, PLAN, PredictionOptions(course="steady"))
     assert found.trials[1].sed is not None
     assert found.trials[2].sed is None
