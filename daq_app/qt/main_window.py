@@ -29,8 +29,8 @@ from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
-from daq_app.qt.score_line import LENGTH
-from daq_app.qt.screens import millimetres
+from daq_app.qt.screens import line_settings, millimetres
+from daq_app.qt.subject_preview import open_preview
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
@@ -39,7 +39,6 @@ from daq_app.window.messages import Message, NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
-from sessions.recording import Setting
 
 COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
 # Before the scale of the fonts [px]:
@@ -177,6 +176,7 @@ class MainWindow(QMainWindow):
             "drawer": self.middle.toggle_drawer,
             "inspect": self.middle.toggle_inspection,
             "pilot": self._pilot,
+            "preview": self._preview,
             "subject": self.show_subject,
             "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
             "open": self.rooms.choose,
@@ -257,15 +257,14 @@ class MainWindow(QMainWindow):
         else:
             self.notice.warn("A protocol is piloted in Prepare, while no session is in hand.")
 
+    def _preview(self) -> None:
+        refused = open_preview(self.page.form(), self.subject.size(), self._tokens, self._scale, self)
+        if refused:
+            self.notice.warn(refused)
+
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        shown = millimetres(self.subject.screen())
-        origin = "measured" if shown.checked else "default"
-        settings = (
-            Setting("answer line length", LENGTH, "mm", origin),
-            Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
-        )
-        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), settings)
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), line_settings(self.subject.screen()))
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return

@@ -46,6 +46,7 @@ class Menus:
         self.session = bar.addMenu("&Session")
         self._add(self.session, "new", "New session")
         self.pilot = self._add(self.session, "pilot", "Pilot the protocol")
+        self._add(self.session, "preview", "Preview the subject's pages")
         self._add(self.session, "tare", "Zero the bench")
         self.session.addSeparator()
         self.course = [self._add(self.session, name, words) for name, words in SESSION]

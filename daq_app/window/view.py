@@ -63,7 +63,7 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
         banner=_banner(state),
         course=None if session is None else view_course.course_view(session, state.bench, state.now),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
-        subject=view_subject.subject_view(session, translate),
+        subject=view_subject.subject_view(session, translate, state.language),
     )
 
 

@@ -33,10 +33,13 @@ class SubjectView:
         return self.kind != "read"
 
 
-def subject_view(session: SessionState | None, translate: Translate = str) -> SubjectView:
-    """Return what is shown to the subject now, in the language that `translate` makes of English."""
+def subject_view(session: SessionState | None, translate: Translate = str, language: str = ENGLISH) -> SubjectView:
+    """Return what is shown to the subject now, in the language that `translate` makes of English.
+
+    `language` is the code of the one that is chosen before there is a session, which has its own.
+    """
     if session is None:
-        return SubjectView("read", translate(Text.WELCOME), translate(Text.BEGINS))
+        return SubjectView("read", translate(Text.WELCOME), translate(Text.BEGINS), language=language)
     return replace(_Page(session, translate).view(), language=session.plan.language)
 
 
