@@ -44,6 +44,7 @@ KEYS = (
     Key("-", "shorter", "show a shorter stretch of time"),
     Key("M", "model", "live model at finite strain, or at small strain again"),
     Key("D", "drawer", "open or close the drawer: six axes, sample and finger"),
+    Key("V", "mirror", "show or fold a small picture of the page that the subject sees now"),
     Key("I", "inspect", "inspect the last stroke's trial, and go back; a click on a tile inspects any trial"),
     Key("B", "bench", "show or fold the bench"),
     Key("F5", "pilot", "pilot the protocol of the page with simulated hand and answers"),

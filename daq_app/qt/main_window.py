@@ -71,7 +71,7 @@ class MainWindow(QMainWindow):
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
         self.page = NewSessionPage(scale, bridge.send, self.act)
-        self.course = CoursePanel(scale, bridge.send)
+        self.course = CoursePanel(tokens, scale, bridge.send)
         self.middle = Middle(bridge, tokens, scale, self.act)
         self.live = self.middle.live
         self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
@@ -125,7 +125,16 @@ class MainWindow(QMainWindow):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
-        for part in (self.header, self.to_do, self.middle, self.bench, self.strip, self.subject, self.rooms):
+        for part in (
+            self.header,
+            self.to_do,
+            self.course,
+            self.middle,
+            self.bench,
+            self.strip,
+            self.subject,
+            self.rooms,
+        ):
             part.set_tokens(tokens)
 
     def show_subject(self) -> None:
@@ -174,6 +183,7 @@ class MainWindow(QMainWindow):
             "shorter": lambda: self.live.change_length(-1),
             "bench": self._fold_bench,
             "drawer": self.middle.toggle_drawer,
+            "mirror": self.course.mirror.toggle,
             "inspect": self.middle.toggle_inspection,
             "pilot": self._pilot,
             "preview": self._preview,
@@ -296,6 +306,7 @@ class MainWindow(QMainWindow):
         hand = None if session is None else session.plan.answering_hand
         was_scoring = self.subject.scoring
         self.subject.show_view(view.subject, hand)
+        self.course.mirror.show_view(view.mirror, self.subject.size())
         if not was_scoring:
             self._bring_subject()
 

@@ -17,6 +17,7 @@ SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on")
 PANELS = (
     ("bench", "Bench"),
     ("drawer", "Drawer: axes, sample, finger"),
+    ("mirror", "The subject's page"),
     ("inspect", "Inspect the last trial"),
     ("hold", "Hold the picture"),
     ("model", "Live model at finite strain"),

@@ -48,6 +48,7 @@ class View:
     course: CourseView | None  # None: the page of a new session is shown
     bench: BenchView
     subject: SubjectView
+    mirror: SubjectView | None = None  # what of it the experimenter sees; None where no session is in hand
 
 
 def derive_view(state: AppState, translate: Translate = str) -> View:
@@ -64,6 +65,7 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
         course=None if session is None else view_course.course_view(session, state.bench, state.now),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
         subject=view_subject.subject_view(session, translate, state.language),
+        mirror=None if session is None else view_subject.mirror_view(session, translate),
     )
 
 

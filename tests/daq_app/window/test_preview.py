@@ -6,7 +6,10 @@ import pytest
 
 from daq_app.window.new_session import Refused, SessionForm
 from daq_app.window.preview import preview
+from daq_app.window.view_subject import mirror_view, subject_view
+from sessions.plan.plan import Shown
 from sessions.plan.protocols import protocol, protocol_names
+from tests.daq_app.session_messages import PLAN, READY, after
 
 ANSWERS = {
     "constant-stimuli": "choice",
@@ -71,3 +74,16 @@ def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
     refused = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
     assert isinstance(refused, Refused)
     assert "wrong.toml" in refused.sentences["protocol"]
+
+
+def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():
+    subject = ("instruction", "trial count", "forces")
+    for experimenter, counted in ((("answer",), False), (("trial count", "forces"), True)):
+        plan = replace(PLAN, shown=Shown(subject, experimenter))
+        session = replace(after(*READY).session, plan=plan)
+        assert subject_view(session).force
+        assert "Surface 1 of 10." in subject_view(session).text
+        mirror = mirror_view(session)
+        assert not mirror.force
+        assert ("Surface 1 of 10." in mirror.text) is counted
+        assert mirror.title == subject_view(session).title
