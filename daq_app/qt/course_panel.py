@@ -52,7 +52,7 @@ class CoursePanel(QFrame):
         self.line.setAccessibleName("reason or note")
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
-        self._bottom.addWidget(self._actions())
+        self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
         self._bottom.addWidget(self._asked(scale))
         self._timer = label("", "quiet")
         self.mirror = Mirror(tokens, scale)
@@ -138,13 +138,13 @@ class CoursePanel(QFrame):
     def _end(self) -> None:
         self.ask("end")
 
-    def _actions(self) -> QWidget:
+    def _actions(self, columns: int) -> QWidget:
         page = QWidget()
         grid = QGridLayout(page)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
         for at, made in enumerate(self._all):
-            grid.addWidget(made, at // 3, at % 3)
+            grid.addWidget(made, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         return page
 

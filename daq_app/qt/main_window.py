@@ -66,7 +66,7 @@ class MainWindow(QMainWindow):
         self._tokens = tokens
         self._close_asked = -LEAVING
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
-        self.header = Header(tokens, self.show_subject, self._show_keys)
+        self.header = Header(tokens, scale, self.show_subject, self._show_keys)
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))

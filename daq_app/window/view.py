@@ -79,7 +79,7 @@ def _lamp(state: AppState) -> Lamp:
         return Lamp("off", _ended_words(session), "")
     running = duration(state.now - session.begun)
     if session.saved is None:
-        return Lamp("off", f"starting {running}", "nothing saved yet")
+        return Lamp("off", f"starting {running}", "not saved yet")
     age = state.now - session.saved
     saved = f"saved {age:.1f} s ago"
     if age > UNSAVED or state.gone is not None:
