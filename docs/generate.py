@@ -7,6 +7,7 @@ import inspect
 from pathlib import Path
 
 import against_the_paper
+import looks
 
 from daq_app.cli import main
 
@@ -22,7 +23,9 @@ def write(folder: Path) -> None:
         "scene-keys": scene_keys(),
         "protocol-keys": protocol_keys(),
         "against-the-paper": against_the_paper.page(),
+        "looks": looks.page(),
     }
+    looks.write_pictures(folder)
     for name, text in pages.items():
         file = folder / f"{name}.md"
         if not file.exists() or file.read_text(encoding="utf-8") != text:

@@ -23,7 +23,6 @@ from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable
 from sessions.plan.plan import Frame
-from sessions.plan.protocols.languages import ENGLISH
 
 FRAME = 16  # between two looks at the recorder [ms]: 60 a second
 AFTER_OPENING = 1500  # what is not needed at once waits until the window stands [ms]
@@ -202,7 +201,7 @@ class Bridge(QObject):
             return
         self._shown = self.state
         session = self.state.session
-        view = derive_view(self.state, translator(ENGLISH if session is None else session.plan.language))
+        view = derive_view(self.state, translator(self.state.language if session is None else session.plan.language))
         if view != self.view:
             self.view = view
             self.changed.emit(view)

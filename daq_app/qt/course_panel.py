@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -15,17 +16,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from daq_app.qt.mirror import Mirror
 from daq_app.qt.parts import EntryLine, button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from sessions.run import steps
 
+ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
+
 
 class CoursePanel(QFrame):
     """The left of the experimenter's window while a session is in hand."""
 
-    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
+    def __init__(self, tokens: Tokens, scale: float, send: Callable[[Message], None]) -> None:
         """Show no plan; `send` takes what is done."""
         super().__init__()
         self.setProperty("role", "panel")
@@ -48,9 +52,11 @@ class CoursePanel(QFrame):
         self.line.setAccessibleName("reason or note")
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
-        self._bottom.addWidget(self._actions())
+        self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
         self._bottom.addWidget(self._asked(scale))
         self._timer = label("", "quiet")
+        self.mirror = Mirror(tokens, scale)
+        self._roomy = round(ROOMY * min(scale, 1.4))
         head = QHBoxLayout()
         head.addWidget(label("Plan", "section"), 1)
         head.addWidget(self._timer)
@@ -59,6 +65,7 @@ class CoursePanel(QFrame):
         layout.setSpacing(GRID)
         layout.addLayout(head)
         layout.addWidget(self.plan, 1)
+        layout.addWidget(self.mirror)
         layout.addWidget(self._bottom)
 
     @property
@@ -131,13 +138,13 @@ class CoursePanel(QFrame):
     def _end(self) -> None:
         self.ask("end")
 
-    def _actions(self) -> QWidget:
+    def _actions(self, columns: int) -> QWidget:
         page = QWidget()
         grid = QGridLayout(page)
         grid.setContentsMargins(0, 0, 0, 0)
         grid.setSpacing(GRID)
         for at, made in enumerate(self._all):
-            grid.addWidget(made, at // 3, at % 3)
+            grid.addWidget(made, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
@@ -175,7 +182,13 @@ class CoursePanel(QFrame):
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
     def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme: the style sheet does it all."""
+        """Follow another theme: the style sheet does the rest."""
+        self.mirror.set_tokens(tokens)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Fold the picture of the subject's page where the plan needs the room."""
+        super().resizeEvent(event)
+        self.mirror.set_room(self.height() >= self._roomy)
 
 
 def _buttons(view: CourseView) -> tuple[Button, ...]:

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
 from daq_app.window.answer import Choice
+from daq_app.window.subject_texts import SubjectText as Text
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event
 
@@ -51,7 +52,7 @@ class NumberField(_Field):
         """Show an empty field; `now` tells the session clock [s]."""
         super().__init__(now)
         self.field = QLineEdit()
-        self.field.setAccessibleName("your number, above 0")
+        self.field.setAccessibleName(Text.OWN_NUMBER)
         self.field.setFixedWidth(round(260 * scale))
         self.field.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
@@ -88,9 +89,9 @@ class ChoiceOfTwo(_Field):
         """Show two buttons; `now` tells the session clock [s]."""
         super().__init__(now)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("which of the two: 1 for the first, 2 for the second")
-        self.first = self._button("The first", "first", scale)
-        self.second = self._button("The second", "second", scale)
+        self.setAccessibleName(Text.OF_TWO)
+        self.first = self._button(Text.FIRST, "first", scale)
+        self.second = self._button(Text.SECOND, "second", scale)
         layout = QHBoxLayout(self)
         layout.setSpacing(4 * GRID)
         layout.addStretch(1)

@@ -3,11 +3,12 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.parts import Shortened, button, label, regrade, say
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -16,7 +17,7 @@ from daq_app.window.view_course import Button
 class Header(QWidget):
     """Whose session it is, whether anything is simulated, and whether it is being recorded."""
 
-    def __init__(self, tokens: Tokens, subject: Callable[[], None], keys: Callable[[], None]) -> None:
+    def __init__(self, tokens: Tokens, scale: float, subject: Callable[[], None], keys: Callable[[], None]) -> None:
         """Show no session; `subject` and `keys` show the subject's window and the keys."""
         super().__init__()
         self._heading = Shortened("title")
@@ -39,7 +40,7 @@ class Header(QWidget):
         layout.addWidget(button("Keys  F1", "show the keys of this window", keys))
         self._device = Shortened("quiet")
         layout.insertWidget(1, self._device, 2)
-        self._saved.setFixedWidth(self._saved.fontMetrics().horizontalAdvance("nothing saved yet "))
+        self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
 
     def show_view(self, view: View) -> None:
         """Show the top line."""

@@ -44,10 +44,12 @@ KEYS = (
     Key("-", "shorter", "show a shorter stretch of time"),
     Key("M", "model", "live model at finite strain, or at small strain again"),
     Key("D", "drawer", "open or close the drawer: six axes, sample and finger"),
+    Key("V", "mirror", "show or fold a small picture of the page that the subject sees now"),
     Key("I", "inspect", "inspect the last stroke's trial, and go back; a click on a tile inspects any trial"),
     Key("B", "bench", "show or fold the bench"),
     Key("F5", "pilot", "pilot the protocol of the page with simulated hand and answers"),
     Key("F6", "subject", "show the subject's window and go to it"),
+    Key("F7", "preview", "preview every page that the subject will see, by the protocol and language of the page"),
     Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),
     Key("Ctrl+O", "open", "look at a recorded session: strokes, predictions, report, exports"),
     Key("F1", "keys", "show or hide these keys"),
@@ -86,6 +88,7 @@ _NAMED = {
     Qt.Key.Key_F4: "F4",
     Qt.Key.Key_F5: "F5",
     Qt.Key.Key_F6: "F6",
+    Qt.Key.Key_F7: "F7",
     Qt.Key.Key_Escape: "Esc",
 }
 

@@ -29,8 +29,8 @@ from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
-from daq_app.qt.score_line import LENGTH
-from daq_app.qt.screens import millimetres
+from daq_app.qt.screens import line_settings, millimetres
+from daq_app.qt.subject_preview import open_preview
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
@@ -39,7 +39,6 @@ from daq_app.window.messages import Message, NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
-from sessions.recording import Setting
 
 COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
 # Before the scale of the fonts [px]:
@@ -67,12 +66,12 @@ class MainWindow(QMainWindow):
         self._tokens = tokens
         self._close_asked = -LEAVING
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
-        self.header = Header(tokens, self.show_subject, self._show_keys)
+        self.header = Header(tokens, scale, self.show_subject, self._show_keys)
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
         self.page = NewSessionPage(scale, bridge.send, self.act)
-        self.course = CoursePanel(scale, bridge.send)
+        self.course = CoursePanel(tokens, scale, bridge.send)
         self.middle = Middle(bridge, tokens, scale, self.act)
         self.live = self.middle.live
         self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
@@ -126,7 +125,16 @@ class MainWindow(QMainWindow):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._tokens = tokens
-        for part in (self.header, self.to_do, self.middle, self.bench, self.strip, self.subject, self.rooms):
+        for part in (
+            self.header,
+            self.to_do,
+            self.course,
+            self.middle,
+            self.bench,
+            self.strip,
+            self.subject,
+            self.rooms,
+        ):
             part.set_tokens(tokens)
 
     def show_subject(self) -> None:
@@ -175,8 +183,10 @@ class MainWindow(QMainWindow):
             "shorter": lambda: self.live.change_length(-1),
             "bench": self._fold_bench,
             "drawer": self.middle.toggle_drawer,
+            "mirror": self.course.mirror.toggle,
             "inspect": self.middle.toggle_inspection,
             "pilot": self._pilot,
+            "preview": self._preview,
             "subject": self.show_subject,
             "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
             "open": self.rooms.choose,
@@ -257,15 +267,14 @@ class MainWindow(QMainWindow):
         else:
             self.notice.warn("A protocol is piloted in Prepare, while no session is in hand.")
 
+    def _preview(self) -> None:
+        refused = open_preview(self.page.form(), self.subject.size(), self._tokens, self._scale, self)
+        if refused:
+            self.notice.warn(refused)
+
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        shown = millimetres(self.subject.screen())
-        origin = "measured" if shown.checked else "default"
-        settings = (
-            Setting("answer line length", LENGTH, "mm", origin),
-            Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
-        )
-        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), settings)
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), line_settings(self.subject.screen()))
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return
@@ -297,6 +306,7 @@ class MainWindow(QMainWindow):
         hand = None if session is None else session.plan.answering_hand
         was_scoring = self.subject.scoring
         self.subject.show_view(view.subject, hand)
+        self.course.mirror.show_view(view.mirror, self.subject.size())
         if not was_scoring:
             self._bring_subject()
 

@@ -17,6 +17,7 @@ SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on")
 PANELS = (
     ("bench", "Bench"),
     ("drawer", "Drawer: axes, sample, finger"),
+    ("mirror", "The subject's page"),
     ("inspect", "Inspect the last trial"),
     ("hold", "Hold the picture"),
     ("model", "Live model at finite strain"),
@@ -46,6 +47,7 @@ class Menus:
         self.session = bar.addMenu("&Session")
         self._add(self.session, "new", "New session")
         self.pilot = self._add(self.session, "pilot", "Pilot the protocol")
+        self._add(self.session, "preview", "Preview the subject's pages")
         self._add(self.session, "tare", "Zero the bench")
         self.session.addSeparator()
         self.course = [self._add(self.session, name, words) for name, words in SESSION]

@@ -1,10 +1,9 @@
 """The page on which a session is begun: a checklist of cards, each of which says in one line why not."""
 
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -20,25 +19,23 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.card import CardFrame
+from daq_app.qt.cut_short import CutShort
 from daq_app.qt.languages import missing_glyphs, name_of, translator
 from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
-from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
-from daq_app.window.messages import Message
+from daq_app.window.messages import LanguageChosen, Message
 from daq_app.window.new_session import (
     AXES,
     Bench,
     SessionForm,
-    Unfinished,
     enrolled,
     enrolment,
     offered,
     place_of,
     subject_texts,
-    unfinished,
 )
 from daq_app.window.subject_texts import SubjectText
 from sessions.plan.plan import Hand
@@ -67,7 +64,6 @@ class NewSessionPage(QFrame):
         self._cards: tuple[Card, ...] = ()
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
-        self._shown: tuple[Unfinished, ...] = ()
         self.subject = entry("subject code, never a name")
         self.protocol = choice("protocol")
         self.protocol.addItems([*protocol_names(), "choose a file …"])
@@ -104,10 +100,10 @@ class NewSessionPage(QFrame):
         self._screen = ""  # with that, which characters of the texts no font here has
         self._pilot = button("Pilot  F5", "pilot this protocol with simulated hand and answers", lambda: act("pilot"))
         self._pilot.setToolTip("Runs by itself, needs no subject, and is kept apart in the folder “pilots”")
+        self._preview = button("Preview  F7", "preview every page that the subject will see", lambda: act("preview"))
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
-        self._resume = choice("sessions that were cut short")
-        self._go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
-        self._unfinished, self._height, self._area = QFrame(), QWidget(), QWidget()
+        self.cut_short = CutShort(send)
+        self._height, self._area = QWidget(), QWidget()
         self._build(scale)
         for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
             line.textChanged.connect(self.changed)
@@ -117,12 +113,12 @@ class NewSessionPage(QFrame):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
         self.language.currentIndexChanged.connect(self._show_screen)
+        self.language.currentIndexChanged.connect(self._speak)
         self.language.currentIndexChanged.connect(self.changed)
         for line in (self.study, self.folder):
             line.textChanged.connect(self._place_changed)
         self._place_changed()
         self._show_study()
-        self.show_unfinished(())
 
     def form(self) -> SessionForm:
         """Return what stands on the page."""
@@ -209,30 +205,7 @@ class NewSessionPage(QFrame):
 
     def look_for_unfinished(self) -> None:
         """Look for sessions that were cut short, without holding up the window."""
-        folder = Path(self.form().folder or ".")
-        results: list[tuple[Unfinished, ...]] = []
-        worker = threading.Thread(target=lambda: results.append(unfinished(folder)), daemon=True)
-        worker.start()
-        self._looking = timer = QTimer(self)
-        timer.setInterval(100)
-
-        def look() -> None:
-            if not worker.is_alive():
-                timer.stop()
-                self.show_unfinished(results[0] if results else ())
-
-        timer.timeout.connect(look)
-        timer.start()
-
-    def show_unfinished(self, found: tuple[Unfinished, ...]) -> None:
-        """Offer the sessions that were cut short."""
-        if found != self._shown:
-            self._shown = found
-            self._resume.clear()
-            for session in found:
-                self._resume.addItem(session.words, str(session.folder))
-                self._resume.setItemData(self._resume.count() - 1, str(session.folder), Qt.ItemDataRole.ToolTipRole)
-        self._unfinished.setVisible(bool(found))
+        self.cut_short.look_in(Path(self.form().folder or "."))
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
@@ -256,6 +229,10 @@ class NewSessionPage(QFrame):
                 self.language.addItem(name_of(code), code)
             self.language.setCurrentIndex(max(self.language.findData(before), 0))
 
+    def _speak(self) -> None:
+        """Let the subject's page speak the chosen language before there is a session."""
+        self._send(LanguageChosen(self.language.currentData() or ENGLISH))
+
     def _enrolled(self) -> None:
         refused = enrolled(self.form())
         self._show_study()
@@ -263,11 +240,6 @@ class NewSessionPage(QFrame):
         self.changed.emit()
         if refused:
             self.frames["Subject"].show_card(Card("Subject", ready=False, words=refused, field="subject"))
-
-    def _resumed(self) -> None:
-        folder = self._resume.currentData()
-        if folder:
-            self._send(ResumeSession(str(folder)))
 
     def _choose_protocol(self, at: int) -> None:
         if at != self.protocol.count() - 1:
@@ -302,12 +274,7 @@ class NewSessionPage(QFrame):
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.setSpacing(GRID)
         layout.addWidget(label("New session", "title"))
-        layout.addWidget(self._unfinished)
-        self._unfinished.setProperty("role", "banner")
-        self._unfinished.setProperty("grade", "look")
-        cut_short = QVBoxLayout(self._unfinished)
-        for widget in (label("▲ Sessions that were cut short", wrap=True), self._resume, self._go_on):
-            cut_short.addWidget(widget)
+        layout.addWidget(self.cut_short)
         self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         left, right = QVBoxLayout(), QVBoxLayout()
         for column in (left, right):
@@ -352,6 +319,7 @@ class NewSessionPage(QFrame):
         row.addStretch(1)
         layout.addLayout(row)
         layout.addWidget(self._people_words)
+        layout.addWidget(self._preview)
         layout.addWidget(self._pilot)
 
     def _build_subject(self, layout: QVBoxLayout) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
 from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.subject_texts import SubjectText as Text
 
 FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
@@ -19,7 +20,7 @@ class PressBar(Painted):
         """Start empty."""
         super().__init__(tokens)
         self._force = 0.0
-        self.setAccessibleName("how hard you press")
+        self.setAccessibleName(Text.PRESSING)
         self.setFixedHeight(round(6 * GRID * scale))
 
     def show_force(self, trace: LiveTrace) -> None:

@@ -18,6 +18,8 @@ from PySide6.QtWidgets import QAbstractSlider, QSizePolicy
 
 from daq_app.qt.tokens import Tokens
 from daq_app.window.answer import LEAP, STEP, Answer, Device
+from daq_app.window.subject_texts import SubjectText as Text
+from daq_app.window.subject_texts import Translate
 from sessions.plan.plan import Hand
 from sessions.run.steps import Scored
 
@@ -56,7 +58,8 @@ class ScoreLine(QAbstractSlider):
         self._ends = ("", "")
         self._ticks = 0
         self.setRange(0, 100)
-        self.setAccessibleName("line to answer on")
+        self._words: Translate = str
+        self._name()
         self.valueChanged.connect(self._moved)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_AcceptTouchEvents)
@@ -73,6 +76,11 @@ class ScoreLine(QAbstractSlider):
     def answer(self) -> Answer:
         """Return the answer so far."""
         return self._answer
+
+    def speak(self, words: Translate) -> None:
+        """Be named in another language to screen readers."""
+        self._words = words
+        self._name()
 
     def set_pixels_per_mm(self, pixels: float) -> None:
         """Be as long as `LENGTH` says on a screen with so many device-independent pixels a millimetre."""
@@ -180,13 +188,17 @@ class ScoreLine(QAbstractSlider):
         if answer is self._answer:
             return
         self._answer = answer
-        low, high = self._ends
-        self.setAccessibleName(f"line from {low} to {high}")
         self.setValue(round(answer.score or 0.0))
-        where = "no answer yet" if answer.score is None else f"answer at {answer.score:.0f} of 100"
-        self.setAccessibleDescription(f"{where}; arrow keys move it")
+        self._name()
         self.update()
         self.changed.emit()
+
+    def _name(self) -> None:
+        """Say to screen readers what the line is, and where the answer lies."""
+        (low, high), score = self._ends, self._answer.score
+        self.setAccessibleName(self._words(Text.LINE).format(low=low, high=high))
+        where = self._words(Text.UNANSWERED if score is None else Text.ANSWERED)
+        self.setAccessibleDescription(where if score is None else where.format(score=f"{score:.0f}"))
 
     @property
     def _mirrored(self) -> bool:

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 from PySide6.QtCore import QSettings
 from PySide6.QtGui import QScreen
 
+from daq_app.qt.score_line import LENGTH
+from sessions.recording import Setting
+
 LEAST, MOST = 40.0, 250.0  # what 100 mm may measure on a screen before it is taken for a slip of the hand [mm]
 PLAUSIBLE = (40.0, 600.0)  # dots an inch; a screen that says otherwise does not know its size
 USUAL_DPI = 96.0
@@ -63,3 +66,13 @@ def _key(screen: QScreen) -> str:
     name = "-".join(part for part in parts if part) or "screen"
     safe = "".join(c if c.isalnum() or c == "-" else "_" for c in name)
     return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
+
+
+def line_settings(screen: QScreen) -> tuple[Setting, ...]:
+    """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
+    shown = millimetres(screen)
+    origin = "measured" if shown.checked else "default"
+    return (
+        Setting("answer line length", LENGTH, "mm", origin),
+        Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
+    )

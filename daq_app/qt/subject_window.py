@@ -55,7 +55,7 @@ class SubjectWindow(QWidget):
         self._ways = QStackedWidget()
         for way in (self._scale, self.number, self.choice):
             self._ways.addWidget(way)
-        self.next = button("Next", "next: give this answer", self._give, "primary")
+        self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(tokens, scale)
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
@@ -143,6 +143,11 @@ class SubjectWindow(QWidget):
         words = translator(language)
         self.setLayoutDirection(direction(language))
         self.next.setText(words(Text.NEXT))
+        self.next.setAccessibleName(words(Text.NEXT))
+        self.line.speak(words)
+        self.number.field.setAccessibleName(words(Text.OWN_NUMBER))
+        self.choice.setAccessibleName(words(Text.OF_TWO))
+        self.press.setAccessibleName(words(Text.PRESSING))
         self.choice.set_words(words(Text.FIRST), words(Text.SECOND))
 
     def _begin(self, view: SubjectView) -> None:

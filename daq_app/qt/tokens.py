@@ -159,9 +159,9 @@ QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2
   font-size: {px(TITLE)}; min-height: {TARGET}px; padding: 8px 28px; }}
 QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
-QPushButton:checked {{ border: 2px solid {t.act}; font-weight: 600; }}
+QPushButton:checked {{ border: 2px solid {t.act}; }}
 QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {px(SMALL)}; background: transparent; border: none; }}
-QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; font-weight: 600; }}
+QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; }}
 QMenuBar, QMenu {{ background: {t.surface}; }}
 QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
 QMenu::item:disabled {{ color: {t.quiet}; }}

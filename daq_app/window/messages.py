@@ -69,5 +69,23 @@ class DrawingFailed:
     sentence: str
 
 
-Own = Tick | Searching | DevicesFound | Loaded | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed
+@dataclass(frozen=True, slots=True)
+class LanguageChosen:
+    """The language that the next session's subject reads was chosen."""
+
+    language: str
+
+
+Own = (
+    Tick
+    | Searching
+    | DevicesFound
+    | Loaded
+    | LifeKnown
+    | Judged
+    | Dismissed
+    | NewSession
+    | DrawingFailed
+    | LanguageChosen
+)
 Message = m.Request | m.Report | Own  # what `fold` takes

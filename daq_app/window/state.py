@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, replace
 from daq_app.recorder import messages as m
 from daq_app.window.bench_state import BenchState, bench_after
 from daq_app.window.course_state import SessionState, session_after, session_begun
-from daq_app.window.messages import Dismissed, DrawingFailed, Message, NewSession, Tick
+from daq_app.window.messages import Dismissed, DrawingFailed, LanguageChosen, Message, NewSession, Tick
+from sessions.plan.protocols.languages import ENGLISH
 
 _FROM_RECORDER = frozenset(m.REPORTS)
 
@@ -21,6 +22,7 @@ class AppState:
     failed: m.Failed | None = None  # the last request that could not be met
     gone: str | None = None  # why the recorder's process is not there any more
     drawing: str | None = None  # what could not be drawn
+    language: str = ENGLISH  # that the next session's subject reads, as it is chosen
 
 
 def fold(state: AppState, message: Message) -> AppState:
@@ -58,5 +60,7 @@ def _of_the_window(state: AppState, message: Message) -> AppState:
             return replace(state, failed=None, drawing=None)
         case DrawingFailed(sentence):
             return replace(state, drawing=sentence)
+        case LanguageChosen(language):
+            return replace(state, language=language)
         case _:
             return state

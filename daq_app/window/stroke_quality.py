@@ -58,6 +58,7 @@ ADVICE: Mapping[FlawName, str] = {
     FlawName.DEAD: "Connect the transducer again first.",
     FlawName.DRIFT: "Zero again, hands off.",
 }
+LEAVING = "pressed less than half as hard at the end"
 PRESS_ON = "Keep pressing until the end."
 PICTURE = ("N", "T", "mu", "speed")  # rows of a stroke's picture
 
@@ -89,6 +90,7 @@ class Quality:
     normal_force: float | None = None  # mean over the steady window [N]
     advice: str = ""  # what to do about the worst, one sentence
     picture: StrokePicture | None = None
+    redo: bool = False  # another stroke mends the worst
 
 
 def stroke_quality(
@@ -103,19 +105,21 @@ def stroke_quality(
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
     told = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in WORDS]
-    words = list(dict.fromkeys(_words(flaw) for flaw in told))
-    sentences = [flaw.sentence for flaw in told]
+    found = [(flaw.grade, _words(flaw), flaw.sentence, ADVICE.get(flaw.name, "")) for flaw in told]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
-        words.append("normal force fell by half")
-        sentences.append(f"The normal force ended at {100 * (1 - fell):.0f} % of what it was: the finger was leaving.")
-    advice = ADVICE.get(told[0].name, "") if told else PRESS_ON if words else ""
+        at_length = f"The normal force ended at {100 * (1 - fell):.0f} % of what it was: the finger was leaving."
+        refusals = sum(grade == "refused" for grade, *_ in found)
+        found.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
+    words = list(dict.fromkeys(short for _, short, _, _ in found))
+    sentences = [at_length for _, _, at_length, _ in found]
+    advice = found[0][3] if found else ""
     grades = {flaw.grade for flaw in told}
     grade = "refused" if "refused" in grades else "doubtful" if words else "good"
     if stroke is None:
         known = tuple(words) or (WORDS[FlawName.NO_STROKE],)
         advice = advice or ADVICE[FlawName.NO_STROKE]
-        return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice)
+        return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice, redo=True)
     return Quality(
         grade,
         tuple(words),
@@ -129,6 +133,7 @@ def stroke_quality(
         stroke.normal_force,
         advice,
         _picture(stroke),
+        bool(advice) and found[0][0] != "note",
     )
 
 

@@ -31,6 +31,13 @@ class SubjectText(StrEnum):
     NEXT = "Next"
     FIRST = "The first"
     SECOND = "The second"
+    # What a screen reader tells:
+    LINE = "Line from {low} to {high}"
+    UNANSWERED = "No answer yet. The arrow keys move the mark."
+    ANSWERED = "Answer at {score} of 100. The arrow keys move the mark."
+    OWN_NUMBER = "Your number, above 0"
+    OF_TWO = "Which of the two: 1 for the first, 2 for the second"
+    PRESSING = "How hard you press"
 
 
 def usual_question(descriptor: str) -> str:

@@ -48,6 +48,7 @@ class View:
     course: CourseView | None  # None: the page of a new session is shown
     bench: BenchView
     subject: SubjectView
+    mirror: SubjectView | None = None  # what of it the experimenter sees; None where no session is in hand
 
 
 def derive_view(state: AppState, translate: Translate = str) -> View:
@@ -63,7 +64,8 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
         banner=_banner(state),
         course=None if session is None else view_course.course_view(session, state.bench, state.now),
         bench=view_bench.bench_view(state.bench, recording=session is not None and not session.over),
-        subject=view_subject.subject_view(session, translate),
+        subject=view_subject.subject_view(session, translate, state.language),
+        mirror=None if session is None else view_subject.mirror_view(session, translate),
     )
 
 
@@ -77,7 +79,7 @@ def _lamp(state: AppState) -> Lamp:
         return Lamp("off", _ended_words(session), "")
     running = duration(state.now - session.begun)
     if session.saved is None:
-        return Lamp("off", f"starting {running}", "nothing saved yet")
+        return Lamp("off", f"starting {running}", "not saved yet")
     age = state.now - session.saved
     saved = f"saved {age:.1f} s ago"
     if age > UNSAVED or state.gone is not None:

@@ -33,11 +33,25 @@ class SubjectView:
         return self.kind != "read"
 
 
-def subject_view(session: SessionState | None, translate: Translate = str) -> SubjectView:
-    """Return what is shown to the subject now, in the language that `translate` makes of English."""
+def subject_view(session: SessionState | None, translate: Translate = str, language: str = ENGLISH) -> SubjectView:
+    """Return what is shown to the subject now, in the language that `translate` makes of English.
+
+    `language` is the code of the one that is chosen before there is a session, which has its own.
+    """
     if session is None:
-        return SubjectView("read", translate(Text.WELCOME), translate(Text.BEGINS))
+        return SubjectView("read", translate(Text.WELCOME), translate(Text.BEGINS), language=language)
     return replace(_Page(session, translate).view(), language=session.plan.language)
+
+
+def mirror_view(session: SessionState, translate: Translate = str) -> SubjectView:
+    """Return what the experimenter sees of the subject's page, without what the protocol keeps from the experimenter.
+
+    The bar of the force is left out too: in a picture that stands still it would show none.
+    """
+    plan = session.plan
+    kept = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
+    shown = replace(plan.shown, subject=tuple(one for one in plan.shown.subject if one not in kept))
+    return subject_view(replace(session, plan=replace(plan, shown=shown)), translate)
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,14 +89,14 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
 
 
 def verdict(quality: Quality) -> str:
-    """Return one verdict on a stroke: the worst flaw, then what to do.
+    """Return one verdict on a stroke: whether it is to be done again, the worst flaw, then what to do.
 
     >>> verdict(Quality("refused", ("pressed too lightly",), (), None, None, None, None, None, advice="Press harder."))
     'Redo: pressed too lightly. Press harder.'
     """
     if not quality.words:
         return "Good"
-    opening = "Redo" if quality.grade == "refused" else "Doubtful"
+    opening = "Redo" if quality.grade == "refused" or quality.redo else "Doubtful"
     return f"{opening}: {quality.words[0].rstrip('.')}. {quality.advice}".strip()
 
 

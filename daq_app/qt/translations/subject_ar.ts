@@ -91,5 +91,29 @@
         <source>The second</source>
         <translation>الثاني</translation>
     </message>
+    <message>
+        <source>Line from {low} to {high}</source>
+        <translation>خط من {low} إلى {high}</translation>
+    </message>
+    <message>
+        <source>No answer yet. The arrow keys move the mark.</source>
+        <translation>لا توجد إجابة بعد. تحرّك مفاتيح الأسهم العلامة.</translation>
+    </message>
+    <message>
+        <source>Answer at {score} of 100. The arrow keys move the mark.</source>
+        <translation>الإجابة عند {score} من 100. تحرّك مفاتيح الأسهم العلامة.</translation>
+    </message>
+    <message>
+        <source>Your number, above 0</source>
+        <translation>رقمك، أكبر من 0</translation>
+    </message>
+    <message>
+        <source>Which of the two: 1 for the first, 2 for the second</source>
+        <translation>أيّهما: 1 للأول و2 للثاني</translation>
+    </message>
+    <message>
+        <source>How hard you press</source>
+        <translation>مدى قوة ضغطك</translation>
+    </message>
 </context>
 </TS>

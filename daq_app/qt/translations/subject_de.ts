@@ -91,5 +91,29 @@
         <source>The second</source>
         <translation>Die zweite</translation>
     </message>
+    <message>
+        <source>Line from {low} to {high}</source>
+        <translation>Linie von {low} bis {high}</translation>
+    </message>
+    <message>
+        <source>No answer yet. The arrow keys move the mark.</source>
+        <translation>Noch keine Antwort. Die Pfeiltasten bewegen die Marke.</translation>
+    </message>
+    <message>
+        <source>Answer at {score} of 100. The arrow keys move the mark.</source>
+        <translation>Antwort bei {score} von 100. Die Pfeiltasten bewegen die Marke.</translation>
+    </message>
+    <message>
+        <source>Your number, above 0</source>
+        <translation>Ihre Zahl, größer als 0</translation>
+    </message>
+    <message>
+        <source>Which of the two: 1 for the first, 2 for the second</source>
+        <translation>Welche der beiden: 1 für die erste, 2 für die zweite</translation>
+    </message>
+    <message>
+        <source>How hard you press</source>
+        <translation>Wie fest Sie drücken</translation>
+    </message>
 </context>
 </TS>

@@ -91,5 +91,29 @@
         <source>The second</source>
         <translation>La seconde</translation>
     </message>
+    <message>
+        <source>Line from {low} to {high}</source>
+        <translation>Ligne de {low} à {high}</translation>
+    </message>
+    <message>
+        <source>No answer yet. The arrow keys move the mark.</source>
+        <translation>Pas encore de réponse. Les flèches du clavier déplacent la marque.</translation>
+    </message>
+    <message>
+        <source>Answer at {score} of 100. The arrow keys move the mark.</source>
+        <translation>Réponse à {score} sur 100. Les flèches du clavier déplacent la marque.</translation>
+    </message>
+    <message>
+        <source>Your number, above 0</source>
+        <translation>Votre nombre, supérieur à 0</translation>
+    </message>
+    <message>
+        <source>Which of the two: 1 for the first, 2 for the second</source>
+        <translation>Laquelle des deux : 1 pour la première, 2 pour la seconde</translation>
+    </message>
+    <message>
+        <source>How hard you press</source>
+        <translation>La force avec laquelle vous appuyez</translation>
+    </message>
 </context>
 </TS>

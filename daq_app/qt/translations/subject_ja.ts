@@ -91,5 +91,29 @@
         <source>The second</source>
         <translation>二つ目</translation>
     </message>
+    <message>
+        <source>Line from {low} to {high}</source>
+        <translation>{low}から{high}までの線</translation>
+    </message>
+    <message>
+        <source>No answer yet. The arrow keys move the mark.</source>
+        <translation>まだ回答がありません。矢印キーで印を動かします。</translation>
+    </message>
+    <message>
+        <source>Answer at {score} of 100. The arrow keys move the mark.</source>
+        <translation>100のうち{score}に回答しました。矢印キーで印を動かします。</translation>
+    </message>
+    <message>
+        <source>Your number, above 0</source>
+        <translation>0より大きい数</translation>
+    </message>
+    <message>
+        <source>Which of the two: 1 for the first, 2 for the second</source>
+        <translation>どちらですか。1つ目は1、2つ目は2</translation>
+    </message>
+    <message>
+        <source>How hard you press</source>
+        <translation>押している強さ</translation>
+    </message>
 </context>
 </TS>

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 
 import pytest
 from PySide6.QtCore import QPointF, Qt, QTranslator
-from PySide6.QtGui import QFont
+from PySide6.QtGui import QAccessible, QFont
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
@@ -17,6 +17,7 @@ from sessions.plan.protocols import protocol
 
 pytestmark = pytest.mark.qt
 OTHERS = ("de", "fr", "ja", "ar")
+NAMES = ("{number}", "{count}", "{code}", "{low}", "{high}", "{score}")
 
 
 @pytest.fixture
@@ -51,7 +52,7 @@ def test_each_file_has_every_text_and_what_qt_reads_is_what_a_translator_wrote(l
     assert read.load(str(languages.FOLDER / f"subject_{language}.qm"))
     for text, translation in written.items():
         assert read.translate(languages.CONTEXT, text) == translation
-        names = [name for name in ("{number}", "{count}", "{code}") if name in text]
+        names = [name for name in NAMES if name in text]
         assert all(name in translation for name in names)
 
 
@@ -110,3 +111,23 @@ def test_next_stays_at_the_answering_hand_in_every_language(shown):
 def test_a_character_that_no_font_draws_is_named():
     assert languages.missing_glyphs(["Hello, 5"], QFont()) == ""
     assert languages.missing_glyphs(["a \U000f0000 b"], QFont()) == "\U000f0000"
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(shown, language):
+    words = languages.translator(language)
+    page = shown(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
+    named = words(SubjectText.LINE).format(low="low", high="high")
+    said = QAccessible.queryAccessibleInterface(page.line)
+    assert said.role() == QAccessible.Role.Slider
+    assert said.text(QAccessible.Text.Name) == named
+    assert said.text(QAccessible.Text.Description) == words(SubjectText.UNANSWERED)
+    QTest.keyClick(page.line, Qt.Key.Key_End)
+    score = round(page.line.answer.score)
+    assert said.text(QAccessible.Text.Description) == words(SubjectText.ANSWERED).format(score=score)
+    assert page.next.accessibleName() == words(SubjectText.NEXT)
+    assert page.number.field.accessibleName() == words(SubjectText.OWN_NUMBER)
+    assert page.choice.accessibleName() == words(SubjectText.OF_TWO)
+    assert page.press.accessibleName() == words(SubjectText.PRESSING)
+    ours = {made.accessibleName() for made in (page.line, page.next, page.number.field, page.choice, page.press)}
+    assert not ours & {str(text) for text in SubjectText}

@@ -1,27 +1,46 @@
 """The windows can be read: contrast as it is painted, and no text cut off at any size of type."""
 
 import pytest
-from PySide6.QtGui import QColor
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QHeaderView,
     QLabel,
     QListWidget,
     QProgressBar,
+    QPushButton,
+    QRadioButton,
+    QStyle,
     QStyleFactory,
+    QStyleOptionButton,
+    QStyleOptionComboBox,
     QTableWidget,
     QTableWidgetItem,
     QTreeWidget,
+    QWidget,
 )
 
 from daq_app.qt import tokens
+from daq_app.qt.languages import translator
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.parts import Shortened
+from daq_app.qt.subject_preview import SubjectPreview
+from daq_app.qt.subject_window import SubjectWindow
+from daq_app.window.messages import Judged
+from daq_app.window.new_session import SessionForm
+from daq_app.window.preview import preview
+from daq_app.window.view import derive_view
+from sessions.plan.protocols import protocol, protocol_names
 from tests.daq_app.qt.test_window_for_everybody import contrast
+from tests.daq_app.session_messages import BAD, CLOSING, MOUNT, PAUSED, SCORE, after
 
 pytestmark = pytest.mark.qt
 PACE = 1.0  # no test here waits for a session
 SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
 SCALES = [1.0, 1.5, 2.0]
-TIGHTEST = [(SCREENS[0], SCALES[0]), (SCREENS[0], SCALES[-1])]  # where a label has least room
+ROUNDING = 2  # by which Qt's own size of a button may fall short of its text; its padding is wider [px]
+QUICK = [(SCREENS[0], SCALES[0], False), (SCREENS[0], SCALES[-1], True)]  # where a text has least room
 
 
 def painted_contrast(widget, box):
@@ -85,41 +104,147 @@ def test_the_progress_bar_can_be_read_empty_and_full(themed, part):
 
 
 def cut_off(window):
-    """Return the texts of labels that are shown smaller than their text needs."""
+    """Return every text of labels, buttons, drop-downs and heads of tables that has less room than it needs."""
     found = []
-    for shown in window.findChildren(QLabel):
-        if not shown.isVisible() or not shown.text() or isinstance(shown, Shortened):
-            continue
-        needed = shown.sizeHint().width() if not shown.wordWrap() else 0
-        high = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
-        if shown.width() < needed or shown.height() < high:
-            found.append((shown.text(), shown.size().toTuple(), (needed, high)))
+    for shown in window.findChildren(QWidget):
+        if shown.isVisible() and not isinstance(shown, Shortened):
+            found += [(text, room, needed) for text, room, needed in texts_of(shown) if text and is_less(room, needed)]
     return found
 
 
+def is_less(room, needed):
+    return any(has + ROUNDING < needs for has, needs in zip(room, needed, strict=True))
+
+
+def texts_of(shown):
+    """Return what is written in a widget: each text with the room that it has and that it needs [px]."""
+    if isinstance(shown, QLabel):
+        needed = shown.sizeHint().width() if not shown.wordWrap() else 0
+        high = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
+        return [(shown.text(), shown.size().toTuple(), (needed, high))]
+    if isinstance(shown, QPushButton | QCheckBox | QRadioButton):
+        option = QStyleOptionButton()
+        shown.initStyleOption(option)
+        element = {
+            QPushButton: QStyle.SubElement.SE_PushButtonContents,
+            QCheckBox: QStyle.SubElement.SE_CheckBoxContents,
+        }
+        kind = next(
+            (one for of, one in element.items() if isinstance(shown, of)), QStyle.SubElement.SE_RadioButtonContents
+        )
+        return [(shown.text(), shown.style().subElementRect(kind, option, shown).size().toTuple(), size_of(shown))]
+    if isinstance(shown, QComboBox) and not shown.isEditable():  # in one that is typed in a text moves along
+        option = QStyleOptionComboBox()
+        shown.initStyleOption(option)
+        field = QStyle.SubControl.SC_ComboBoxEditField
+        room = shown.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, shown).size().toTuple()
+        return [(shown.currentText(), room, size_of(shown, shown.currentText()))]
+    if isinstance(shown, QHeaderView) and shown.orientation() == Qt.Orientation.Horizontal:
+        model, sections = shown.model(), [at for at in range(shown.count()) if not shown.isSectionHidden(at)]
+        heads = [str(model.headerData(at, Qt.Orientation.Horizontal) or "") for at in sections]
+        return [
+            (text, (shown.sectionSize(at), shown.height()), size_of(shown, text))
+            for at, text in zip(sections, heads, strict=True)
+        ]
+    return []
+
+
+def size_of(shown, text=None):
+    """Return the width and height of a text as a widget writes it, without the ampersands of its keys."""
+    lines = (shown.text() if text is None else text).replace("&", "").split("\n")
+    metrics = shown.fontMetrics()
+    return max(metrics.horizontalAdvance(line) for line in lines), metrics.height() * len(lines)
+
+
+@pytest.fixture
+def windows(driver):
+    """Return a function that makes the experimenter's window in a theme and at a size of type."""
+    made, bridge = [], driver.window.bridge
+
+    def make(size, scale, theme):
+        window = MainWindow(bridge, theme, scale)
+        made.append(window)
+        window.setStyleSheet(tokens.style_sheet(theme, scale))
+        window.resize(*size)
+        window.show()
+        settle(driver.application)
+        assert (window.width(), window.height()) == size
+        return window
+
+    yield make
+    bridge.blockSignals(False)
+    for window in made:
+        bridge.changed.disconnect(window.show_view)
+        bridge.frame.disconnect(window._draw)
+        for one in (window.subject, window):
+            one.hide()
+            one.deleteLater()
+
+
+def settle(application):
+    for _ in range(5):
+        application.processEvents()
+
+
+@pytest.mark.parametrize(
+    ("size", "scale", "theme"),
+    [
+        pytest.param(
+            size,
+            scale,
+            theme,
+            marks=[] if (size, scale, theme.dark) in QUICK else pytest.mark.slow,
+            id=f"{size[0]}-{scale}-{name}",
+        )
+        for size in SCREENS
+        for scale in SCALES
+        for name, theme in (("light", tokens.LIGHT), ("dark", tokens.DARK))
+    ],
+)
+def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, size, scale, theme):
+    window = windows(size, scale, theme)
+    assert all(value.isVisible() for value in window.live.bar.values.values())
+    assert cut_off(window) == []
+    window.act("keys")
+    settle(driver.application)
+    assert cut_off(window.keys) == []
+    window.act("keys")
+    window.act("preview")
+    (shown,) = window.findChildren(SubjectPreview)
+    for row in range(shown.list.count()):
+        shown.list.setCurrentRow(row)
+        settle(driver.application)
+        assert cut_off(shown) == []
+    shown.close()
+    window.bridge.blockSignals(True)
+    window.live.toggle_hold()
+    for messages in (MOUNT, (*SCORE, Judged(1, 1, BAD)), PAUSED, CLOSING):
+        window.show_view(derive_view(after(*messages)))
+        settle(driver.application)
+        assert cut_off(window) == []
+        assert (window.width(), window.height()) == size
+
+
+@pytest.mark.parametrize("language", ["en", "de", "fr", "ja", "ar"])
 @pytest.mark.parametrize(
     ("size", "scale"),
     [
-        pytest.param(size, scale, marks=[] if (size, scale) in TIGHTEST else pytest.mark.slow)
+        pytest.param(size, scale, marks=[] if (size, scale) == (SCREENS[0], SCALES[-1]) else pytest.mark.slow)
         for size in SCREENS
         for scale in SCALES
     ],
 )
-def test_no_label_is_cut_off_and_every_live_number_is_there(driver, size, scale):
-    application = driver.application
-    window = MainWindow(driver.window.bridge, tokens.LIGHT, scale)
+def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, language):
+    window = SubjectWindow(tokens.LIGHT, scale, lambda: 0.0)
     window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
-    try:
-        window.resize(*size)
-        window.show()
-        for _ in range(3):
-            application.processEvents()
-        assert (window.width(), window.height()) == size
-        assert all(value.isVisible() for value in window.live.bar.values.values())
-        assert cut_off(window) == []
-    finally:
-        driver.window.bridge.changed.disconnect(window.show_view)
-        driver.window.bridge.frame.disconnect(window._draw)
-        window.hide()
-        window.deleteLater()
-        assert QColor(tokens.LIGHT.text).isValid()
+    window.resize(*size)
+    window.show()
+    for name in protocol_names():
+        form = SessionForm(protocol=name, language=language if language in protocol(name).languages else "")
+        for page in preview(form, translator(form.language or "en")):
+            window.show_view(page.view, None)
+            window.next.setVisible(page.view.asks)
+            settle(application)
+            assert cut_off(window) == [], page.name
+    window.hide()
+    window.deleteLater()

@@ -70,11 +70,11 @@ def test_a_search_that_finds_nothing_says_so_and_what_to_do(driver):
 
 def test_a_session_that_was_cut_short_is_offered_above_every_card(driver, tmp_path):
     page = driver.window.page
-    page.show_unfinished((Unfinished(tmp_path, "P03: 2 of 10 trials done"),))
+    page.cut_short.show_sessions((Unfinished(tmp_path, "P03: 2 of 10 trials done"),))
     driver.application.processEvents()
-    offer = page._go_on.mapTo(page, page._go_on.rect().bottomLeft()).y()
+    offer = page.cut_short.go_on.mapTo(page, page.cut_short.go_on.rect().bottomLeft()).y()
     assert all(frame.mapTo(page, frame.rect().topLeft()).y() > offer for frame in page.frames.values())
-    page.show_unfinished(())
+    page.cut_short.show_sessions(())
 
 
 @pytest.mark.usefixtures("application")

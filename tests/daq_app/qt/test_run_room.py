@@ -178,3 +178,25 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
         awaited = fed(20.0 + 60.0 * minute, 80.0 + 60.0 * minute)
     np.testing.assert_array_equal(awaited, drawn)
     panel.hide()
+
+
+def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
+    window, mirror = driver.window, driver.window.course.mirror
+    mirror.set_room(room=True)
+    begin(driver, "P37")
+    assert mirror.is_open
+    QTest.keyClick(window, Qt.Key.Key_Space)
+    driver.phase("scoring")
+    assert mirror.picture.isVisible()
+    assert mirror.picture.page._question.text() == window.subject._question.text()
+    before = mirror.picture.grab().toImage()
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    QTest.keyClick(window.subject.line, Qt.Key.Key_PageUp)
+    driver.application.processEvents()
+    assert window.subject.line.answered
+    assert not mirror.picture.page.line.answered
+    assert mirror.picture.grab().toImage() == before
+    click(mirror.tab)
+    assert not mirror.picture.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_V)
+    assert mirror.picture.isVisible()

@@ -55,6 +55,7 @@ def test_a_flawed_stroke_says_redo_its_worst_flaw_and_what_to_do():
     flawed = replace(BAD, advice="Slide further, at one speed.")
     assert verdict(flawed) == "Redo: no steady window. Slide further, at one speed."
     assert verdict(replace(flawed, grade="doubtful")).startswith("Doubtful: no steady window")
+    assert verdict(replace(flawed, grade="doubtful", redo=True)).startswith("Redo: no steady window. Slide")
 
 
 @pytest.mark.parametrize(

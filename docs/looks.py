@@ -1,0 +1,101 @@
+"""The page of the window's looks, made from its tokens: type, spacing, colours with their contrasts, and pictures."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from PySide6.QtGui import QColor
+from PySide6.QtWidgets import QApplication, QGridLayout, QLineEdit, QListWidget, QStyleFactory, QWidget
+
+from daq_app.qt import tokens
+from daq_app.qt.parts import button, label
+
+THEMES = {"light": tokens.LIGHT, "dark": tokens.DARK}
+PAIRS = (  # what is written on what
+    *((text, ground) for text in ("text", "quiet", "wrong", "look") for ground in ("ground", "surface", "raised")),
+    ("on_act", "act"),
+    ("surface", "wrong"),
+)
+
+
+def page() -> str:
+    """Return the page."""
+    sizes = {"small": tokens.SMALL, "text": tokens.TEXT, "title": tokens.TITLE, "headline": tokens.HEADLINE}
+    lines = [
+        "# Looks of the window",
+        "",
+        "Made from `daq_app/qt/tokens.py`. Sizes are in device-independent pixels.",
+        "",
+    ]
+    lines += _table(("type", "size at 100 %", "at 200 %"), [(n, f"{s}", f"{2 * s}") for n, s in sizes.items()])
+    lines += [f"Everything keeps to a grid of {tokens.GRID}. What is pressed is at least {tokens.TARGET} high.", ""]
+    fields = [field.name for field in dataclasses.fields(tokens.Tokens) if field.name != "dark"]
+    rows = [(name, *(f"`{getattr(theme, name)}`" for theme in THEMES.values())) for name in fields]
+    lines += ["## Colours", "", *_table(("token", *THEMES), rows)]
+    lines += [
+        "## Contrast",
+        "",
+        "Ratios as WCAG 2.1 has them. Text needs 4.5. A selected row is `on_act` on `act`.",
+        "",
+    ]
+    contrasts = [
+        (f"{a} on {b}", *(f"{contrast(getattr(t, a), getattr(t, b)):.1f}" for t in THEMES.values())) for a, b in PAIRS
+    ]
+    lines += _table(("written on", *THEMES), contrasts)
+    lines += ["## Pictures", "", *(f"![{name} theme](looks-{name}.png)\n" for name in THEMES)]
+    return "\n".join(lines)
+
+
+def contrast(first: str, second: str) -> float:
+    """Return the contrast ratio of two colours (WCAG 2.1), from 1 to 21.
+
+    >>> round(contrast("#000000", "#ffffff"), 6)
+    21.0
+    """
+    bright, dim = sorted((_luminance(first), _luminance(second)), reverse=True)
+    return (bright + 0.05) / (dim + 0.05)
+
+
+def write_pictures(folder: Path) -> None:
+    """Write a picture of the window's parts in each theme, made by the program's own style."""
+    held = QApplication.instance() or QApplication([])
+    for name, theme in THEMES.items():
+        shown = _parts()
+        shown.setStyle(QStyleFactory.create("Fusion"))
+        shown.setPalette(tokens.palette(theme))
+        shown.setStyleSheet(tokens.style_sheet(theme, 1.0))
+        shown.resize(640, 260)
+        shown.grab().save(str(folder / f"looks-{name}.png"))
+    del held
+
+
+def _parts() -> QWidget:
+    shown = QWidget()
+    shown.setObjectName("window")
+    grid = QGridLayout(shown)
+    for at, role in enumerate(("headline", "title", "value", "quiet")):
+        grid.addWidget(label(f"{role.capitalize()} 0123", role), at, 0)
+    grid.addWidget(button("Primary", "primary", lambda: None, "primary"), 0, 1)
+    grid.addWidget(button("Secondary", "secondary", lambda: None), 1, 1)
+    grid.addWidget(QLineEdit("typed"), 2, 1)
+    rows = QListWidget()
+    rows.addItems(["a row", "a selected row"])
+    rows.setCurrentRow(1)
+    grid.addWidget(rows, 3, 1)
+    for at, grade in enumerate(("wrong", "look")):
+        made = label(f"This is {grade}.", "value")
+        made.setProperty("grade", grade)
+        grid.addWidget(made, at + 1, 2)
+    return shown
+
+
+def _luminance(name: str) -> float:
+    parts = [channel / 255 for channel in (QColor(name).red(), QColor(name).green(), QColor(name).blue())]
+    linear = [c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    return [*(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows)), ""]

@@ -1,0 +1,89 @@
+"""The preview holds every page that a session shows the subject, and no page that it does not."""
+
+from dataclasses import replace
+
+import pytest
+
+from daq_app.window.new_session import Refused, SessionForm
+from daq_app.window.preview import preview
+from daq_app.window.view_subject import mirror_view, subject_view
+from sessions.plan.plan import Shown
+from sessions.plan.protocols import protocol, protocol_names
+from tests.daq_app.session_messages import PLAN, READY, after
+
+ANSWERS = {
+    "constant-stimuli": "choice",
+    "magnitude-estimation": "number",
+    "paired-comparison": "choice",
+    "sensotact-friction": "line",
+}
+
+
+@pytest.mark.parametrize("name", protocol_names())
+def test_every_text_that_a_protocol_gives_the_subject_is_on_a_page(name):
+    chosen = protocol(name)
+    pages = preview(SessionForm(protocol=name))
+    told = " ".join(f"{page.view.title} {page.view.text} {' '.join(page.view.ends)}" for page in pages)
+    for block in chosen.blocks:
+        assert block.instruction in told
+        assert block.question in told
+        assert all(end in told for end in block.scale_ends or ())
+    assert {page.view.kind for page in pages} == {"read", ANSWERS[name]}
+
+
+def test_pages_come_in_the_course_of_a_session_and_each_once():
+    names = [page.name for page in preview(SessionForm())]
+    assert names == [
+        "before the session",
+        "the surface is changed",
+        "stickiness: stroke",
+        "stickiness: answer",
+        "the finger is still on",
+        "slipperiness: stroke",
+        "slipperiness: answer",
+        "pause",
+        "an answer was given",
+        "end",
+    ]
+
+
+def test_rests_and_phases_before_are_pages_of_their_own():
+    assert "rest" in [page.name for page in preview(SessionForm(protocol="paired-comparison"))]
+    form = SessionForm(pre_evaluation=True, practice=True)
+    names = [page.name for page in preview(form)]
+    assert "stickiness, practice: stroke" in names
+    assert "stickiness, pre-evaluation: stroke" in names
+
+
+def test_pages_are_in_the_language_of_the_form():
+    pages = preview(SessionForm(language="de"), lambda text: f"*{text}")
+    german = protocol("sensotact-friction").in_language("de").blocks[0]
+    assert all(page.view.language == "de" for page in pages)
+    assert pages[0].view.title == "*Welcome"
+    (stroke,) = (page.view for page in pages if page.name == "stickiness: stroke")
+    assert german.instruction in stroke.text
+
+
+def test_whatever_else_is_wrong_with_the_form_its_pages_are_shown():
+    wrong = SessionForm(subject="Ada Lovelace", seed="many", height="high", folder="/dev/null", forces=True)
+    assert preview(wrong) == preview(SessionForm())
+
+
+def test_a_protocol_that_cannot_be_read_is_refused_in_a_sentence(tmp_path):
+    (tmp_path / "wrong.toml").write_text("name = ")
+    refused = preview(replace(SessionForm(), protocol=str(tmp_path / "wrong.toml")))
+    assert isinstance(refused, Refused)
+    assert "wrong.toml" in refused.sentences["protocol"]
+
+
+def test_the_mirror_keeps_what_the_protocol_keeps_from_the_experimenter():
+    subject = ("instruction", "trial count", "forces")
+    for experimenter, counted in ((("answer",), False), (("trial count", "forces"), True)):
+        plan = replace(PLAN, shown=Shown(subject, experimenter))
+        session = replace(after(*READY).session, plan=plan)
+        assert subject_view(session).force
+        assert "Surface 1 of 10." in subject_view(session).text
+        mirror = mirror_view(session)
+        assert not mirror.force
+        assert ("Surface 1 of 10." in mirror.text) is counted
+        assert mirror.title == subject_view(session).title
