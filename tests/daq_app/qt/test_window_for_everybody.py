@@ -296,7 +296,7 @@ def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
     line.begin(("not at all", "very"))
     told = QAccessible.queryAccessibleInterface(line)
     assert told.role() == QAccessible.Role.Slider
-    assert "no answer yet" in told.text(QAccessible.Text.Description)
+    assert "No answer yet" in told.text(QAccessible.Text.Description)
     assert not line.answered
     told.valueInterface().setCurrentValue(72)
     assert line.answer.score == 72.0
