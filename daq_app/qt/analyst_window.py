@@ -71,6 +71,7 @@ class AnalystWindow(QMainWindow):
         self.stroke.replayed.connect(self._replay_next)
         self.model = ModelColumn(tokens, font_scale())
         self.model.other_wanted.connect(self._choose_other)
+        self.model.said.connect(lambda sentence: self._words.show_whole(sentence))
         for column in (self.trials, self.stroke, self.model):
             column.asked.connect(self.ask)
         self.progress = QProgressBar()

@@ -21,7 +21,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.analyst.field_list import FIELD_CHOICES, ticks
+from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice, ticks
 from daq_app.analyst.frame import Frame, Parts
 from daq_app.analyst.probe import Line, probe_words
 from daq_app.analyst.viewport import View
@@ -187,15 +187,35 @@ class FingerCanvas(QWidget):
             self._kept.setDevicePixelRatio(ratio)
             self._kept.fill(Qt.GlobalColor.transparent)
             painter = QPainter(self._kept)
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            painter.setFont(font(SMALL, self._scale))
-            self._paint(painter)
+            self._paint_on(painter)
             painter.end()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._kept)
         if self.hasFocus():
             painter.setPen(QPen(QColor(self._tokens.act), 2))
             painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
+
+    @property
+    def frame(self) -> Frame | None:
+        """The state that is shown."""
+        return self._frame
+
+    @property
+    def field(self) -> FieldChoice:
+        """The field that is shown in colour."""
+        return self._look.field
+
+    def draw(self, painter: QPainter, head: str) -> None:
+        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it, "" for none."""
+        painter.fillRect(self.rect(), QColor(self._tokens.surface))
+        self._paint_on(painter)
+        painter.setPen(QColor(self._tokens.look))
+        painter.drawText(self._box(), int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop), f"{head} ")
+
+    def _paint_on(self, painter: QPainter) -> None:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(font(SMALL, self._scale))
+        self._paint(painter)
 
     def _probe(self) -> None:
         """Say what is under the pointer."""

@@ -1,8 +1,10 @@
 """What the model says of the chosen trial: its finger, its history, the pictures of the session, another session."""
 
+from pathlib import Path
+
 import numpy as np
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
@@ -15,6 +17,7 @@ from daq_app.qt.field_bar import OWN, FieldBar
 from daq_app.qt.field_plot import LINE, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
+from daq_app.qt.finger_pictures import FilmWriter, write_picture
 from daq_app.qt.parts import Shortened, Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
@@ -31,6 +34,7 @@ class ModelColumn(QWidget):
 
     asked = Signal(object)
     other_wanted = Signal()
+    said = Signal(str)  # what came of a picture or film that was written
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Show nothing yet."""
@@ -54,7 +58,9 @@ class ModelColumn(QWidget):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
-        self.save = SaveButtons("the finger", self._save)
+        self.film = button("Film", "save the history as a film (GIF)", self._ask_film, "small")
+        self._filming = False
+        self.save = SaveButtons("the finger", self._save_finger)
         self.player = TransportBar("the history", tells_time=False)
         self.player.moved.connect(self._moved)
         self.why = Wrapped("value", "look")
@@ -154,7 +160,8 @@ class ModelColumn(QWidget):
             parts, arcs = (NO_PARTS, np.empty(0)) if finger is None else (finger.parts, finger.arcs)
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
         field = self.fields.field
-        own = automatic_range(field, () if frame is None else (frame,))
+        frames = tuple(film.film.frames) if film is not None and self._filming else () if frame is None else (frame,)
+        own = automatic_range(field, frames)  # of a film that is written: the same for all of it
         common = common_range(state, field)
         ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
         look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
@@ -198,11 +205,49 @@ class ModelColumn(QWidget):
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"
         at = "" if self._film is None or self._at is None else f" {self._at}"  # of the history that is shown
-        drawn = self._name and self.fields.field.name == SED.name  # the figures of a report know no other field
-        self.save.set_name(f"{kind}{self._name}{at}" if drawn else "")
+        self.film.setEnabled(bool(self._name) and self._film is not None)
+        self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
 
     def _save(self, name: str, path: str) -> None:
         self.asked.emit(m.Write(f"picture {name}", path))
+
+    def _head(self) -> str:
+        """Return what every picture of the session is marked with."""
+        report = None if self._state is None else self._state.report
+        return "" if report is None else " · ".join(filter(None, (report.head, report.session)))
+
+    def _save_finger(self, name: str, path: str) -> None:
+        """Write the picture of the SED as the report draws it, and any other field as it is shown."""
+        if self.fields.field.name == SED.name:
+            self._save(name, path)
+            return
+        try:
+            write_picture(self.finger, self._head(), Path(path))
+        except OSError as error:
+            self.said.emit(f"{path} could not be written ({error.strerror}): choose another folder.")
+        else:
+            self.said.emit(f"Saved: {path}")
+
+    def _ask_film(self) -> None:
+        proposed = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
+        path, _ = QFileDialog.getSaveFileName(self, "Save the film as GIF", proposed)
+        if path:
+            self.write_film(Path(path if path.lower().endswith(".gif") else f"{path}.gif"))
+
+    def write_film(self, path: Path) -> FilmWriter:
+        """Begin to write the history that is shown as a film; `said` tells what came of it."""
+        assert self._film is not None
+        before, self._filming = self._at, True
+        writer = FilmWriter(self.finger, self._head(), self._moved, len(self._film.film.frames))
+
+        def ended(sentence: str) -> None:
+            self._filming, self._at = False, before
+            self._paint()
+            self.said.emit(sentence)
+
+        writer.ended.connect(ended)
+        writer.write(path)
+        return writer
 
     def _finger_page(self) -> QWidget:
         page = QWidget()
@@ -210,6 +255,9 @@ class ModelColumn(QWidget):
         for part in (self.near, self.mesh, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
+        course = QHBoxLayout()
+        course.addWidget(self.player, 1)
+        course.addWidget(self.film)
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.fields)
@@ -217,6 +265,6 @@ class ModelColumn(QWidget):
         layout.addWidget(self.probe)
         layout.addWidget(self.plot, 1)
         layout.addWidget(self.why)
-        layout.addWidget(self.player)
+        layout.addLayout(course)
         layout.addLayout(bar)
         return page

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyqtgraph
 import pytest
+from PIL import Image
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QWheelEvent
 from PySide6.QtTest import QTest
@@ -460,6 +461,53 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
     assert [(one.what, one.path) for one in written] == [
         ("picture course", f"out/picture.{ending}") for ending in ("svg", "png", "csv")
     ]
+
+
+def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simulated(window, monkeypatch, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    field, canvas = FIELD_CHOICES[-1], window.model.finger
+    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
+    for made in window.model.save.buttons:
+        made.click()
+        assert window._words.toolTip().startswith("Saved: ")
+    assert not any(isinstance(asked, m.Write) for asked in window._work.asked)
+    with Image.open(tmp_path / "u.png") as written:
+        assert written.size == (2 * canvas.width(), 2 * canvas.height())
+    assert "SIMULATED" in (tmp_path / "u.svg").read_text()
+    head, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
+    assert (head[:11], names) == ("# SIMULATED", f"x [mm],y [mm],{field.axis}")
+    shown = canvas.frame
+    table = np.array([line.split(",") for line in numbers], float)
+    np.testing.assert_allclose(table, np.column_stack([shown.nodes, field.of(shown)]), rtol=1e-8)
+    monkeypatch.setattr(
+        "daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
+    )
+    window.model.save.buttons[0].click()
+    assert window._words.toolTip().endswith("choose another folder.")
+    window.model.fields.which.setCurrentIndex(0)
+
+
+def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    ranges, show = set(), window.model._moved
+    window.model._moved = lambda at: (show(at), ranges.add(window.model.finger._look.range))
+    window.model.write_film(tmp_path / "film.gif")
+    until(application, lambda: "Saved" in window._words.toolTip())
+    window.model._moved = show
+    with Image.open(tmp_path / "film.gif") as written:
+        assert (written.n_frames, written.info["duration"]) == (4, 100)
+        assert written.size == (window.model.finger.width(), window.model.finger.height())
+    assert len(ranges) == 1
+    assert "Step 4 of 4" in window.model.finger.accessibleName()
+
+
+def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    writer = window.model.write_film(tmp_path / "film.gif")
+    writer._dialog.cancel()
+    until(application, lambda: "The film was cancelled" in window._words.toolTip())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_second_session_is_shown_beside_the_first(window):

@@ -1,0 +1,116 @@
+"""What the finger's picture shows, written to a file: one state as PNG, SVG or numbers, a history as a film."""
+
+import io
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from PySide6.QtCore import QBuffer, QObject, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QProgressDialog, QPushButton
+
+from daq_app.qt.finger_canvas import FingerCanvas
+from sessions.atomic_file import write_whole
+
+DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
+SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
+COLOURS = 256  # of a frame of a GIF: all that the format has
+
+
+def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
+    """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `head` stands over it. Raises OSError."""
+    match path.suffix.lower():
+        case ".csv":
+            frame, field = canvas.frame, canvas.field
+            rows = io.StringIO()
+            if frame is not None:
+                table = np.column_stack([frame.nodes, field.of(frame)])
+                rows.write(f"# {head}\n" if head else "")
+                np.savetxt(rows, table, "%.9g", ",", header=f"x [mm],y [mm],{field.axis}", comments="")
+            write_whole(path, rows.getvalue().encode())
+        case ".svg":
+            buffer, drawing = QBuffer(), QSvgGenerator()
+            drawing.setOutputDevice(buffer)
+            drawing.setSize(QSize(canvas.width(), canvas.height()))
+            drawing.setViewBox(QRect(0, 0, canvas.width(), canvas.height()))
+            drawing.setTitle(canvas.accessibleName())
+            _draw(canvas, QPainter(drawing), head)
+            write_whole(path, bytes(buffer.data().data()))
+        case _:
+            buffer = QBuffer()
+            _image(canvas, DENSITY, head).save(buffer, "PNG")  # pyright: ignore[reportCallIssue, reportArgumentType]
+            write_whole(path, bytes(buffer.data().data()))
+
+
+def _image(canvas: FingerCanvas, density: float, head: str) -> QImage:
+    image = QImage(round(canvas.width() * density), round(canvas.height() * density), QImage.Format.Format_RGB888)
+    image.setDevicePixelRatio(density)
+    _draw(canvas, QPainter(image), head)
+    return image
+
+
+def _draw(canvas: FingerCanvas, painter: QPainter, head: str) -> None:
+    canvas.draw(painter, head)
+    painter.end()
+
+
+class FilmWriter(QObject):
+    """Writes the states of a history as an animated GIF, one state at each turn of the event loop."""
+
+    ended = Signal(str)  # with a sentence: where it is, or why there is none
+
+    def __init__(self, canvas: FingerCanvas, head: str, show: Callable[[int], None], count: int) -> None:
+        """Take `count` states that `show` puts on `canvas`, with a `head` over them."""
+        super().__init__(canvas)
+        self._canvas, self._head, self._show, self._count = canvas, head, show, count
+        self._path = Path()
+        self._frames: list[Image.Image] = []
+        self._pool = ThreadPoolExecutor(1)
+        self._writing: Future[None] | None = None
+        self._dialog = QProgressDialog("Writing the film", "", 0, count + 1, canvas.window())
+        cancel = QPushButton("Cancel")
+        cancel.setAccessibleName("cancel the film")
+        self._dialog.setCancelButton(cancel)
+        self._dialog.setWindowModality(Qt.WindowModality.WindowModal)
+        self._dialog.setMinimumDuration(0)
+        self._timer = QTimer(self)
+        self._timer.timeout.connect(self._step)
+
+    def write(self, path: Path) -> None:
+        """Begin to write to `path`; `ended` follows."""
+        self._path = path
+        self._timer.start(0)
+
+    def _step(self) -> None:
+        if self._dialog.wasCanceled() and self._writing is None:
+            self._end(f"The film was cancelled: {self._path} was not written.")
+        elif len(self._frames) < self._count:
+            self._show(len(self._frames))
+            image = _image(self._canvas, 1.0, self._head)
+            size = (image.width(), image.height())
+            whole = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
+            self._frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE))
+            self._dialog.setValue(len(self._frames))
+        elif self._writing is None:
+            self._dialog.setCancelButton(None)
+            self._writing = self._pool.submit(_write_film, self._path, self._frames)
+        elif self._writing.done():
+            error = self._writing.exception()
+            self._end(f"Saved: {self._path}" if error is None else f"The film could not be written: {error}")
+
+    def _end(self, sentence: str) -> None:
+        self._timer.stop()
+        self._pool.shutdown(wait=False)
+        self._dialog.close()
+        self._dialog.deleteLater()
+        self.ended.emit(sentence)
+        self.deleteLater()
+
+
+def _write_film(path: Path, frames: list[Image.Image]) -> None:
+    content = io.BytesIO()
+    frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=SHOWN, loop=0)
+    write_whole(path, content.getvalue())
