@@ -3,7 +3,8 @@
 Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
 of 1 %, the lean of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
 
-Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [SET ...]]; 100 seeds by default.
+Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [FIRST [SET ...]]]; by default 100 seeds
+from 5000.
 """
 
 import sys
@@ -207,16 +208,14 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
 
 
 def main() -> None:
-    """Print a row for each set."""
-    seeds = range(5000, 5000 + int(sys.argv[1]) if len(sys.argv) > 1 else 5100)
-    print(f"{'':20s}" + "".join(f"{name:>12s} (withheld, off)" for name in NUMBERS) + "   static peaks")
-    for name in sys.argv[2:] or SETS:
-        found = coverage(SETS[name], seeds)
-        numbers = "".join(
-            f"{100 * found.held[n]:10.1f} % ({100 * found.withheld[n]:4.1f} %, {100 * found.errors[n]:+5.2f} %)"
-            for n in NUMBERS
-        )
-        print(f"{name:20s}{numbers}   {100 * found.false_peaks:6.1f} %", flush=True)
+    """Print a row for each set, as the documentation holds them."""
+    count, first = (int(sys.argv[1]) if len(sys.argv) > 1 else 100), (int(sys.argv[2]) if len(sys.argv) > 2 else 5000)
+    head = ("set", *(f"`{name}` (withheld)" for name in NUMBERS), "static peaks")
+    print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
+    for name in sys.argv[3:] or SETS:
+        found = coverage(SETS[name], range(first, first + count))
+        cells = [f"{100 * found.held[n]:.1f} % ({100 * found.withheld[n]:.1f} %)" for n in NUMBERS]
+        print("| " + " | ".join((name, *cells, f"{100 * found.false_peaks:.1f} %")) + " |", flush=True)
 
 
 if __name__ == "__main__":

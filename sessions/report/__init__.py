@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sessions.prediction import SessionPrediction
+from sessions.prediction import SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.series_slopes import other_signs
@@ -26,7 +26,7 @@ from sessions.report.contents import (
     TextFile,
     Trace,
 )
-from sessions.report.experiments import experiments, quantities, with_psychometric
+from sessions.report.experiments import experiments, quantities, with_psychometric, with_response
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Seds
@@ -62,6 +62,7 @@ class Further:
     firing: Sequence[Firing] = ()  # of each trial with a course
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
     firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
+    response: str = SED.name  # the quantity at the ending that is held against scores
     paths: Mapping[int, Seds] | None = None  # trial -> SED along many paths of the analysis
 
 
@@ -85,7 +86,9 @@ def findings(
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
-    judged = experiments(recording.plan, tables, quantities(predicted, found), more.paths, analysis.settings.area)
+    numbers = quantities(predicted, found)
+    judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area)
+    judged = with_response(judged, numbers, more.response)
     return Report(
         title=_title(recording),
         session=recording.folder.name,
@@ -104,6 +107,7 @@ def findings(
         fields=fields(prediction),
         planted=tuple(planted or ()),
         sealed=_sealed(recording, tables, predicted),
+        response=more.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
         modelled=modelled(prediction),
         left_out=left_out(prediction),
@@ -116,6 +120,7 @@ def findings(
             more.firing_settings,
             more.paths,
             [Path(table.session).name for table in tables[1:]],
+            more.response,
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,

@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
-from sessions.prediction import PredictionOptions, SessionPrediction, with_own_finger
+from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings
 from sessions.recording.reader import Recording
 from sessions.report.contents import TextFile
@@ -22,6 +22,7 @@ def session_commands(
     afferent: AfferentSettings | None = None,
     paths: Mapping[int, Seds] | None = None,
     scores: Sequence[str] = (),
+    response: str = SED.name,
 ) -> tuple[str, ...]:
     """Return the commands, to be typed where the session folders lie; `scores` are the names of further visits."""
     name = shlex.quote(recording.folder.name)
@@ -41,6 +42,8 @@ def session_commands(
         small = sum(path.kinematics == "small" for path in PATHS)
         finite = any(len(seds) > small for seds in paths.values())
         report += ["--paths", "finite"] if finite else ["--paths"]
+    if response != SED.name:
+        report += ["--quantity", response]
     if scores:
         report += ["--scores", *map(shlex.quote, scores)]
     return tuple(" ".join(["daq-app", *words]) for words in (*lines, report))

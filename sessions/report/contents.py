@@ -63,11 +63,12 @@ class Experiment:
     indices: tuple[int, ...]  # of its stimuli, rising
     scores: tuple[MeanScore, ...]
     answers: tuple[Answers, ...]
-    score_relation: Relation | None  # SED [MPa] against mean score; None where one of the two is missing
-    index_relation: Relation | None  # SED [MPa] against index
+    score_relation: Relation | None  # `response` [MPa or -] against mean score; None where one of the two is missing
+    index_relation: Relation | None  # `response` against index
     rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
     paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
     psychometric: Psychometric | None = None  # of comparisons with a standard, where the block has one
+    response: str = "sed"  # the quantity at the ending whose relations these are, one of `solver.quantities`
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,6 +237,7 @@ class Report:
     commands: tuple[str, ...]  # ... and what to type
     width: float | None  # of the finger [mm], where forces per mm met forces
     other_signs: tuple[str, ...] = ()  # where the SED goes another way on this finger than on the published one
+    response: str = "sed"  # the quantity at the ending that is held against scores, one of `solver.quantities`
     model: str = ""  # which model the SEDs are of, in a few words
     interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name

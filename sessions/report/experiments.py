@@ -126,9 +126,25 @@ def _experiment(
     )
 
 
-def _related(x: Mapping[int, float], seds: Mapping[int, float]) -> Relation | None:
-    """Return how the SEDs go with x, over the indices that have both; None where there is none."""
-    both = [index for index in x if index in seds]
+def with_response(found: Sequence[Experiment], numbers: Quantities, name: str) -> tuple[Experiment, ...]:
+    """Return the experiments with the relations of the quantity of that name; `numbers` are the `quantities`.
+
+    Rivals and paths stay those of the SED, the published quantity.
+    """
+    label = next((label for label, one in RESPONSES.items() if one == name), MODEL)
+    told: list[Experiment] = []
+    for one in found:
+        values = {index: value for (block, index), value in numbers[label].items() if block == one.name}
+        scores = {mean.index: mean.mean for mean in one.scores}
+        indices = {index: float(index) for index in one.indices}
+        related = _related(scores, values), _related(indices, values)
+        told.append(replace(one, response=name, score_relation=related[0], index_relation=related[1]))
+    return tuple(told)
+
+
+def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
+    """Return how responses go with x, over the indices that have both; None where there is none."""
+    both = [index for index in x if index in responses]
     if not both:
         return None
-    return relation([x[index] for index in both], [seds[index] for index in both], both)
+    return relation([x[index] for index in both], [responses[index] for index in both], both)

@@ -1,6 +1,7 @@
 """What a report says in sentences: its question and, in short, its answer."""
 
 from sessions.report import Experiment, Report
+from sessions.report.responses import ShownResponse, shown_response
 from sessions.report.robustness import robustness
 from sessions.report.tables.multiverse import paths_sentence
 from sessions.report.tables.psychometric import compared_with_standard, psychometric_sentences
@@ -36,9 +37,11 @@ def summary(report: Report) -> tuple[str, ...]:
     for judged in compared_with_standard(report):
         sentences += psychometric_sentences(judged)
     for experiment in report.experiments:
-        seds = [p.sed for p in report.predictions if p.experiment == experiment.name and p.sed is not None]
-        if seds:
-            sentences.append(_predicted(experiment, min(seds), max(seds), report.model.split(",")[0]))
+        shown = shown_response(report.response)
+        told = [shown.of(p) for p in report.predictions if p.experiment == experiment.name]
+        values = [shown.factor * one[0] for one in told if one is not None]
+        if values:
+            sentences.append(_predicted(experiment, shown, (min(values), max(values)), report.model.split(",")[0]))
             sentences += rivals_sentences(experiment.name, experiment.rivals)
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
@@ -63,14 +66,16 @@ def _strokes(report: Report) -> str:
     return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
 
 
-def _predicted(experiment: Experiment, low: float, high: float, strain: str) -> str:
-    """Return how prediction and score go together in one experiment."""
-    words = f"{_capital(experiment.name)}: the SED predicted{f' at {strain}' if strain else ''}"
+def _predicted(experiment: Experiment, shown: ShownResponse, ends: tuple[float, float], strain: str) -> str:
+    """Return how prediction and score go together in one experiment; `ends` are in the shown unit."""
+    low, high = ends
+    decimals, unit = (2, " kPa") if shown.unit == "kPa" else (shown.places, "")
+    words = f"{_capital(experiment.name)}: the {shown.label} predicted{f' at {strain}' if strain else ''}"
     if high > low:
-        words += f" runs from {digits(1e3 * low, 2)} to {digits(1e3 * high, 2)} kPa"
+        words += f" runs from {digits(low, decimals)} to {digits(high, decimals)}{unit}"
         words += f" (a range of {spread_share(low, high)})"
     else:
-        words += f" is {digits(1e3 * low, 2)} kPa"
+        words += f" is {digits(low, decimals)}{unit}"
     return words + related_words(experiment.score_relation) + "."
 
 

@@ -108,7 +108,8 @@ def spread_share(low: float, high: float) -> str:
     >>> spread_share(5.185, 5.3575)
     '3.3 %'
     """
-    return f"{significant(200 * (high - low) / (high + low), 2)} %"
+    middle = abs(high + low)
+    return f"{significant(200 * (high - low) / middle, 2)} %" if middle else "about 0"
 
 
 def direction(sign: int | None) -> str:

@@ -13,9 +13,13 @@ from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording, SessionWriter
-from sessions.report import Planted, findings
+from sessions.report import Further, Planted, findings
+from sessions.report.figures.relation import relation_panel
 from sessions.report.html import page
+from sessions.report.prose import summary
+from sessions.report.responses import shown_response
 from sessions.report.strokes import _extremes
+from sessions.report.tables.scores import relation_table
 from sessions.statistics.scores import Score, ScoreTable, score_table
 from sessions.strokes.analysis import analyse
 
@@ -170,6 +174,25 @@ def test_the_published_finding_comes_out_of_its_own_numbers(predicted):
     assert slippery.index_relation.pearson <= -0.85
     sed = {(p.experiment, p.index): p.sed for p in report.predictions}
     assert sed["slipperiness", 55] < sed["slipperiness", 75]  # because its measured mu is lower
+
+
+def test_another_quantity_than_the_sed_is_held_against_scores_in_figure_table_and_words(session):
+    recording, analysis, _ = session
+    prediction = predict(analysis, recording.plan)
+    report = findings(recording, analysis, prediction, further=Further(response="shear_along_skin"))
+    # The published friction alone fixes the sign: the shear along the skin rises with stickiness, and it falls with
+    # slipperiness (docs/explanation/which-response.md, from another mesh).
+    sticky, slippery = report.experiments
+    assert sticky.index_relation.pearson >= 0.95
+    assert slippery.index_relation.pearson <= -0.8
+    given = {row.trial: row.prediction.responses["shear_along_skin"].value for row in prediction.trials}
+    shown = shown_response("shear_along_skin")
+    assert [shown.of(one)[0] for one in report.predictions] == [given[one.trial] for one in report.predictions]
+    assert any("shear along the skin predicted" in sentence for sentence in summary(report))
+    assert "shear along the skin" in relation_table(report).caption
+    assert any("--quantity shear_along_skin" in line for line in report.commands)
+    panel = relation_panel(sticky, [one for one in report.predictions if one.experiment == sticky.name], simulated=True)
+    assert panel is None or "shear along the skin [-]" in panel.header
 
 
 def test_the_finger_of_each_experiment_lies_on_the_surface_and_is_pressed_where_it_touches(predicted):

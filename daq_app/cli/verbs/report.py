@@ -14,7 +14,7 @@ from daq_app.cli.model_option import add_paths
 from daq_app.console import Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
-from sessions.prediction import PredictionOptions, Progress, SessionPrediction
+from sessions.prediction import QUANTITIES, SED, PredictionOptions, Progress, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
@@ -25,6 +25,7 @@ from sessions.report.predictions import afferent_facts
 from sessions.statistics.multiverse import trial_paths
 
 PAGE = "report.html"
+NAMES = [quantity.name for quantity in QUANTITIES]
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
 
 
@@ -49,6 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--afferent",
         action="store_true",
         help="also firing rates of an SA-II afferent: an illustration (or where it was kept before)",
+    )
+    parser.add_argument(
+        "--quantity",
+        choices=NAMES,
+        default=SED.name,
+        metavar="NAME",
+        help=f"of the ending, to hold against scores in place of the SED: {', '.join(NAMES)}",
     )
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_area(parser)
@@ -117,4 +125,4 @@ def _further(
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         paths = trial_paths(recording, prediction, shown("many paths of the analysis"), finite=finite)
-    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, paths)
+    return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, options.quantity, paths)

@@ -12,6 +12,7 @@ from sessions.report.figures.responses import response_panel
 from sessions.report.figures.scores import score_panel
 from sessions.report.figures.strokes import friction_panel, speed_panel
 from sessions.report.figures.style import Panel, Plate, look
+from sessions.report.responses import shown_response
 
 __all__ = ["Panel", "Plate", "picture", "plates"]
 
@@ -104,10 +105,11 @@ def _responses(report: Report) -> Plate:
 
 
 def _relations(report: Report) -> Plate:
+    label = shown_response(report.response).label
     caption = (
-        "Predicted SED against mean score; each point is a stimulus with its index. Across: 95 % t interval. Upright: "
-        "error of each SED from the mesh, which all share. Line: least squares. r: Pearson's, interval by Fisher's z. "
-        f"Range: greatest less least, and its share of their middle. Beside it: from 0.{_model(report)}"
+        f"Predicted {label} against mean score; each point is a stimulus with its index. Across: 95 % t interval. "
+        f"Upright: error of each {label} from the mesh, which all share. Line: least squares. r: Pearson's, interval "
+        f"by Fisher's z. Range: greatest less least, and its share of their middle. Beside it: from 0.{_model(report)}"
     )
     panels = [
         relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from sessions.report import Report
+from sessions.report.responses import shown_response
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, table
 from sessions.report.wording import NONE, correlation, digits, identifier, places, significant
 from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
@@ -62,21 +63,22 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
 
 
 def relation_table(report: Report) -> Table | None:
-    """Return how the predicted SED goes with mean scores and with the indices."""
+    """Return how the predicted quantity goes with mean scores and with the indices."""
+    shown = shown_response(report.response)
     notes = Notes()
     groups: list[Group] = []
     for e in report.experiments:
         related = [("mean score", e.score_relation), ("index", e.index_relation)]
         groups.append(Group(e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
     columns = (
-        "SED against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
-        "exact p of rho | slope [Pa a point] | r without one"
+        f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
+        f"exact p of rho | slope [{shown.step} a point] | r without one"
     )
     caption = (
-        f"Relation of the predicted SED ({report.model}) to scores and to the stimuli's indices. The forces are those "
-        "of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright (2000). p: two-sided, "
-        "counted over all orders. Slope: of the SED on the score or index, over its t interval. Last column: r when "
-        "the stimulus of that index is left out."
+        f"Relation of the predicted {shown.label} ({report.model}) to scores and to the stimuli's indices. "
+        "The forces are those of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright "
+        "(2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its t interval. "
+        "Last column: r when the stimulus of that index is left out."
     )
     return table("table-relation", caption, columns, groups, notes)
 

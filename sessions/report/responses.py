@@ -1,0 +1,49 @@
+"""How a quantity at the ending is told: its label, and its numbers in the unit that people read."""
+
+import math
+from dataclasses import dataclass
+
+from sessions.prediction import QUANTITIES, SED
+from sessions.report.contents import Numbers, PredictionFinding
+from sessions.report.wording import digits
+
+
+@dataclass(frozen=True, slots=True)
+class ShownResponse:
+    """One of `solver.quantities` as pages and figures show it."""
+
+    name: str
+    label: str
+    kept_unit: str  # of the numbers in files: "MPa", or "-" for a strain
+    unit: str  # of the numbers shown: "kPa", or "1"
+    factor: float  # a number shown by one kept
+    places: int  # decimals of a number shown
+    step: str  # unit of a slope on scores or indices, which is a millionth of the kept one
+
+    def told(self, shown: float) -> str:
+        """Return a number of the shown unit with that unit.
+
+        >>> shown_response("sed").told(9.5528), shown_response("shear_along_skin").told(-0.25)
+        ('9.553 kPa', '−0.2500')
+        """
+        return digits(shown, self.places) + ("" if self.unit == "1" else f" {self.unit}")
+
+    def of(self, prediction: PredictionFinding) -> Numbers | None:
+        """Return a prediction's number in the kept unit, and its error where it has one; None without one."""
+        if self.name == SED.name:
+            error = prediction.error_estimate
+            if prediction.sed is None:
+                return None
+            return (prediction.sed,) if error is None else (prediction.sed, abs(prediction.sed) * error)
+        if self.name not in prediction.responses:
+            return None
+        value, error = prediction.responses[self.name]
+        return (value, error) if math.isfinite(error) else (value,)
+
+
+def shown_response(name: str) -> ShownResponse:
+    """Return how the quantity of that name is told; the names are those of `solver.quantities`."""
+    one = next(quantity for quantity in QUANTITIES if quantity.name == name)
+    if one.unit == "MPa":
+        return ShownResponse(one.name, one.label, "MPa", "kPa", 1e3, 3, "Pa")
+    return ShownResponse(one.name, one.label, one.unit, "1", 1.0, 4, "10⁻⁶")
