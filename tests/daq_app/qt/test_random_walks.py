@@ -144,11 +144,17 @@ class Walk:
         return what
 
     def plug(self):
-        """Connect the simulated bench where nothing is connected or being connected; return whether one is."""
-        link = self.driver.state.bench.link
-        if link == "none":
+        """Connect the simulated bench where nothing is connected or being connected, in place of any other."""
+        bench = self.driver.state.bench
+        if bench.link == "none":
             self.window.bridge.send(Connect("sim:?rate=100"))
-        return link == "open"
+        elif bench.link == "open" and not bench.info.simulated:
+            self.window.bridge.send(Disconnect())
+
+    def plugged(self):
+        """Return whether the simulated bench is connected and no session is in hand."""
+        bench = self.driver.state.bench
+        return self.driver.session is None and bench.link == "open" and bench.info.simulated
 
     # ---- what must hold
 
@@ -194,11 +200,14 @@ class Walk:
         window.setFocus()
         window.act("go to run" if driver.session is not None else "go to prepare")
         deadline = time.monotonic() + 3 * LONGEST
-        while driver.session is not None:
-            what = f"{driver.session.phase}, {window.to_do.sentence.text()!r}, {driver.view.banner}"
+        while not self.plugged():  # a session that was asked for may begin meanwhile
+            session = driver.session
+            what = f"{session and session.phase}, {window.to_do.sentence.text()!r}, {driver.view.banner}"
             assert time.monotonic() < deadline, f"seed {self.seed}, after {self.steps[-12:]}: {what}"
-            if driver.session.over:
-                if driver.session.end is not None and driver.session.sealing == "running":
+            if session is None:
+                self.plug()
+            elif session.over:
+                if session.end is not None and session.sealing == "running":
                     driver.until(lambda: driver.session.sealing != "running", "the seal")
                 window.bridge.send(NewSession())
             elif window.course.end.isEnabled() and not window.course.asking:
@@ -209,10 +218,6 @@ class Walk:
             time.sleep(0.01)
         self.good_form()
         window.page.with_forces.setChecked(True)
-        driver.until(lambda: driver.state.bench.link != "lost", "the end of the link")
-        if driver.state.bench.link == "open" and not driver.state.bench.info.simulated:
-            window.bridge.send(Disconnect())
-        driver.until(self.plug, "the simulated bench")
         driver.until(window.to_do.primary.isEnabled, "Start")
 
 
