@@ -71,7 +71,7 @@ class AnalystWindow(QMainWindow):
         self.stroke.replayed.connect(self._replay_next)
         self.model = ModelColumn(tokens, font_scale())
         self.model.other_wanted.connect(self._choose_other)
-        self.model.said.connect(lambda sentence: self._words.show_whole(sentence))
+        self.model.said.connect(self._say)
         for column in (self.trials, self.stroke, self.model):
             column.asked.connect(self.ask)
         self.progress = QProgressBar()
@@ -212,6 +212,9 @@ class AnalystWindow(QMainWindow):
         if self.state.row + 1 < len(rows(self.state)):
             self.stroke.play()
             self.ask(m.Choose(self.state.row + 1))
+
+    def _say(self, sentence: str) -> None:
+        self._words.show_whole(sentence)
 
     def _show(self) -> None:
         state = self.state
