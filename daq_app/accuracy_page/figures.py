@@ -69,22 +69,23 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     drawn = sheet(*SQUARE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
-    for method in dict.fromkeys(row.method for row in rows):
-        points = [(r.judged_error, getattr(r, time), r) for r in rows if r.method == method]
+    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+        points = [(r.judged_error, getattr(r, time), r) for r in rows if r.kinematics == kinematics]
         known = [(error, 1e3 * span, r) for error, span, r in points if error is not None and span is not None]
         if not known:
             continue
-        kinematics = known[0][2].kinematics
         colour, mark = COLOURS[kinematics], MARKS[kinematics]
         axes.plot([100 * e for e, _, _ in known], [s for _, s, _ in known], color=colour, linewidth=0.8)
         for error, span, row in known:
-            words = f"{row.method}: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"
+            words = f"{kinematics} strain: {row.dofs} unknowns, {100 * error:.2g} %, {span:.3g} ms"
             face = "white" if error < 3.0 * doubt[row.kinematics] else colour
             gid = drawn.note(words)
             axes.plot(100 * error, span, mark, color=colour, markerfacecolor=face, markersize=4.5, gid=gid)
-            table.append((row.method, row.element, row.order, row.linear_solver, row.dofs, error, 1e-3 * span))
+            table.append((kinematics, row.dofs, error, 1e-3 * span))
         error, span, row = known[-1]
-        axes.annotate(method, (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour)
+        axes.annotate(
+            f"{kinematics} strain", (100 * error, span), xytext=(4, 5), textcoords="offset points", color=colour
+        )
     if not table:
         return None
     _logarithmic(axes)

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Kind = TypeVar("Kind")
+Row = TypeVar("Row")
 # Processor time of the thread that works: on a quiet machine the time that passes, and on a busy one still the solver's
 # own. Where the system counts it too coarsely, the time that passes.
 PROCESSOR_TIME = get_clock_info("thread_time").resolution <= 1e-6
@@ -76,11 +77,13 @@ def timed(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> 
     return median(spans)
 
 
-def within(asked: Asked, work: Iterable[Kind], what: str) -> Iterator[Kind | LeftOut]:
-    """Yield the items of `work`, one at least, until time is over; then say that the rest of `what` was left out."""
+def rows_within(
+    asked: Asked, work: Iterable[Kind], what: str, rows: Callable[[Kind], Iterable[Row]]
+) -> Iterator[Row | LeftOut]:
+    """Yield the `rows` of each item of `work`, of one at least, until time is over; then that the rest is left out."""
     items = list(work)
     for number, item in enumerate(items):
         if number and asked.left <= 0.0:
             yield LeftOut(f"Time was over after {number} of {len(items)} {what}.")
             return
-        yield item
+        yield from rows(item)

@@ -13,7 +13,7 @@ from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
 from solver.scene import Scene, Solve
-from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import random_scene
 from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
@@ -81,10 +81,10 @@ def measure(asked: Asked, found: Found) -> Iterator[Estimate | Guaranteed | Left
 def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[Estimate | Guaranteed | LeftOut]:
     truths = known(found, kinematics)
     chosen = [scene for scene in cases(kinematics) if scene.title in truths]
-    for tolerance in within(asked, asked.pick(TOLERANCES, TOLERANCES[:1]), f"tolerances at {kinematics} strain"):
-        if isinstance(tolerance, LeftOut) or not chosen:
-            yield tolerance if isinstance(tolerance, LeftOut) else LeftOut(f"No truth is known at {kinematics} strain.")
-            return
+    if not chosen:
+        return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
+
+    def rows_at(tolerance: float) -> Iterator[Estimate | Guaranteed]:
         begun = clock()
         found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         took = clock() - begun
@@ -101,21 +101,25 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
             )  # fmt: skip
 
+    tolerances = asked.pick(TOLERANCES, TOLERANCES[:1])
+    return rows_within(asked, tolerances, f"tolerances at {kinematics} strain", rows_at)
+
 
 def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
     wanted = 2 if asked.quick else RANDOM[kinematics]
     refused = 0
-    for number in within(asked, range(wanted), f"random scenes at {kinematics} strain"):
-        if isinstance(number, LeftOut):
-            yield number
-            break
+
+    def rows_of(number: int) -> Iterator[Estimate]:
+        nonlocal refused
         scene = random_scene(number, kinematics)
         (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
         truth = _truth(scene)
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1
-            continue
-        yield from compared(answer, TOLERANCES[0], *truth)
+        else:
+            yield from compared(answer, TOLERANCES[0], *truth)
+
+    yield from rows_within(asked, range(wanted), f"random scenes at {kinematics} strain", rows_of)
     if refused:
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 

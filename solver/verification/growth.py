@@ -7,7 +7,7 @@ from math import log
 from statistics import median
 
 from solver.verification.asked import Asked, Found, LeftOut
-from solver.verification.methods import METHODS
+from solver.verification.methods import MESHED
 from solver.verification.truth import cases
 
 MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
@@ -30,8 +30,8 @@ class Growth:
 def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
     """Yield a row for each kinematics and mesh, until the next would take too long."""
     del found
-    for method in METHODS:
-        scene = cases(method.kinematics)[0]
+    for kinematics, meshed in MESHED.items():
+        scene = cases(kinematics)[0]
         last: Growth | None = None
         for fineness in asked.pick(MESHES, QUICK):
             if last is not None and not asked.quick:
@@ -39,13 +39,13 @@ def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
                 awaited = (last.setup_s + 5.0 * last.floor_s) * (larger / last.dofs) ** 2.2
                 if awaited > SHARE * asked.left:
                     yield LeftOut(
-                        f"Growth at {method.kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
+                        f"Growth at {kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
                     )
                     break
-            mesh = method.meshed(scene, fineness, False)
+            mesh = meshed(scene, fineness, False)
             mesh.floor()  # the first is given new memory, which takes as long as the work, and longer on large meshes
             floor = median(mesh.floor() for _ in range(5 if mesh.dofs < 20000 else 3))
-            last = Growth(method.kinematics, fineness, mesh.dofs, mesh.setup_s, floor)
+            last = Growth(kinematics, fineness, mesh.dofs, mesh.setup_s, floor)
             yield last
 
 

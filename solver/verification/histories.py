@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from solver.equilibrium.march import march, press_and_slide
 from solver.scene import Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, timed, within
-from solver.verification.methods import FiniteMeshed, Kinematics, SmallMeshed
-from solver.verification.truth import JUDGED, cases
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
+from solver.verification.methods import MESHED, Kinematics
+from solver.verification.truth import JUDGED, KINEMATICS, cases
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]
 FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
@@ -26,26 +26,16 @@ class Marched:
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Marched | LeftOut]:
-    """Yield a row a surface and kinematics."""
+    """Return an iterator over a row a surface and kinematics."""
     del found
     names = ("slipperiness 100", "stickiness 0") if asked.quick else JUDGED
-    scenes = [s for kind in ("small", "finite") for s in cases(kind) if s.title in names]
-    for scene in within(asked, scenes, "courses of 200 substeps"):
-        if isinstance(scene, LeftOut):
-            yield scene
-        else:
-            yield _small(scene) if scene.solve.kinematics == "small" else _finite(scene)
+    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
+    return rows_within(asked, scenes, "courses of 200 substeps", lambda scene: [_marched(scene)])
 
 
-def _small(scene: Scene) -> Marched:
-    return _marched(scene, SmallMeshed(scene, FINENESS["small"], False))
-
-
-def _finite(scene: Scene) -> Marched:
-    return _marched(scene, FiniteMeshed(scene, FINENESS["finite"], False))
-
-
-def _marched(scene: Scene, mesh: SmallMeshed | FiniteMeshed) -> Marched:
+def _marched(scene: Scene) -> Marched:
+    kind = scene.solve.kinematics
+    mesh = MESHED[kind](scene, FINENESS[kind], False)
     friction, loading = scene.friction, scene.loading
     course = press_and_slide(
         loading.depth, float(friction.mu), friction.cap, loading.direction,
@@ -57,4 +47,4 @@ def _marched(scene: Scene, mesh: SmallMeshed | FiniteMeshed) -> Marched:
     sed = float(mesh.numbers(last)[0])
     took = mesh.prepared_s + clock() - begun
     off = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
-    return Marched(scene.solve.kinematics, scene.title, mesh.dofs, mesh.prepared_s + span, took, off)
+    return Marched(kind, scene.title, mesh.dofs, mesh.prepared_s + span, took, off)

@@ -3,7 +3,6 @@
 import datetime
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import isfinite
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -64,12 +63,11 @@ class Measured:
         rows = {
             name: [{"kind": type(row).__name__, **asdict(row)} for row in found] for name, found in self.rows.items()
         }
-        return _plain(
-            {
-                "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
-                "left_out": list(self.left_out), **rows,
-            }
-        )  # fmt: skip
+        whole = {
+            "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
+            "left_out": self.left_out, **rows,
+        }  # fmt: skip
+        return msgspec.json.decode(msgspec.json.encode(whole))
 
 
 def restored(document: dict[str, Any]) -> Measured:
@@ -143,13 +141,3 @@ def loaded(progress: Progress) -> None:
 
 def _share(subject: Subject, quick: bool) -> float:
     return subject.quick_share if quick else subject.share
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401  whatever JSON may hold
-    if isinstance(value, dict):
-        return {str(name): _plain(item) for name, item in value.items()}  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    return value

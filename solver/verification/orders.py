@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.published import contacts, locking
 
 Errors = Sequence[float]
+Size = TypeVar("Size", int, float)
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,14 +47,10 @@ def slope(sizes: Errors, errors: Errors) -> float:
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Order | LeftOut]:
-    """Yield a row for each quantity, until time is over."""
+    """Return an iterator over a row for each quantity, until time is over."""
     del found
     works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, pressed]
-    for work in within(asked, works, "problems whose order is observed"):
-        if isinstance(work, LeftOut):
-            yield work
-        else:
-            yield from work(asked.quick)
+    return rows_within(asked, works, "problems whose order is observed", lambda work: work(asked.quick))
 
 
 def _row(
@@ -66,12 +65,7 @@ def cylinders(quick: bool) -> Iterator[Order]:
     """Yield thick cylinders under inner pressure, distorted meshes: displacement 3, stress 2, energy 4, at any nu."""
     sizes = (1 / 16, 1 / 32) if quick else (1 / 8, 1 / 16, 1 / 32)
     for nu in (0.3, 0.4999999):
-        errors: list[tuple[float, ...]] = []
-        took: list[float] = []
-        for size in sizes:
-            begun = clock()
-            errors.append(locking.cylinder_errors(nu, round(1 / size)))
-            took.append(clock() - begun)
+        errors, took = _each(sizes, lambda size, nu=nu: locking.cylinder_errors(nu, round(1 / size)))
         for (quantity, least), column in zip(
             (("displacement", 2.9), ("stress", 1.9), ("energy", 3.7)), zip(*errors, strict=True), strict=True
         ):
@@ -84,12 +78,7 @@ def membranes(quick: bool) -> Iterator[Order]:
     The error of a mesh is what the next one, half as wide, adds to the displacement.
     """
     counts = (4, 8, 16, 32) if quick else (4, 8, 16, 32, 64)
-    risen: list[float] = []
-    took: list[float] = []
-    for count in counts:
-        begun = clock()
-        risen.append(locking.cook(240.565, 0.4999, 100.0, count)[0])
-        took.append(clock() - begun)
+    risen, took = _each(counts, lambda count: locking.cook(240.565, 0.4999, 100.0, count)[0])
     gained = np.diff(risen) / risen[-1]
     sizes = [1 / count for count in counts[:-1]]
     yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, gained.tolist(), took[:-1], 0.9)
@@ -99,21 +88,17 @@ def pressed(quick: bool) -> Iterator[Order]:
     """Yield the force on a half-plane under a round body: order 2, root mean square over meshes of nearly one size."""
     sizes = (0.4, 0.2, 0.1) if quick else (0.4, 0.2, 0.1, 0.05)
     true = float(np.mean([contacts.press(0.025 * s, 0.4999) for s in (1.0, 1.1)]))
-    errors: list[float] = []
-    took: list[float] = []
-    for size in sizes:
-        begun = clock()
-        errors.append(_rms([contacts.press(size * s, 0.4999) / true - 1 for s in np.linspace(0.9, 1.1, 4).tolist()]))
-        took.append((clock() - begun) / 4)
-    yield _row("half-plane under a round body", "force", "small", sizes, errors, took, 1.7)
+    near = np.linspace(0.9, 1.1, 4).tolist()
+    errors, took = _each(sizes, lambda size: _rms([contacts.press(size * s, 0.4999) / true - 1 for s in near]))
+    yield _row("half-plane under a round body", "force", "small", sizes, errors, [t / len(near) for t in took], 1.7)
 
 
 def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
 
     def sed(asked: Scene, fineness: float, shift: bool) -> float:
-        model = LinearFinger.of(asked, Sizing(fineness, 2.0, shift))
-        return float(model.numbers([settled(asked, model)])[0, 0])
+        finger = LinearFinger.of(asked, Sizing(fineness, 2.0, shift))
+        return float(finger.numbers([settled(asked, finger)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
     for surface in (STICKINESS[0], STICKINESS[4]):
@@ -137,15 +122,23 @@ def _finger(
     title: str, kinematics: str, sed: Callable[[float, bool], float], overkill: float, meshes: Errors, least: float
 ) -> Order:
     true = float(np.mean([sed(overkill, shift) for shift in (False, True)]))
-    errors: list[float] = []
-    took: list[float] = []
-    for fineness in meshes:
-        near = [(fineness * part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
-        begun = clock()
-        errors.append(_rms([sed(*mesh) / true - 1 for mesh in near]))
-        took.append((clock() - begun) / len(near))
+    near = [(part, shift) for part in (0.92, 1.0, 1.08) for shift in (False, True)]
+    errors, took = _each(
+        meshes, lambda fineness: _rms([sed(fineness * part, shift) / true - 1 for part, shift in near])
+    )
     sizes = [meshes[0] / fineness for fineness in meshes]
+    took = [one / len(near) for one in took]
     return _row(f"finger, {title}", "SED of the ending", kinematics, sizes, errors, took, least)
+
+
+def _each(meshes: Sequence[Size], error: Callable[[Size], Value]) -> tuple[list[Value], list[float]]:
+    """Return what `error` finds on each mesh, and how long it took [s]."""
+    found, took = list[Value](), list[float]()
+    for mesh in meshes:
+        begun = clock()
+        found.append(error(mesh))
+        took.append(clock() - begun)
+    return found, took
 
 
 def _rms(values: Errors) -> float:

@@ -12,6 +12,7 @@ from time import perf_counter
 
 from solver.verification.asked import Asked, Found, LeftOut
 from solver.verification.methods import Kinematics
+from solver.verification.truth import KINEMATICS
 
 SCENE = """[friction]
 mu = 0.24
@@ -79,12 +80,9 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
                 yield Cold(what, runs, median(took), median(passed))
             except (subprocess.SubprocessError, OSError) as bad:
                 yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
-    kinds: list[Kinematics] = ["small", "finite"]
-    for kinematics in kinds:
-        if asked.quick:
-            yield LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
-            continue
-        yield _memory(kinematics, asked.host.python)
+    for kinematics in KINEMATICS:
+        left_out = LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
+        yield left_out if asked.quick else _memory(kinematics, asked.host.python)
 
 
 def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str]]]:

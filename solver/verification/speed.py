@@ -1,4 +1,4 @@
-"""Time against true error, for every way of solving and every mesh, on the reference cases."""
+"""Time against true error, at both kinematics and on every mesh, on the reference cases."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,31 +9,25 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.response.finite_solution import alike
 from solver.scene import Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, timed, within
-from solver.verification.methods import FINITE, METHODS, SMALL, Meshed, Method
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
+from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
 from solver.verification.truth import JUDGED, Truth, cases, known
 
-MESHES = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact
-    SMALL.name: (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
-    FINITE.name: (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
+MESHES: dict[
+    Kinematics, tuple[float, ...]
+] = {  # elements to a tip radius; 840 to 15,000 unknowns, and 1,480 to 11,000 where meshes follow the contact
+    "small": (2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0),
+    "finite": (5.5, 6.5, 8.0, 10.0, 12.0, 16.0, 20.0),
 }
 LITTLE = 0.25  # patience of a quick run
-QUICK = {
-    SMALL.name: (2.5, 3.0, 5.0, 8.0),
-    FINITE.name: (5.5, 10.0, 20.0),
-}
+QUICK: dict[Kinematics, tuple[float, ...]] = {"small": (2.5, 3.0, 5.0, 8.0), "finite": (5.5, 10.0, 20.0)}
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """One way of solving on one mesh. Times are medians; errors relative, by case, of SED, normal force and drag."""
+    """One mesh. Times are medians; errors relative, by case, of SED, normal force and drag."""
 
-    method: str
-    kinematics: str
-    element: str
-    order: int
-    linear_solver: str
-    start: str
+    kinematics: Kinematics
     fineness: float
     dofs: int
     setup_s: float  # mesh and tables
@@ -55,25 +49,26 @@ class Speed:
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
-    """Yield a row for every way and mesh, coarse meshes of all ways before fine ones."""
-    pairs = [(fineness, method) for method in METHODS for fineness in (QUICK if asked.quick else MESHES)[method.name]]
-    if not all(known(found, method.kinematics) for method in METHODS):
+    """Yield a row for each kinematics and mesh, coarse meshes before fine ones."""
+    pairs: list[tuple[float, Kinematics]] = [
+        (fineness, kind) for kind, all_of in (QUICK if asked.quick else MESHES).items() for fineness in all_of
+    ]
+    if not all(known(found, kind) for kind in MESHED):
         yield LeftOut("Speeds need the truth of both kinematics, which is not known.")
         return
-    for item in within(asked, sorted(pairs, key=lambda pair: pair[0]), "meshes and ways of solving"):
-        if isinstance(item, LeftOut):
-            yield item
-        else:
-            fineness, method = item
-            yield _row(method, fineness, known(found, method.kinematics), LITTLE if asked.quick else 1.0)
+    patience = LITTLE if asked.quick else 1.0
+    yield from rows_within(
+        asked, sorted(pairs), "meshes whose speed is measured",
+        lambda pair: [_row(pair[1], pair[0], known(found, pair[1]), patience)],
+    )  # fmt: skip
 
 
-def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
+def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: float) -> Speed:
     """Return the row of one mesh; `patience` is how long its times are repeated, by that of a full run."""
-    chosen = [scene for scene in cases(method.kinematics) if scene.title in truths]
+    chosen = [scene for scene in cases(kind) if scene.title in truths]
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    prepared, setup, beside = _made(method, deepest, fineness, 0.3 * patience)
-    mesh = method.meshed(deepest, fineness, False)
+    prepared, setup, beside = _made(kind, deepest, fineness, 0.3 * patience)
+    mesh = MESHED[kind](deepest, fineness, False)
     first: list[float] = []
     solved: list[Scene] = []
     errors: dict[str, tuple[float, ...]] = {}
@@ -94,13 +89,12 @@ def _row(method: Method, fineness: float, truths: dict[str, Truth], patience: fl
     floors = beside if prepared else between  # of the same moments as most of the work
     next_s = median(onward) if onward else None
     return Speed(
-        method.name, method.kinematics, method.element, method.order, method.linear_solver, method.start,
-        fineness, mesh.dofs, setup, prepared, median(floors),
+        kind, fineness, mesh.dofs, setup, prepared, median(floors),
         prepared + median(first), next_s, prepared + together, len(solved), errors, failed,
     )  # fmt: skip
 
 
-def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
+def _made(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
     """Return medians of what a mesh's assembly and factorisation, and what the rest took; and floors in turn with them.
 
     One is forgotten before the next is made, as in a process that solves again and again, which is given memory once.
@@ -109,7 +103,7 @@ def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple
     floors: list[float] = []
     began = clock()
     while len(spans) < 5 and (not spans or clock() - began < most_s):
-        mesh = method.meshed(scene, fineness, False)
+        mesh = MESHED[kind](scene, fineness, False)
         spans.append((mesh.prepared_s, mesh.setup_s))
         floors.append(mesh.floor())
         del mesh
@@ -117,7 +111,7 @@ def _made(method: Method, scene: Scene, fineness: float, most_s: float) -> tuple
     return median(prepared), median(setup), floors
 
 
-def _onward(mesh: Meshed, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
+def _onward(mesh: SmallMeshed | FiniteMeshed, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
     """Return what each surface took that was begun at one solved just before, pressed as deep and moved the same way.
 
     Medians over passes through all of `scenes`, in the order the solver takes them, after one in which meshes are made.

@@ -13,7 +13,7 @@ from solver.verification.asked import Asked, Found
 from solver.verification.estimates import Guaranteed
 from solver.verification.growth import Growth, between, exponent
 from solver.verification.histories import Marched
-from solver.verification.methods import MAIN, Kinematics
+from solver.verification.methods import Kinematics
 from solver.verification.processes import Cold, Memory
 from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, cases
@@ -54,24 +54,22 @@ class Target:
 def measure(asked: Asked, found: Found) -> Iterator[Target]:
     """Yield every row from what the other subjects found."""
     meshes = QUICK if asked.quick else MESHES
-    yield _at_error(
-        found, meshes, "small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s
+    further = "finite strain, each further surface"
+    at_errors: tuple[tuple[str, Kinematics, float, float, float, Callable[[Speed], float | None]], ...] = (
+        ("small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s),
+        ("finite strain, one surface from undeformed", "finite", 0.01, 12.0, 8.0, lambda s: s.first_s),
+        (further, "finite", 0.01, 4.0, 2.0, lambda s: s.next_s),
+        (further, "finite", 0.003, 12.0, 6.0, lambda s: s.next_s),
+        ("finite strain, one surface", "finite", 0.0015, 150.0, 80.0, lambda s: s.first_s),
+        ("finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s),
     )
-    yield _at_error(
-        found, meshes, "finite strain, one surface from undeformed", "finite", 0.01, 12.0, 8.0, lambda s: s.first_s
-    )
-    yield _at_error(found, meshes, "finite strain, each further surface", "finite", 0.01, 4.0, 2.0, lambda s: s.next_s)
-    yield _at_error(
-        found, meshes, "finite strain, each further surface", "finite", 0.003, 12.0, 6.0, lambda s: s.next_s
-    )
-    yield _at_error(found, meshes, "finite strain, one surface", "finite", 0.0015, 150.0, 80.0, lambda s: s.first_s)
-    yield _at_error(found, meshes, "finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s)
+    for row in at_errors:
+        yield _at_error(found, meshes, *row)
     yield _warm(found, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
     yield _warm(found, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
     yield _marched(found)
     yield _cold(found)
-    for row in found.of(Guaranteed):
-        yield _guaranteed(row)
+    yield from map(_guaranteed, found.of(Guaranteed))
     for row in found.of(Memory):
         yield Target(
             f"memory of a solve, {row.kinematics} strain, above idle", _percent(row.tolerance), "MB", 100.0, None,
@@ -88,7 +86,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
 
 def _at_error(
     found: Found,
-    meshes: dict[str, tuple[float, ...]],
+    meshes: dict[Kinematics, tuple[float, ...]],
     work: str,
     kinematics: Kinematics,
     error: float,
@@ -96,19 +94,16 @@ def _at_error(
     aim: float,
     time: Callable[[Speed], float | None],
 ) -> Target:
-    rows = [row for row in found.of(Speed) if row.method == MAIN[kinematics].name]
-    good = [
-        (took, r)
-        for r in rows
-        if r.judged_error is not None and r.judged_error <= error and (took := time(r)) is not None
-    ]
+    rows = [row for row in found.of(Speed) if row.kinematics == kinematics]
+    known = [(r.judged_error, took, r) for r in rows if r.judged_error is not None and (took := time(r)) is not None]
+    good = [(took, r) for off, took, r in known if off <= error]
     if not good:
         least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
         how = "" if least is None else f"no mesh that was tried is below: the best is at {_percent(least)}"
-        tried = len(rows) >= len(meshes[MAIN[kinematics].name])
+        tried = len(rows) >= len(meshes[kinematics])
         return Target(work, _percent(error), "ms", reach, aim, None, None, how, tried)
     took, best = min(good, key=lambda pair: pair[0])
-    how = f"{best.method}, {best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
+    how = f"{best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
     return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
 

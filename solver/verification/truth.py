@@ -16,9 +16,9 @@ from solver.response.solution import solve_many
 from solver.scene import Scene, Solve
 from solver.scene.published import scenes
 from solver.verification.asked import Asked, Found, LeftOut, clock
-from solver.verification.methods import MAIN, Kinematics
+from solver.verification.methods import MESHED, Kinematics
 
-KINEMATICS: tuple[Kinematics, ...] = ("small", "finite")
+KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
 # fineness of three meshes, and whether moved along the skin by half an element
 SHIFTED = {
@@ -63,7 +63,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
 def overkill(deepest: Scene, *, quick: bool) -> Solves:
     """Return what solves scenes of one finger, none deeper than `deepest`, on the three meshes of a truth."""
     kind = deepest.solve.kinematics
-    meshes = [MAIN[kind].meshed(deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)[kind]]
+    meshes = [MESHED[kind](deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)[kind]]
 
     def solves(scene: Scene) -> tuple[np.ndarray, tuple[int, ...]]:
         return np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes]), tuple(mesh.dofs for mesh in meshes)

@@ -13,19 +13,18 @@ import numpy as np
 
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march, press_and_slide
-from solver.equilibrium.newton import LoadState
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Friction, Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, within
-from solver.verification.methods import FiniteMeshed, Kinematics, SmallMeshed
-from solver.verification.truth import cases
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
+from solver.verification.methods import MESHED, Kinematics
+from solver.verification.truth import KINEMATICS, cases
 
 PASSES, QUICK_PASSES = 5, 3
 PRESS, SLIDES, DISTANCE = 200, 60, 6.0  # readings of the press and of the slide, and how far it goes [mm]
 LIFTS = 8  # readings in which it lifts off: 40 ms at 200 Hz
 FINER: dict[Kinematics, float] = {"small": 10.0, "finite": 8.0}  # fineness of the truth's mesh
 SURFACES = ("slipperiness 100", "slipperiness 55", "slipperiness 0", "stickiness 0")
-FULL: dict[Kinematics, tuple[str, ...]] = {"small": SURFACES, "finite": SURFACES}
 QUICK: dict[Kinematics, tuple[str, ...]] = {"finite": SURFACES[:1], "small": SURFACES[::3]}
 Reading = tuple[float, float, float]  # normal and tangential force [N/mm], SED [MPa]
 
@@ -45,20 +44,17 @@ class Warm:
 
 
 def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
-    """Yield a row a surface and kinematics."""
+    """Return an iterator over a row a surface and kinematics."""
     del found
-    scenes = [s for kind, names in (QUICK if asked.quick else FULL).items() for s in cases(kind) if s.title in names]
-    for scene in within(asked, scenes, "surfaces followed reading by reading"):
-        yield (
-            scene
-            if isinstance(scene, LeftOut)
-            else _row(replace(scene, friction=Friction(scene.friction.mu)), QUICK_PASSES if asked.quick else PASSES)
-        )
+    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if asked.quick else SURFACES)]
+    unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
+    passes = QUICK_PASSES if asked.quick else PASSES
+    return rows_within(asked, unbounded, "surfaces followed reading by reading", lambda scene: [_row(scene, passes)])
 
 
 def _row(scene: Scene, passes: int) -> Warm:
     kinematics = scene.solve.kinematics
-    readings = list(_small(scene) if kinematics == "small" else _finite(scene))
+    readings = list(_readings(scene))
     begun = clock()
     follows = stepper(scene)
     setup = clock() - begun
@@ -84,29 +80,18 @@ def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES
     return spans, found
 
 
-def _small(scene: Scene) -> Iterator[Reading]:
-    finger = SmallMeshed(scene, FINER["small"], False).finger
-    depth, direction = scene.loading.depth, scene.loading.direction
-    course = press_and_slide(depth, scene.friction.mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
-    lifts = [(down, DISTANCE + depth * (n + 1)) for n, down in enumerate(_lifts(depth))]
-    course += [LoadState(down, scene.friction.mu, travel=-direction * along) for down, along in lifts]
-    for state in march(finger.newton, course):
-        sed = finger.sed_ending(finger.displacement(state))
-        yield float(state.force[1]), float(state.force[0]), sed
-
-
-def _finite(scene: Scene) -> Iterator[Reading]:
-    finger = FiniteMeshed(scene, FINER["finite"], False).finger
-    depth, mu, direction = scene.loading.depth, scene.friction.mu, scene.loading.direction
-    course = press_and_slide(depth, mu, np.inf, direction, press=PRESS, slides=SLIDES, distance=DISTANCE)
-    for shape in march(finger.newton, course, tolerance=1e-6):
-        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape.u)
-    shape = None
-    for down in _lifts(depth):
-        shape = settled(finger.newton, LoadState(down, mu, np.inf, -direction), shape)
-        yield float(shape.force[1]), float(shape.force[0]), finger.sed_ending(shape.u)
-
-
-def _lifts(depth: float) -> list[float]:
-    """Return the depths of a finger that lifts off, at each of whose readings it slides as if settled."""
-    return [depth * (1.0 - n / LIFTS) for n in range(1, LIFTS)]
+def _readings(scene: Scene) -> Iterator[Reading]:
+    """Yield what a finer mesh has of a press, a slide, and a lift at each of whose readings it slides as if settled."""
+    kind, loading, mu = scene.solve.kinematics, scene.loading, float(scene.friction.mu)
+    finger = MESHED[kind](scene, FINER[kind], False).finger
+    course = press_and_slide(
+        loading.depth, mu, np.inf, loading.direction, press=PRESS, slides=SLIDES, distance=DISTANCE
+    )
+    states = [*march(finger.newton, course, tolerance=1e-6)]
+    lifted: EquilibriumState | None = None
+    for n in range(1, LIFTS):
+        load = LoadState(loading.depth * (1.0 - n / LIFTS), mu, np.inf, -loading.direction)
+        lifted = settled(finger.newton, load, lifted)
+        states.append(lifted)
+    for sed, push, drag in finger.numbers(states).tolist():
+        yield push, drag, sed

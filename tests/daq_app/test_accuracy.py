@@ -14,14 +14,14 @@ from daq_app.child_process import interpreter
 from solver import solve
 from solver.response.solution import DEFAULT
 from solver.verification import estimates, targets
-from solver.verification.asked import Asked, Found, Host, LeftOut, timed, within
+from solver.verification.asked import Asked, Found, Host, LeftOut, rows_within, timed
 from solver.verification.costs import Cost, shares
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
 from solver.verification.machine import Machine
 from solver.verification.measuring import Measured, measured, restored
-from solver.verification.methods import FINITE
+from solver.verification.methods import FiniteMeshed
 from solver.verification.orders import Order
 from solver.verification.published.problems import Problem
 from solver.verification.random_scenes import random_scene
@@ -38,7 +38,7 @@ OVER = Asked(quick=True, until=perf_counter() - 1.0, host=HOST)
 def speed(kinematics, dofs, error, first, floor=1e-3, failed=()):
     errors = {name: (error, 0.0, 0.0) for name in JUDGED if name not in failed}
     return Speed(
-        f"{kinematics} strain", kinematics, "Q2/P-1", 2, "some", "some", 5.0, dofs, 0.01, 0.0, floor, first, first / 2,
+        kinematics, 5.0, dofs, 0.01, 0.0, floor, first, first / 2,
         6 * first, 6, errors, dict.fromkeys(failed, "no state"),
     )  # fmt: skip
 
@@ -127,7 +127,7 @@ def test_time_is_drawn_against_the_error_that_is_guaranteed_and_against_the_true
 
 def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
     scene = next(s for s in cases("finite") if s.title == "slipperiness 100")
-    timed_way = FINITE.meshed(scene, DEFAULT["finite"], False)
+    timed_way = FiniteMeshed(scene, DEFAULT["finite"], False)
     found = timed_way.numbers(timed_way.solve(scene))
     answer = solve(scene)
     assert found == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)
@@ -218,8 +218,11 @@ def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():
 
 
 def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():
-    assert list(within(FOREVER, [1, 2, 3], "things")) == [1, 2, 3]
-    assert list(within(OVER, [1, 2, 3], "things")) == [1, LeftOut("Time was over after 1 of 3 things.")]
+    assert list(rows_within(FOREVER, [1, 2, 3], "things", lambda n: [n, -n])) == [1, -1, 2, -2, 3, -3]
+    assert list(rows_within(OVER, [1, 2, 3], "things", lambda n: [n])) == [
+        1,
+        LeftOut("Time was over after 1 of 3 things."),
+    ]
 
 
 def test_a_time_is_the_median_of_runs_and_slow_work_is_run_once():
@@ -272,7 +275,11 @@ def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
 
 
 def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_for_its_caller():
-    mesher, contact, library = ("/x/solver/mesher.py", 1, "a"), ("/x/solver/contact.py", 1, "b"), ("/lib/np.py", 1, "c")
+    mesher, contact, library = (
+        ("/x/solver/mesh/mesher.py", 1, "a"),
+        ("/x/solver/contact/law.py", 1, "b"),
+        ("/lib/np.py", 1, "c"),
+    )
     calls = {mesher: (1, 1, 3.0, 4.0), contact: (1, 1, 1.0, 3.0)}
     profile = {mesher: (1, 1, 2.0, 6.0, {}), contact: (1, 1, 1.0, 4.0, {}), library: (2, 2, 4.0, 7.0, calls)}
     found = shares(type("Profile", (), {"__init__": lambda self: vars(self).update(stats=profile)})())

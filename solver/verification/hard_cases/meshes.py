@@ -23,13 +23,8 @@ def two_parts() -> tuple[Mesh, Mesh]:
     kept = np.arange(len(whole.nodes)).reshape(-1, column)[:, 2 * STIFF_LAYERS :]
     number = np.full(len(whole.nodes), -1)
     number[kept.ravel()] = np.arange(kept.size)
-    alone = Mesh(
-        whole.nodes[kept.ravel()],
-        number[whole.elements[region == 0]],
-        region[region == 0],
-        number[whole.skin],
-        number[kept[:, 0]],
-    )
+    elements = number[whole.elements[region == 0]]
+    alone = Mesh(whole.nodes[kept.ravel()], elements, region[region == 0], number[whole.skin], number[kept[:, 0]])
     return replace(whole, region=region), alone
 
 

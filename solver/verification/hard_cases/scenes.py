@@ -16,13 +16,7 @@ EITHER: Must = "answer or limit"
 SOFT = Material(0.034, 0.48)
 BEYOND: dict[Kinematics, tuple[tuple[float, float], ...]] = {  # depth [mm] and mu near and beyond a limit
     "small": ((1.5, 1.4), (2.0, 1.3), (2.0, 2.0)),  # at which the finger wedges itself in
-    "finite": (
-        (2.0, 0.37),
-        (2.0, 0.38),
-        (2.0, 0.44),
-        (1.5, 0.62),
-        (1.0, 2.0),
-    ),  # at which skin behind the contact folds
+    "finite": ((2.0, 0.37), (2.0, 0.38), (2.0, 0.44), (1.5, 0.62), (1.0, 2.0)),  # at which skin folds
 }
 
 

@@ -1,10 +1,10 @@
 """The suite as a list of cases, and the rows it gives."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
-from solver.verification.asked import Asked, Found, LeftOut, clock, within
+from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.hard_cases import bodies
 from solver.verification.hard_cases.outcome import Outcome
 from solver.verification.hard_cases.scenes import ANSWER, Case, hard_scenes
@@ -51,11 +51,11 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
 
 def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
     """Run one case and say what is wrong, if anything; `neighbour` is the outcome of the case it must be `same_as`."""
-    begun = clock()
-    return _row(case, case.run(), neighbour, begun)
+    return _judged(case, neighbour)[0]
 
 
-def _row(case: Case, found: Outcome, neighbour: Outcome | None, begun: float) -> HardCase:
+def _judged(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
+    begun, found = clock(), case.run()
     flaws = [found.flaw] if found.flaw else []
     if not found.answered and case.must == ANSWER:
         flaws.append("no answer")
@@ -65,23 +65,22 @@ def _row(case: Case, found: Outcome, neighbour: Outcome | None, begun: float) ->
         off = abs(found.numbers[0] / neighbour.numbers[0] - 1.0)
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
-    took = clock() - begun
-    return HardCase(case.kinematics, case.name, case.must, found.answered, "; ".join(flaws), found.summary, took)
+    whole = "; ".join(flaws)
+    row = HardCase(case.kinematics, case.name, case.must, found.answered, whole, found.summary, clock() - begun)
+    return row, found
 
 
 def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
     """Yield a row for every case, or for those that tell most."""
     del found
-    suite = [case for kinematics in ("small", "finite") for case in cases(kinematics)]
+    suite = [case for kinematics in bodies.BODIES for case in cases(kinematics)]
     todo = [case for case in suite if not asked.quick or case.name in TELLING]
     if len(todo) < len(suite):
         yield LeftOut(f"{len(suite) - len(todo)} hard cases are left to a full run.")
     kept: dict[tuple[Kinematics, str], Outcome] = {}
-    for case in within(asked, todo, "hard cases"):
-        if isinstance(case, LeftOut):
-            yield case
-            return
-        begun = clock()
-        outcome = case.run()
-        kept[case.kinematics, case.name] = replace(outcome, summary="")
-        yield _row(case, outcome, kept.get((case.kinematics, case.same_as)), begun)
+
+    def rows(case: Case) -> Iterator[HardCase]:
+        row, kept[case.kinematics, case.name] = _judged(case, kept.get((case.kinematics, case.same_as)))
+        yield row
+
+    yield from rows_within(asked, todo, "hard cases", rows)

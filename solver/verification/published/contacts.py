@@ -16,15 +16,7 @@ from solver.contact.law import OPEN, STICK, FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
-from solver.verification.published.bodies import (
-    chain,
-    disc,
-    graded,
-    mirrored,
-    mound,
-    stress,
-    touching_within,
-)
+from solver.verification.published.bodies import chain, disc, graded, mirrored, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 
 ELEMENT = 1 / 30  # of the half-width

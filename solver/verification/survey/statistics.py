@@ -35,17 +35,11 @@ def shares(rows: Sequence[Estimate]) -> Iterator[str]:
             if verdicts:
                 parts.append(f"{word} {sum(known)} of {len(known)}")
         errors = [row.error for row in mine]
-        worst = max(
-            (row for row in mine if row.above is not None), key=lambda row: row.error / row.estimate, default=None
-        )
-        tail = (
-            ""
-            if worst is None
-            else (
-                f"; worst {worst.error / worst.estimate:.2f}: {100 * worst.error:.2g} % estimated at "
-                f"{100 * worst.estimate:.2g} % in {worst.case}"
-            )
-        )
+        tail = ""
+        if judged := [row for row in mine if row.above is not None]:
+            worst = max(judged, key=lambda row: row.error / row.estimate)
+            part, estimate = worst.error / worst.estimate, 100 * worst.estimate
+            tail = f"; worst {part:.2f}: {100 * worst.error:.2g} % estimated at {estimate:.2g} % in {worst.case}"
         yield (
             f"  {name}: {', '.join(parts)}; error {100 * median(errors):.2g} % in the median, "
             f"{100 * max(errors):.2g} % at most{tail}"
