@@ -1,4 +1,3 @@
-# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
 """The one search for contact states: a primal-dual active set on the condensed skin of a linearised body.
 
 Alart and Curnier 1991, Comput. Meth. Appl. Mech. Eng. 92, 353; Hüeber and Wohlmuth 2005, ibid. 194, 3147. States that
@@ -15,11 +14,13 @@ from solver._kernels.arguments import (
     LoadArguments,
     Skin,
     SkinPosition,
+    Slack,
     StateChanges,
 )
-from solver._kernels.compiling import HELD_X, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.force_system import assemble_force_system
 from solver._kernels.skin import COLUMNS, STEEP, assemble_contact_system, bounded_length, solve
-from solver.arrays import Array
+from solver.arrays import Array, Narrow
 
 SLACK = 1e-12  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # what drives the body: its depth, its normal force, its drag too
@@ -34,56 +35,67 @@ def contradictions(
 
     `above` (k,) are heights over the surface, `slip` (k,) is how far each node went along +x relative to the surface
     since the last step, `length` (k,) as in `bounded_length`. Where the load has a sense every touching node slips, the
-    friction force pointing there; else nodes stick, slip and turn round. Where friction is steep, slip is a bad guess
-    of a node that comes to touch: its own drag may lift it off by more than it is pressed.
+    friction force pointing there; else nodes stick, slip and turn round.
     """
     state, sense, reaction = states
-    mu, tau, direction = load.mu, load.tau, load.sense
     wanted, turned, badness = changes
     changed = 0
-    size = state.shape[0]
     force = height = 0.0
-    for i in range(size):
+    for i in range(state.shape[0]):
         force = max(force, abs(reaction[i, 1]))
         height = max(height, abs(above[i]))
-    slack, small = SLACK * force, SLACK * height
-    by_height = force / height if height > 0.0 else 0.0
-    for i in range(size):
-        was, way = state[i], sense[i]
-        now, bad = was, 0.0
-        if was == OPEN:
-            if above[i] < -small:
-                now = STICK if direction == 0 and mu > 0.0 and tau > 0.0 else SLIP
-                if direction != 0 and mu > STEEP and tau < np.inf:
-                    now = SHEAR_LIMITED
-                way = direction if direction != 0 else way
-                bad = -above[i] * by_height
-        elif reaction[i, 1] < -slack:
+    slack = Slack(SLACK * force, SLACK * height, force / height if height > 0.0 else 0.0)
+    for i in range(state.shape[0]):
+        now, way, bad = state[i], sense[i], 0.0
+        if now == OPEN:
+            if above[i] < -slack.height:
+                now, bad = touching_state(load), -above[i] * slack.by_height
+                way = load.sense if load.sense != 0 else way
+        elif reaction[i, 1] < -slack.force:
             now, bad = OPEN, -reaction[i, 1]
         else:
-            coulomb, bound = mu * max(reaction[i, 1], 0.0), tau * max(length[i], 0.0)
-            most = min(coulomb, bound)
-            slips = (
-                SHEAR_LIMITED
-                if bound < coulomb - slack or (was == SHEAR_LIMITED and bound <= coulomb + slack)
-                else SLIP
-            )
-            if direction != 0:
-                way, now, bad = direction, slips, reaction[i, 1]
-            elif was == STICK:
-                if abs(reaction[i, 0]) > most + slack:
-                    way = 1 if reaction[i, 0] > 0.0 else -1
-                    now, bad = SHEAR_LIMITED if bound < coulomb else SLIP, abs(reaction[i, 0]) - most
-            elif slip[i] * sense[i] > small and most > 0.0:
-                now, bad = STICK, slip[i] * sense[i] * by_height
-            else:
-                now, bad = slips, reaction[i, 1]
-        if now != was or (now >= SLIP and way != sense[i]):
+            bound = load.tau * max(length[i], 0.0)
+            now, way, bad = friction_state(now, way, reaction[i], slip[i], bound, load, slack)
+        if now != state[i] or (now >= SLIP and way != sense[i]):
             changed += 1
         else:
             bad = -1.0
         wanted[i], turned[i], badness[i] = now, way, bad
     return changed
+
+
+@compiled
+def touching_state(load: LoadArguments) -> int:
+    """Return the state in which a node is first thought to touch.
+
+    Where friction is steep, slip is a bad guess: the node's own drag may lift it off by more than it is pressed.
+    """
+    if load.sense != 0:
+        return SHEAR_LIMITED if load.mu > STEEP and load.tau < np.inf else SLIP
+    return STICK if load.mu > 0.0 and load.tau > 0.0 else SLIP
+
+
+@compiled
+def friction_state(
+    was: int, sense: int, reaction: Array, slip: float, bound: float, load: LoadArguments, slack: Slack
+) -> tuple[int, int, float]:
+    """Return state and sense of a node that is pressed, and how badly it contradicts those it has [N/mm]."""
+    coulomb = load.mu * max(reaction[1], 0.0)
+    most = min(coulomb, bound)
+    slips = SLIP
+    if bound < coulomb - slack.force or (was == SHEAR_LIMITED and bound <= coulomb + slack.force):
+        slips = SHEAR_LIMITED
+    now, way, bad = slips, sense, reaction[1]
+    if load.sense != 0:
+        way = load.sense
+    elif was == STICK:
+        now, bad = STICK, 0.0
+        if abs(reaction[0]) > most + slack.force:
+            way = 1 if reaction[0] > 0.0 else -1
+            now, bad = SHEAR_LIMITED if bound < coulomb else SLIP, abs(reaction[0]) - most
+    elif slip * sense > slack.height and most > 0.0:
+        now, bad = STICK, slip * sense * slack.by_height
+    return now, way, bad
 
 
 @compiled
@@ -115,125 +127,68 @@ def solve_active_set(
     that to equilibrium, the others where steps are unknown. Returns the number of systems solved, UNSETTLED or
     SINGULAR.
     """
-    stiffness, force, compliance, motions = body
-    state, sense, reaction = states
-    x, above, anchor = position
-    length, free, matrix, right, steps, motion = system
-    mu, tau, kind = load.mu, load.tau, control.kind
-    size, by_forces = state.shape[0], compliance.shape[0] > 0
-    slip = np.empty(size)
+    size, by_forces = states.state.shape[0], body.compliance.shape[0] > 0
     sums = np.zeros((2, 2 * size))  # how the force of the surface along x and y follows steps, or forces
-    loads, answer, untouched = np.zeros(2), steps, np.zeros(2 * size)
+    loads, untouched = np.zeros(2), np.zeros(2 * size)
+    answer = system.steps
     if by_forces:
-        answer = np.zeros((2 * size + motions.shape[1], COLUMNS))
-        for i in range(2 * size):
-            sums[i % 2, i] = 1.0
-            for c in range(2 * size):
-                untouched[c] -= force[i] * compliance[i, c]
-    elif kind != DEPTH_GIVEN:
-        for i in range(2 * size):
-            loads[i % 2] += force[i]
-            for c in range(2 * size):
-                sums[i % 2, c] += stiffness[i, c]
-    entered = np.zeros(size, np.int32)  # how often each node came to touch
+        answer = np.zeros((2 * size + body.motions.shape[1], COLUMNS))
+    sum_forces(body, by_forces, control.kind, sums, loads, untouched)
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
-    wanted, turned, badness = changes
-    seen, seen_sense, known = np.empty((rounds + 1, size), np.int32), np.empty((rounds + 1, size), np.int32), 0
-    ahead, reached = np.empty(size), np.empty(size)
-    one_by_one = held_again = False
+    entered = np.zeros(size, np.int32)  # how often each node came to touch
+    seen, known = np.empty((rounds + 1, 2, size), np.int32), 0
+    ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
+    motion = system.motion
+    one_by_one, may_hold = False, load.mu > 0.0 and load.tau > 0.0
     for turn in range(rounds + 1):
-        bounded_length(x, skin, state, mu, length)
-        if by_forces:
-            count = assemble_force_system(body, skin, states, load, position, untouched, system, answer)
-        else:
-            count = assemble_contact_system(body, skin, states, load, position, system)
-        if not solve(matrix, right, count):
+        if not solve_states(body, skin, states, load, position, untouched, system, answer):
             return SINGULAR
-        for r in range(count):
-            for c in range(COLUMNS):
-                answer[free[r], c] = right[r, c]
-        if by_forces:
-            for i in range(size):
-                if state[i] == SLIP:
-                    for c in range(COLUMNS):
-                        answer[2 * i, c] = sense[i] * mu * answer[2 * i + 1, c]
         motion[0] = motion[1] = 0.0
-        loose = False  # whether nothing holds the body along x: then it may have gone anywhere
-        if kind != DEPTH_GIVEN:
-            stuck = touching = False
-            for i in range(size):
-                touching |= state[i] != OPEN
-                stuck |= state[i] == STICK
-            if kind == DRAG_GIVEN and not stuck and turn < rounds and not held_again and mu > 0.0 and tau > 0.0:
-                # a body that is free along x needs a node that holds it: all are asked again, one by one
-                for i in range(size):
-                    if state[i] != OPEN:
-                        state[i] = STICK
-                held_again = one_by_one = True
-                continue
-            loose = kind == DRAG_GIVEN and not stuck
-            by_drag = kind == DRAG_GIVEN and stuck
-            if not touching or not balance(sums, loads, answer, control, by_drag, motion):
-                return SINGULAR
-        if by_forces:
-            for i in range(2 * size):
-                reaction[i // 2, i % 2] = answer[i, 0]
-                steps[i, 0] = untouched[i]
-                for m in range(motions.shape[1]):
-                    steps[i, 0] += motions[i, m] * answer[2 * size + m, 0]
-            for i in range(2 * size):
-                if answer[i, 0] != 0.0:
-                    for c in range(2 * size):
-                        steps[c, 0] += answer[i, 0] * compliance[i, c]
-        else:
-            for i in range(2 * size):
-                total = force[i]
-                for c in range(2 * size):
-                    total += stiffness[i, c] * steps[c, 0]
-                reaction[i // 2, i % 2] = total
-        whole = 0.0
-        for i in range(size):
-            whole += reaction[i, 0] + reaction[i, 1]
-        if not np.isfinite(whole):
+        stuck, dragged = count_in(states.state, STICK) > 0, control.kind == DRAG_GIVEN
+        if dragged and not stuck and may_hold and turn < rounds:
+            # a body that is free along x needs a node that holds it: all are asked again, one by one
+            hold(states.state)
+            may_hold, one_by_one = False, True
+            continue
+        by_drag = dragged and stuck
+        if control.kind != DEPTH_GIVEN and not balance(states.state, sums, loads, answer, control, by_drag, motion):
+            return SINGULAR
+        if not fill_reactions(body, by_forces, answer, untouched, system.steps, states.reaction):
             return SINGULAR
         if turn == rounds:
             break
-        for i in range(size):
-            ahead[i], reached[i] = x[i] + steps[2 * i, 0], above[i] + steps[2 * i + 1, 0] - motion[0]
-            slip[i] = 0.0 if loose else ahead[i] - anchor[i] - motion[1]
-        bounded_length(ahead, skin, state, mu, length)
-        if contradictions(states, reached, slip, length, load, changes) == 0:
+        loose = dragged and not stuck  # nothing holds the body along x: then it may have gone anywhere
+        look_ahead(position, system.steps, motion, loose, ahead, above, slip)
+        bounded_length(ahead, skin, states.state, load.mu, system.length)
+        if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1
-        worst = 0
-        for i in range(size):
-            if badness[i] > badness[worst]:
-                worst = i
-        for i in range(size):
-            if one_by_one and i != worst:
-                continue
-            if state[i] == OPEN and (wanted[i] == SHEAR_LIMITED or wanted[i] == STICK):
-                entered[i] += 1  # a node that comes to touch again and again slips every other time
-                if entered[i] % 2 == 0:
-                    if wanted[i] == STICK:
-                        turned[i] = -1 if slip[i] > 0.0 else 1
-                    wanted[i] = SLIP
-            state[i], sense[i] = wanted[i], turned[i]
-        before = False
-        for n in range(known):
-            same = True
-            for i in range(size):
-                same &= seen[n, i] == state[i] and seen_sense[n, i] == sense[i]
-            before |= same
-        if before:
+        change_states(states, changes, slip, entered, one_by_one)
+        if met_before(states, seen, known):
             one_by_one, known = True, 0
-        for i in range(size):
-            seen[known, i], seen_sense[known, i] = state[i], sense[i]
         known += 1
     return UNSETTLED
 
 
 @compiled
-def assemble_force_system(
+def sum_forces(body: CondensedArrays, by_forces: bool, kind: int, sums: Array, loads: Array, untouched: Array) -> None:
+    """Fill how the surface's force follows the answer, `sums` (2, 2 k) beside `loads` (2,), and the `untouched` step.
+
+    The latter (2 k,) is that without contact, where forces are unknown.
+    """
+    force = body.force
+    for i in range(force.shape[0]):
+        if by_forces:
+            sums[i % 2, i] = 1.0
+            for c in range(force.shape[0]):
+                untouched[c] -= force[i] * body.compliance[i, c]
+        elif kind != DEPTH_GIVEN:
+            loads[i % 2] += force[i]
+            for c in range(force.shape[0]):
+                sums[i % 2, c] += body.stiffness[i, c]
+
+
+@compiled
+def solve_states(
     body: CondensedArrays,
     skin: Skin,
     states: ContactStates,
@@ -241,78 +196,145 @@ def assemble_force_system(
     position: SkinPosition,
     untouched: Array,
     system: ContactSystem,
-    forces: Array,
-) -> int:
-    """Write down the skin's system of contact for its forces: return its size f, and fill its `matrix` and `right`.
-
-    That is what `assemble_contact_system` writes down for steps, where the compliance is known. Unknown are the push on
-    what touches, the drag on what sticks, and the parts of the body's m motions, listed in `free` (f,). `untouched`
-    (2 k,) is the step without contact. `forces` (2 k + m, 4) is filled where they are known; no column is by mu.
-    """
-    compliance, motions, force = body.compliance, body.motions, body.force
+    answer: Array,
+) -> bool:
+    """Fill the `answer`, steps (2 k, 4) or forces (2 k + m, 4), for contact in these states; False where it fails."""
     state, sense = states.state, states.sense
-    x, above, anchor = position
-    length, free, matrix, right, _, _ = system
-    mu, tau, held = load.mu, load.tau, skin.held
-    size = state.shape[0]
-    for i in range(forces.shape[0]):
+    bounded_length(position.x, skin, state, load.mu, system.length)
+    by_forces = body.compliance.shape[0] > 0
+    if by_forces:
+        count = assemble_force_system(body, skin, states, load, position, untouched, system, answer)
+    else:
+        count = assemble_contact_system(body, skin, states, load, position, system)
+    if not solve(system.matrix, system.right, count):
+        return False
+    for r in range(count):
         for c in range(COLUMNS):
-            forces[i, c] = 0.0
-    f = 0
-    for i in range(size):
-        if state[i] != OPEN:
-            free[f] = 2 * i + 1
-            f += 1
-        if state[i] == SHEAR_LIMITED:
-            forces[2 * i, 0] = sense[i] * tau * length[i]
-    for i in range(size):
-        if state[i] == STICK and held[i] & HELD_X == 0:
-            free[f] = 2 * i
-            f += 1
-    known, moving = f, motions.shape[1]
-    f += moving
-    square = matrix[: f * f].reshape(f, f)
-    for r in range(f):
-        for c in range(COLUMNS):
-            right[r, c] = 0.0
-    for m in range(moving):
-        free[known + m] = 2 * size + m
-        for i in range(2 * size):
-            right[known + m, 0] += motions[i, m] * (force[i] - forces[i, 0])
-        for c in range(known):
-            other = free[c]
-            value = motions[other, m]
-            square[c, known + m] = value
-            if other % 2 == 1 and state[other // 2] == SLIP:
-                value += sense[other // 2] * mu * motions[other - 1, m]
-            square[known + m, c] = value
-        for c in range(moving):
-            square[known + m, known + c] = 0.0
-    for r in range(known):
-        row = free[r]
-        i = row // 2
-        mine = compliance[row]
-        for c in range(known):
-            other = free[c]
-            value = mine[other]
-            if other % 2 == 1 and state[other // 2] == SLIP:
-                value += sense[other // 2] * mu * mine[other - 1]
-            square[r, c] = value
-        right[r, 0] = -untouched[row] - (above[i] if row % 2 == 1 else x[i] - anchor[i])
-        right[r, 1 if row % 2 == 1 else 3] = 1.0
-        for j in range(size):
-            if state[j] == SHEAR_LIMITED:
-                right[r, 0] -= mine[2 * j] * forces[2 * j, 0]
-    return f
+            answer[system.free[r], c] = system.right[r, c]
+    if by_forces:
+        for i in range(state.shape[0]):
+            if state[i] == SLIP:
+                for c in range(COLUMNS):
+                    answer[2 * i, c] = sense[i] * load.mu * answer[2 * i + 1, c]
+    return True
 
 
 @compiled
-def balance(sums: Array, loads: Array, answer: Array, control: ForceControl, by_drag: bool, motion: Array) -> bool:
+def look_ahead(
+    position: SkinPosition, steps: Array, motion: Array, loose: bool, ahead: Array, above: Array, slip: Array
+) -> None:
+    """Fill where the skin's nodes will be along the surface and over it, and how far each slips (k,).
+
+    Nothing slips where the body is `loose`, as along a surface that does not hold it.
+    """
+    for i in range(ahead.shape[0]):
+        ahead[i] = position.x[i] + steps[2 * i, 0]
+        above[i] = position.above[i] + steps[2 * i + 1, 0] - motion[0]
+        slip[i] = 0.0 if loose else ahead[i] - position.anchor[i] - motion[1]
+
+
+@compiled
+def count_in(state: Narrow, which: int) -> int:
+    """Return how many nodes are in a state of contact."""
+    count = 0
+    for i in range(state.shape[0]):
+        count += state[i] == which
+    return count
+
+
+@compiled
+def hold(state: Narrow) -> None:
+    """Let every node that touches stick."""
+    for i in range(state.shape[0]):
+        if state[i] != OPEN:
+            state[i] = STICK
+
+
+@compiled
+def fill_reactions(
+    body: CondensedArrays, by_forces: bool, answer: Array, untouched: Array, steps: Array, reaction: Array
+) -> bool:
+    """Fill the `reaction` (k, 2) of the surface, and the step to equilibrium where forces were unknown.
+
+    False where a number is not finite.
+    """
+    stiffness, force, compliance, motions = body
+    size, whole = steps.shape[0], 0.0
+    if by_forces:
+        for i in range(size):
+            reaction[i // 2, i % 2] = answer[i, 0]
+            steps[i, 0] = untouched[i]
+            for m in range(motions.shape[1]):
+                steps[i, 0] += motions[i, m] * answer[size + m, 0]
+        for i in range(size):
+            if answer[i, 0] != 0.0:
+                for c in range(size):
+                    steps[c, 0] += answer[i, 0] * compliance[i, c]
+    else:
+        for i in range(size):
+            total = force[i]
+            for c in range(size):
+                total += stiffness[i, c] * steps[c, 0]
+            reaction[i // 2, i % 2] = total
+    for i in range(size):
+        whole += reaction[i // 2, i % 2]
+    return np.isfinite(whole)
+
+
+@compiled
+def change_states(states: ContactStates, changes: StateChanges, slip: Array, entered: Narrow, one_by_one: bool) -> None:
+    """Change all states that contradict the solution, or the worst one alone.
+
+    A node that comes to touch again and again slips every other time; `entered` (k,) counts that.
+    """
+    state, sense, _ = states
+    wanted, turned, badness = changes
+    worst = 0
+    for i in range(state.shape[0]):
+        if badness[i] > badness[worst]:
+            worst = i
+    for i in range(state.shape[0]):
+        if one_by_one and i != worst:
+            continue
+        if state[i] == OPEN and (wanted[i] == SHEAR_LIMITED or wanted[i] == STICK):
+            entered[i] += 1
+            if entered[i] % 2 == 0:
+                if wanted[i] == STICK:
+                    turned[i] = -1 if slip[i] > 0.0 else 1
+                wanted[i] = SLIP
+        state[i], sense[i] = wanted[i], turned[i]
+
+
+@compiled
+def met_before(states: ContactStates, seen: Narrow, known: int) -> bool:
+    """Return whether the states are among the first `known` of those `seen` (n, 2, k), and add them to these.
+
+    Where they are, they become the only ones.
+    """
+    state, sense, _ = states
+    met = False
+    for n in range(known):
+        same = True
+        for i in range(state.shape[0]):
+            same &= seen[n, 0, i] == state[i] and seen[n, 1, i] == sense[i]
+        met |= same
+    place = 0 if met else known
+    for i in range(state.shape[0]):
+        seen[place, 0, i], seen[place, 1, i] = state[i], sense[i]
+    return met
+
+
+@compiled
+def balance(
+    state: Narrow, sums: Array, loads: Array, answer: Array, control: ForceControl, by_drag: bool, motion: Array
+) -> bool:
     """Add to the first of `answer` (2 k, 4) the change of depth, `by_drag` of travel too, that meets given forces.
 
     `sums` (2, 2 k) is how the surface's force along x and y follows the answer, beside `loads` (2,). Fills `motion`
-    (2,) with both changes, at most its stride. False where nothing meets them.
+    (2,) with both changes, at most its stride. False where nothing touches, or nothing meets them.
     """
+    if count_in(state, OPEN) == state.shape[0]:
+        return False
     drag, push = np.zeros(COLUMNS), np.zeros(COLUMNS)
     for c in range(sums.shape[1]):
         for s in range(COLUMNS):

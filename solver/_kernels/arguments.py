@@ -31,6 +31,37 @@ class ElementSystem(NamedTuple):
     volume: Array  # (e, 3) those modes
 
 
+class ElementWork(NamedTuple):
+    """Memory for one element. Sums over quadrature points are products of small matrices of a fixed size.
+
+    Their sixteen columns are x of the outer nodes, then y; the centre's come last.
+    """
+
+    h: Array  # (q, 18) gradients in the deformed body
+    s: Array  # (q, 18) what the stress is made of
+    wide: Array  # (q, 3) weights times modes
+    push: Array  # (q,) shear modulus as it has grown, by weight
+    more: Array  # (q,) how fast it grows, by weight
+    bend: Array  # (q,) the modulus less the pressure, by weight
+    d: Array  # (3, 18) derivatives of the modes of ln J
+    f: Array  # (18,) forces
+    by_x: Array  # (9, 16) products of deformed gradients, by x of a node
+    by_y: Array  # (9, 16) and by its y
+    laplace: Array  # (9, 9) as in `ElementArrays`, of tissue that stiffens
+    left: Array  # (18, 5) the tangent less the products is left right: three modes of pressure, and the centre
+    right: Array  # (5, 16)
+    own: Array  # (16, 16) their product
+
+
+class OverstressWork(NamedTuple):
+    """Memory for what relaxing tissue adds to one element; x of a node, then its y."""
+
+    full: Array  # (18, 18) tangent, lower half by nodes
+    own: Array  # (18,) forces
+    points: Array  # (4, 9) F T and F^-T times the gradients, x and y of each
+    across: Array  # (2, 17) stiffness between the centre and the others, and the force on it
+
+
 class BodyState(NamedTuple):
     """Displacements and pressures of a body at finite strain."""
 
@@ -72,6 +103,16 @@ class LinearElements(NamedTuple):
     dilatation: Array  # (e, 3, 18) displacements to the modes 1, x - xc, y - yc of the volume strain
     centre: Array  # (e, 2) xc, yc [mm]
     recovery_matrix: Array  # (e, 2, 16): displacement of the centre node = -(recovery_matrix @ outer displacements)
+
+
+class LinearWork(NamedTuple):
+    """Memory for one element at small strain; columns are x of nine nodes, then y."""
+
+    h: Array  # (q, 18) gradients
+    bent: Array  # (q, 18) those times weight and shear modulus
+    modes: Array  # (q, 3) weights times 1, x - xc, y - yc
+    d: Array  # (3, 18) volume strain by modes that are orthonormal over the element
+    root: Array  # (3, 3) L of the Cholesky factor of the mass of the modes
 
 
 class RecoveryArrays(NamedTuple):
@@ -187,6 +228,14 @@ class StateChanges(NamedTuple):
     state: Narrow  # (k,)
     sense: Narrow  # (k,)
     badness: Array  # (k,) how badly each node contradicts its own [N/mm]; -1 where it does not
+
+
+class Slack(NamedTuple):
+    """What is round-off of forces and heights, by the largest of each."""
+
+    force: float  # [N/mm]
+    height: float  # [mm]
+    by_height: float  # the largest force by the largest height [N/mm per mm]
 
 
 class MeshTransferArrays(NamedTuple):

@@ -1,4 +1,3 @@
-# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
 """Elimination of a symmetric body down to its skin, part by part of a `SymbolicFactorization`.
 
 n unknowns are numbered in the order of their elimination, the m of the skin last. A part's front is a symmetric matrix
@@ -10,7 +9,7 @@ import numpy as np
 
 from solver._kernels.arguments import Factors, SymbolicFactorization
 from solver._kernels.compiling import compiled
-from solver.arrays import Array
+from solver.arrays import Array, Narrow
 
 
 @compiled
@@ -21,51 +20,21 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
     There is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to
     an equilibrium.
     """
-    start, inner, border, children, border_at = plan.start, plan.inner, plan.border, plan.children, plan.border_at
-    place, run, factor_at, wait_at = plan.place, plan.run, plan.factor_at, plan.wait_at
-    leaf, order, at = plan.leaf, plan.order, plan.at
-    for p in range(start.shape[0]):
+    inner, border, factor_at, wait_at = plan.inner, plan.border, plan.factor_at, plan.wait_at
+    for p in range(inner.shape[0]):
         k, b = inner[p], border[p]
         wide = k + b
         top = factors[factor_at[p] : factor_at[p] + k * wide].reshape(k, wide)
         rest = waiting[wait_at[p] : wait_at[p] + b * b].reshape(b, b)
         top[:, :] = 0.0
         rest[:, :] = 0.0
-        for n in range(leaf[p, 0], leaf[p, 1]):
-            e = order[n]
-            for i in range(16):
-                r = at[n, i]
-                if r < 0:
-                    continue
-                for j in range(i + 1):
-                    c = at[n, j]
-                    if c < 0:
-                        continue
-                    low, high = min(r, c), max(r, c)
-                    if low < k:
-                        top[low, high] += tangent[e, i, j]
-                    else:
-                        rest[low - k, high - k] += tangent[e, i, j]
-        for child in children[p]:
-            if child < 0:
-                continue
-            size = border[child]
-            below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
-            where = place[border_at[child] : border_at[child] + size]
-            ends = run[border_at[child] : border_at[child] + size]
-            for i in range(size):
-                r = where[i]
-                if r < k:
-                    target, offset = top[r], 0
-                else:
-                    target, offset = rest[r - k], k
-                j = i
-                while j < size:  # neighbours stay neighbours for long runs
-                    first, count = where[j] - offset, ends[j] - j
-                    into, part = target[first : first + count], below[i, j : j + count]
-                    for c in range(count):
-                        into[c] += part[c]
-                    j += count
+        for n in range(plan.leaf[p, 0], plan.leaf[p, 1]):
+            _add_element(tangent[plan.order[n]], plan.at[n], top, rest)
+        for child in plan.children[p]:
+            if child >= 0:
+                size, first = border[child], plan.border_at[child]
+                below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
+                _add_child(below, plan.place[first : first + size], plan.run[first : first + size], top, rest)
         if not _factorised(top, rest):
             return False
     m = skin.shape[0]
@@ -74,6 +43,41 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
         for j in range(i, m):
             skin[i, j] = skin[j, i] = last[i, j]
     return True
+
+
+@compiled
+def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
+    """Add an element's tangent `own` (16, 16), lower half, to a front in which its unknowns stand `at` (16,)."""
+    k = top.shape[0]
+    for i in range(16):
+        for j in range(i + 1):
+            low, high = min(at[i], at[j]), max(at[i], at[j])
+            if 0 <= low < k:
+                top[low, high] += own[i, j]
+            elif low >= k:
+                rest[low - k, high - k] += own[i, j]
+
+
+@compiled
+def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Array) -> None:
+    """Add what a child passes on, `below` (b, b), to the front in which its border stands `where` (b,).
+
+    Neighbours stay neighbours for long runs, of which `ends` (b,) are the ends.
+    """
+    k, size = top.shape[0], below.shape[0]
+    for i in range(size):
+        r = where[i]
+        if r < k:
+            target, offset = top[r], 0
+        else:
+            target, offset = rest[r - k], k
+        j = i
+        while j < size:
+            first, count = where[j] - offset, ends[j] - j
+            into, part = target[first : first + count], below[i, j : j + count]
+            for c in range(count):
+                into[c] += part[c]
+            j += count
 
 
 @compiled

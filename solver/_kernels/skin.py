@@ -1,11 +1,10 @@
-# ruff: noqa: C901 - a compiled loop is flat: calls inside it would cost more than they explain
 """The skin that may touch: lengths and contact rows of its k nodes, and the solution of their system."""
 
 import numpy as np
 
 from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
-from solver.arrays import Array, Narrow
+from solver.arrays import Array, Indices, Narrow
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
 _LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
@@ -79,22 +78,37 @@ def assemble_contact_system(
     with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
     conditions prescribe displacements; what is unknown is listed in `free` (f,).
     """
-    stiffness, force, held, at = body.stiffness, body.force, skin.held, skin.middle
-    state, sense = states.state, states.sense
-    mu, tau = load.mu, load.tau
-    x_now, above, anchor = position
-    length, free, matrix, right, steps, _ = system
-    size = state.shape[0]
-    for i in range(2 * size):
-        for c in range(COLUMNS):
-            steps[i, c] = 0.0
-            right[i, c] = 0.0
+    f = prescribe(skin, states.state, position, system)
+    spot = np.empty(system.steps.shape[0], np.int64)
+    spot[:] = -1
+    for r in range(f):
+        spot[system.free[r]] = r
+    square = system.matrix[: f * f].reshape(f, f)
+    for r in range(f):
+        i = system.free[r] // 2
+        if states.state[i] == SLIP:
+            slide_row(r, states.sense[i], load.mu, body, system.free, square[r], system.right[r])
+            drag = states.sense[i] * load.mu
+        else:
+            free_row(r, body, system.free, square[r], system.right[r])
+            drag = 0.0
+        add_prescribed(system.free[r], drag, body.stiffness, skin.held, states.state, system.steps, system.right[r])
+        if states.state[i] == SHEAR_LIMITED:
+            add_bound(i, states.sense[i] * load.tau, load.mu, skin.middle, states.state, spot, system, square[r])
+    return f
+
+
+@compiled
+def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: ContactSystem) -> int:
+    """Fill the `steps` that states of contact prescribe, and list the `free` unknowns; return how many those are."""
+    free, steps, held = system.free, system.steps, skin.held
+    steps[:, :] = 0.0
     f = 0
-    for i in range(size):
+    for i in range(state.shape[0]):
         x, y = 2 * i, 2 * i + 1
         if held[i] & HELD_X == 0:
             if state[i] == STICK:
-                steps[x, 0], steps[x, 3] = anchor[i] - x_now[i], 1.0
+                steps[x, 0], steps[x, 3] = position.anchor[i] - position.x[i], 1.0
             else:
                 free[f] = x
                 f += 1
@@ -103,54 +117,72 @@ def assemble_contact_system(
                 free[f] = y
                 f += 1
             else:
-                steps[y, 0], steps[y, 1] = -above[i], 1.0
-    spot = np.empty(2 * size, np.int64)
-    for i in range(2 * size):
-        spot[i] = -1
-    for r in range(f):
-        spot[free[r]] = r
-    square = matrix[: f * f].reshape(f, f)
-    for r in range(f):
-        row = free[r]
-        i = row // 2
-        slips = state[i] == SLIP
-        drag = sense[i] * mu if slips else 0.0
-        mine, other = stiffness[row], stiffness[min(row + 1, 2 * size - 1)]
-        if slips:
-            for c in range(f):
-                square[r, c] = mine[free[c]] - drag * other[free[c]]
-            right[r, 0] = drag * force[row + 1] - force[row]
-            right[r, 2] = sense[i] * force[row + 1]
-        else:
-            for c in range(f):
-                square[r, c] = mine[free[c]]
-            right[r, 0] = -force[row]
-        for j in range(size):
-            if state[j] == OPEN or held[j] & HELD_Y != 0:
-                continue
-            y = 2 * j + 1
-            value = mine[y] - drag * other[y]
-            right[r, 0] -= value * steps[y, 0]
-            right[r, 1] -= value
-            if state[j] == STICK and held[j] & HELD_X == 0:
-                value = mine[y - 1] - drag * other[y - 1]
-                right[r, 0] -= value * steps[y - 1, 0]
-                right[r, 3] -= value
-        if state[i] == SHEAR_LIMITED:
-            drag = sense[i] * tau
-            right[r, 0] += drag * length[i]
-            for edge in range(max(i - 1, 0), min(i + 2, size)):
-                if at[edge] != 1 or not rubs(state, edge, i, mu):
-                    continue
-                for n in range(3):
-                    x = 2 * (edge - 1 + n)
-                    slope = drag * _LENGTHS[i - edge + 1, n]
-                    if spot[x] >= 0:
-                        square[r, spot[x]] -= slope
-                    else:
-                        right[r, 0] += slope * steps[x, 0]
-                        right[r, 3] += slope * steps[x, 3]
+                steps[y, 0], steps[y, 1] = -position.above[i], 1.0
     return f
+
+
+@compiled
+def free_row(r: int, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
+    """Write down row r: the force on an unknown of the skin is none."""
+    row = free[r]
+    mine = body.stiffness[row]
+    for c in range(square.shape[0]):
+        square[c] = mine[free[c]]
+    right[0], right[1], right[2], right[3] = -body.force[row], 0.0, 0.0, 0.0
+
+
+@compiled
+def slide_row(r: int, sense: int, mu: float, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
+    """Write down row r: the drag on a node that slips, its sense that of friction, is mu times the push on it."""
+    row, force = free[r], body.force
+    drag = sense * mu
+    mine, other = body.stiffness[row], body.stiffness[row + 1]
+    for c in range(square.shape[0]):
+        square[c] = mine[free[c]] - drag * other[free[c]]
+    right[0], right[1], right[2], right[3] = drag * force[row + 1] - force[row], 0.0, sense * force[row + 1], 0.0
+
+
+@compiled
+def add_prescribed(
+    row: int, drag: float, stiffness: Array, held: Narrow, state: Narrow, steps: Array, right: Array
+) -> None:
+    """Take from the `right` (4,) of a row, less `drag` times the next one, what prescribed steps contribute."""
+    mine, other = stiffness[row], stiffness[min(row + 1, stiffness.shape[0] - 1)]
+    for j in range(state.shape[0]):
+        if state[j] == OPEN or held[j] & HELD_Y != 0:
+            continue
+        y = 2 * j + 1
+        value = mine[y] - drag * other[y]
+        right[0] -= value * steps[y, 0]
+        right[1] -= value
+        if state[j] == STICK and held[j] & HELD_X == 0:
+            value = mine[y - 1] - drag * other[y - 1]
+            right[0] -= value * steps[y - 1, 0]
+            right[3] -= value
+
+
+@compiled
+def add_bound(
+    i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
+) -> None:
+    """Add to node i's row, `square` (f,), the bound's `drag` [MPa] on the length of skin that the node stands for.
+
+    `spot` (2 k,) is where an unknown of the skin stands in the system, -1 where its step is prescribed.
+    """
+    r, steps = spot[2 * i], system.steps
+    right = system.right[r]
+    right[0] += drag * system.length[i]
+    for edge in range(max(i - 1, 0), min(i + 2, state.shape[0])):
+        if middle[edge] != 1 or not rubs(state, edge, i, mu):
+            continue
+        for n in range(3):
+            x = 2 * (edge - 1 + n)
+            slope = drag * _LENGTHS[i - edge + 1, n]
+            if spot[x] >= 0:
+                square[spot[x]] -= slope
+            else:
+                right[0] += slope * steps[x, 0]
+                right[3] += slope * steps[x, 3]
 
 
 @compiled
@@ -165,31 +197,10 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
     for r in range(size):
         least = max(least, ZERO * abs(a[r, r]))
     for r in range(size):
-        row = a[r]
-        p = 0
-        while p + 4 <= r:
-            s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
-            f0 = row[p] * over[p]
-            f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
-            f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
-            f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
-            target = row[p + 4 :]
-            s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
-            for c in range(target.shape[0]):
-                target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
-            for s in range(COLUMNS):
-                right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
-            p += 4
-        while p < r:
-            factor = row[p] * over[p]
-            for c in range(p + 1, size):
-                row[c] -= factor * a[p, c]
-            for s in range(COLUMNS):
-                right[r, s] -= factor * right[p, s]
-            p += 1
-        if abs(row[r]) <= least:
+        eliminate_row(r, a, right, over)
+        if abs(a[r, r]) <= least:
             return False
-        over[r] = 1.0 / row[r]
+        over[r] = 1.0 / a[r, r]
     for r in range(size - 1, -1, -1):
         for c in range(r + 1, size):
             for s in range(COLUMNS):
@@ -197,3 +208,30 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
         for s in range(COLUMNS):
             right[r, s] *= over[r]
     return True
+
+
+@compiled
+def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
+    """Take from row r of a system the rows before it, four at a time, whose pivots are one over `over` (r,)."""
+    row = a[r]
+    p = 0
+    while p + 4 <= r:
+        s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
+        f0 = row[p] * over[p]
+        f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
+        f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
+        f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
+        target = row[p + 4 :]
+        s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
+        for c in range(target.shape[0]):
+            target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
+        for s in range(COLUMNS):
+            right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
+        p += 4
+    while p < r:
+        factor = row[p] * over[p]
+        for c in range(p + 1, row.shape[0]):
+            row[c] -= factor * a[p, c]
+        for s in range(COLUMNS):
+            right[r, s] -= factor * right[p, s]
+        p += 1

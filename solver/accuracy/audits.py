@@ -10,7 +10,7 @@ from solver.body.receptor import Patches
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.failures import NotConverged
+from solver.failures import NoSteadyState, NotConverged
 from solver.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
@@ -96,6 +96,19 @@ def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
         raise NotConverged(
             f"Forces balance to {left:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
             f"contacts far smaller than the mesh, {MIXED} do that."
+        )
+
+
+def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displacement: Array) -> None:
+    """Raise NoSteadyState where a bound on traction alone holds skin displaced farther than the finger is long.
+
+    At small strain a slide that wedges itself in has a state under any bound, however high.
+    """
+    farthest, length = float(np.abs(displacement).max()), float(np.ptp(finger.geometry.mesh.nodes, axis=0).max())
+    if farthest > length and (state.state == kernels.SHEAR_LIMITED).any():
+        raise NoSteadyState(
+            f"This slide would displace skin by {farthest:.3g} mm, farther than the finger is long ({length:.3g} mm): "
+            "ask for less friction or depth, or a lower tau_max."
         )
 
 

@@ -13,7 +13,16 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver._kernels import STICK
-from solver.accuracy.audits import MIXED, audits, course_audits, forces_missed, inside_out, refuse_unsound, unbalanced
+from solver.accuracy.audits import (
+    MIXED,
+    audits,
+    course_audits,
+    forces_missed,
+    inside_out,
+    refuse_beyond_finger,
+    refuse_unsound,
+    unbalanced,
+)
 from solver.accuracy.small_errors import on_nested, steps_asked
 from solver.arrays import Array
 from solver.continuation.small_existence import direct
@@ -203,6 +212,7 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
     )
     sed = finger.sed_ending(displacement)
     refuse_unsound(checks, depth)
+    refuse_beyond_finger(finger, contact, displacement)
     checks |= forces_missed(scene, float(contact.normal.sum()), float(contact.tangential.sum()))
     if way is not None:
         checks |= course_audits(finger.newton, [instant.state for instant in way], relaxing=relaxed)

@@ -117,3 +117,9 @@ def test_at_finite_strain_an_earlier_slide_whose_skin_folds_is_told():
 
 def test_slides_that_all_settle_need_no_warning():
     assert not any("A slide before" in told for told in solve(driven(1.0, 0.4, ("+x", "-x"))).warnings)
+
+
+@pytest.mark.parametrize("bound", [0.9, 9e9])
+def test_a_slide_that_would_carry_skin_farther_than_the_finger_is_long_is_refused(bound):
+    with pytest.raises(NoSteadyState, match="farther than the finger is long"):
+        solve(Scene(friction=Friction(5.0, bound), loading=Loading(1.5, "+x")))
