@@ -3,6 +3,7 @@
 from PySide6.QtCore import QByteArray, Qt
 from PySide6.QtWidgets import QSplitter, QWidget
 
+from daq_app.qt.openness import Openness
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
 from daq_app.qt.screens import settings
 
@@ -19,8 +20,6 @@ class Drawer(QSplitter):
         """Place both as they were left."""
         super().__init__(Qt.Orientation.Horizontal)
         self._main, self._drawer = main, drawer
-        self._room = True
-        self._instead = False  # it was opened where there is no room for both
         self.addWidget(main)
         self.addWidget(drawer)
         self.setChildrenCollapsible(False)
@@ -32,32 +31,27 @@ class Drawer(QSplitter):
             self.restoreState(sizes)
         self.handle(1).setAccessibleName("edge of the drawer")
         self.splitterMoved.connect(self._keep_sizes)
-        self._wanted = settings().value(DRAWER) != "no"
+        self._open = Openness(DRAWER)
         self._place()
 
     @property
     def is_open(self) -> bool:
         """Say whether the drawer is seen."""
-        return self._wanted if self._room else self._instead
+        return bool(self._open)
 
     def set_room(self, room: bool) -> None:
         """Say whether there is room for both."""
-        if room != self._room:
-            self._room, self._instead = room, False
+        if self._open.set_room(room):
             self._place()
 
     def toggle(self) -> None:
         """Open or close the drawer; where there is room for both this is remembered."""
-        if self._room:
-            self._wanted = not self._wanted
-            settings().setValue(DRAWER, "yes" if self._wanted else "no")
-        else:
-            self._instead = not self._instead
+        self._open.toggle()
         self._place()
 
     def _place(self) -> None:
         self._drawer.setVisible(self.is_open)
-        self._main.setVisible(self._room or not self._instead)
+        self._main.setVisible(self._open.room or not self._open)
 
     def _keep_sizes(self) -> None:
         settings().setValue(DRAWER_SIZES, self.saveState())

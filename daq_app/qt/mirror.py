@@ -3,8 +3,8 @@
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
+from daq_app.qt.openness import Openness
 from daq_app.qt.parts import button
-from daq_app.qt.screens import settings
 from daq_app.qt.subject_picture import SubjectPicture
 from daq_app.qt.tokens import Tokens
 from daq_app.window.view_subject import SubjectView
@@ -25,9 +25,7 @@ class Mirror(QWidget):
         self._tokens, self._scale = tokens, scale
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
-        self._room = True
-        self._wanted = settings().value(MIRROR) != "no"
-        self._instead = False  # it was opened where there is no room
+        self._open = Openness(MIRROR)
         self.picture: SubjectPicture | None = None  # made when it is first seen
         self.tab = button("", "the subject's page", self.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
@@ -40,21 +38,16 @@ class Mirror(QWidget):
     @property
     def is_open(self) -> bool:
         """Say whether the picture is seen."""
-        return self._wanted if self._room else self._instead
+        return bool(self._open)
 
     def set_room(self, room: bool) -> None:
         """Say whether there is room for the picture."""
-        if room != self._room:
-            self._room, self._instead = room, False
+        if self._open.set_room(room):
             self._place()
 
     def toggle(self) -> None:
         """Open or fold the picture; where there is room for it this is remembered."""
-        if self._room:
-            self._wanted = not self._wanted
-            settings().setValue(MIRROR, "yes" if self._wanted else "no")
-        else:
-            self._instead = not self._instead
+        self._open.toggle()
         self._place()
 
     def show_view(self, view: SubjectView | None, size: QSize) -> None:

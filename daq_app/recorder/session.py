@@ -59,6 +59,7 @@ from sessions.run.steps import Command, Event
 LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client goes [session clock]
 CLIENT_GONE = "the window or terminal that ran the session is gone"
 ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
+PLANTED = "planted friction"  # likewise: descriptor, index and friction of simulated surfaces
 Send = Callable[[Report], None]
 
 
@@ -117,7 +118,9 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
     at, last = resumption(recording.plan, recording.events), recording.last_block()
     going_on, gap = continued(recording, last, clock, datetime.now(UTC))
-    people = request.people or recorded_people(recording)
+    people = recorded_people(recording)
+    if request.people is not None:  # the bench holds the surfaces that it held
+        people = replace(request.people, planted=people.planted)
     info = _opened_again(request, recording, bench, going_on)
     _check_people(people, recording.plan, bench, folder)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
@@ -172,8 +175,9 @@ def seal(folder: Path, send: Send) -> None:
 def recorded_people(recording: Recording) -> People:
     """Return who did what was asked for when the session began."""
     told = {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
-    with suppress(msgspec.ValidationError):
-        return msgspec.convert({"kind": told["people"], "seed": told.get("people seed", 0)}, People)
+    with suppress(msgspec.DecodeError, msgspec.ValidationError):
+        planted = msgspec.json.decode(told.get(PLANTED, "[]"))
+        return msgspec.convert({"kind": told["people"], "seed": told.get("people seed", 0), "planted": planted}, People)
     return People()
 
 
@@ -288,6 +292,8 @@ def _told(people: People, uri: str | None) -> list[Setting]:
     settings = [Setting("people", people.kind, "", "set")]
     if people.kind != "people":
         settings.append(Setting("people seed", people.seed, "", "set"))
+    if people.planted:
+        settings.append(Setting(PLANTED, msgspec.json.encode(people.planted).decode(), "", "set"))
     if uri is not None:
         settings.append(Setting("device", without_home(uri), "", "set"))
     return settings

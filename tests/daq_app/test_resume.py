@@ -11,11 +11,32 @@ import pytest
 from daq_app.cli.main import run
 from sessions.recording import Recording, RecordingError
 
+PLANTED = {3: 0.15, 70: 0.6}  # friction of two surfaces on the simulated bench, by index
+OWN = f"""
+name = "own"
+title = "Cloths"
+contact_angle = 45.0
+label_seed = 1
+
+[[blocks]]
+name = "slip"
+descriptor = "slipperiness"
+scale_ends = ["not at all", "very"]
+direction = "proximal to distal"
+indentation = 2.0
+instruction = "Stroke once, then score."
+indices = {list(PLANTED)}
+planted_friction = {list(PLANTED.values())}
+repetitions = 4
+"""
+
 
 @pytest.mark.skipif(os.name != "posix", reason="kill -9 needs POSIX")
 def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_ends_whole(tmp_path, capsys):
     folder = tmp_path / "P07"
-    words = ["run", "sensotact-friction", "--device", "sim:?seed=7", "--subject", "P07", "--headless", "--seed", "3"]
+    own = tmp_path / "own.toml"
+    own.write_text(OWN)
+    words = ["run", str(own), "--device", "sim:?seed=7", "--subject", "P07", "--headless", "--seed", "3"]
     people = ["--simulate-subject", "7", "--pace", "20"]
     process = subprocess.Popen(
         [sys.executable, "-m", "daq_app", *words, *people, "--out", str(folder)],
@@ -46,5 +67,9 @@ def test_a_killed_run_is_resumed_at_the_same_trial_on_the_same_bench_only_and_en
     assert run(resume) == 1
     assert "is sealed" in capsys.readouterr().err
     assert run(["analyse", str(folder), "--json"]) in (0, 3)
-    strokes = json.loads(capsys.readouterr().out)["strokes"]
-    assert {stroke["trial"] for stroke in strokes if stroke["trial"]} == set(range(1, 11))
+    analysed = json.loads(capsys.readouterr().out)
+    strokes = analysed["strokes"]
+    assert {stroke["trial"] for stroke in strokes if stroke["trial"]} == {trial.number for trial in after.plan.trials}
+    planted = {trial.number: PLANTED[trial.stimulus.index] for trial in after.plan.trials}
+    for row in analysed["friction"]:  # of the strokes before the end and after it
+        assert row["mu"] == pytest.approx(planted[row["trial"]], rel=0.1)
