@@ -4,7 +4,7 @@ import numpy as np
 
 from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ElementWork, ProbeArrays
 from solver._kernels.compiling import compiled
-from solver.arrays import Array, Narrow
+from solver.arrays import Array, Indices, Narrow
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 
@@ -51,7 +51,7 @@ def excess_of(xx: float, xy: float, yx: float, yy: float, log: float) -> float:
 
 
 @compiled
-def gather(u: Array, nodes: Narrow, e: int, ux: Array, uy: Array) -> None:
+def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> None:
     """Fill `ux`, `uy` (9,) with the displacements of the nodes of an element."""
     for i in range(9):
         ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]

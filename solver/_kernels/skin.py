@@ -85,7 +85,7 @@ def assemble_contact_system(
         spot[system.free[r]] = r
     square = system.matrix[: f * f].reshape(f, f)
     for r in range(f):
-        i = system.free[r] // 2
+        i: int = system.free[r] // 2
         if states.state[i] == SLIP:
             slide_row(r, states.sense[i], load.mu, body, system.free, square[r], system.right[r])
             drag = states.sense[i] * load.mu
