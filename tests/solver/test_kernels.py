@@ -246,12 +246,12 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
     before = (
         "import numpy as np\n"
         "from solver import _kernels as kernels\n"
-        "from solver._kernels.arguments import ContactStates, LoadState\n"
+        "from solver._kernels.arguments import ContactStates, LoadArguments\n"
         "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
         "kernels.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
         "kernels.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
         "states = ContactStates(states, states.copy(), np.zeros((3, 2)))\n"
-        "kernels.update_contact_states(states, zero, zero, zero, zero, LoadState(0.1, 0.1, 0.1, 1))\n"
+        "kernels.update_contact_states(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1))\n"
     )
     first, then = (
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
