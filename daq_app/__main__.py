@@ -15,14 +15,11 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq_app.cli.main import run
 
-    if len(sys.argv) == 1:
-        from daq_app.qt.start import main as open_window  # the command line runs where Qt is not installed
+    first = sys.argv[1] if len(sys.argv) > 1 else "window"
+    if first == "window" or first.startswith("--subject-"):
+        from daq_app.qt.start import window  # the command line runs where Qt is not installed
 
-        sys.exit(open_window())
-    if sys.argv[1] == "window":
-        from daq_app.qt.start import look_at
-
-        sys.exit(look_at(sys.argv[2:]))
+        sys.exit(window(sys.argv[1 + (first == "window") :]))
     _leave(run(sys.argv[1:]))
 
 

@@ -1,8 +1,6 @@
 """The other two ways to answer: a number on one's own scale, and which of two."""
 
 from collections.abc import Callable
-from math import isfinite
-from typing import Literal
 
 from PySide6.QtCore import QRegularExpression, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator
@@ -10,12 +8,11 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
-from daq_app.window.answer import Choice
+from daq_app.window.answer import Choice, Which
 from daq_app.window.subject_texts import SubjectText as Text
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event
 
-Which = Literal["first", "second"]
 POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
 NUMBER = QRegularExpression(
     rf"\d{{0,9}}[{POINTS}]?\d{{0,9}}", QRegularExpression.PatternOption.UseUnicodePropertiesOption
@@ -74,11 +71,8 @@ class NumberField(_Field):
         try:
             number = float(text.strip().translate(dict.fromkeys(map(ord, POINTS), ".")))
         except ValueError:
-            number = 0.0
-        value = number if number > 0.0 and isfinite(number) else None
-        first = self.answer.first_touch
-        # What stands while a number is typed is not yet an answer that is corrected.
-        self.answer = Choice(value, self.now() if first is None else first, self.answer.corrections, "keyboard")
+            number = None
+        self.answer = self.answer.typed(self.now(), number)
         self.changed.emit()
 
 
@@ -119,12 +113,12 @@ class ChoiceOfTwo(_Field):
             Qt.Key.Key_Left if mirrored else Qt.Key.Key_Right: "second",
         }
         if event.key() in keys:
-            self._take(self.answer.changed(self.now(), keys[event.key()], "keyboard"))
+            self._take(self.answer.chosen(self.now(), keys[event.key()], "keyboard"))
         else:
             super().keyPressEvent(event)
 
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        made = button(words, words, lambda: self._take(self.answer.changed(self.now(), which, "mouse")))
+        made = button(words, words, lambda: self._take(self.answer.chosen(self.now(), which, "mouse")))
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.

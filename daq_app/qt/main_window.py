@@ -32,6 +32,7 @@ from daq_app.qt.rooms import Rooms
 from daq_app.qt.screens import line_settings, millimetres
 from daq_app.qt.subject_preview import open_preview
 from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.tablet_screen import TabletScreen
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import headline
@@ -55,8 +56,8 @@ class MainWindow(QMainWindow):
 
     theme_wanted = Signal(str)
 
-    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float) -> None:
-        """Place the panels, and follow `bridge`."""
+    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float, tablet: TabletScreen | None = None) -> None:
+        """Place the panels, and follow `bridge`; with a `tablet` the subject answers there."""
         super().__init__()
         self.setWindowTitle("daq-app")
         self.setAccessibleName("experimenter's window")
@@ -79,6 +80,10 @@ class MainWindow(QMainWindow):
         self.subject = SubjectWindow(tokens, scale, bridge.session_now)
         self.subject.answered.connect(self._answered)
         self.subject.screen_changed.connect(self._line_changed)
+        self.tablet = tablet
+        if tablet is not None:
+            tablet.answered.connect(bridge.send)
+            tablet.changed.connect(self._tablet_changed)
         self.keyboard = Keyboard(self, self.course.plan, self.subject, self.act)
         self.keyboard.free.connect(self._bring_subject)
         self.rooms = Rooms(bridge, tokens, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
@@ -142,6 +147,7 @@ class MainWindow(QMainWindow):
         if self.keyboard.typed_in() is not None:
             self.setFocus()
         self._place_subject(activating=True)
+        self._show_subject_view(self.bridge.view)  # which a window that is hidden need not have
         self.subject.raise_()
         self.subject.activateWindow()
 
@@ -187,6 +193,7 @@ class MainWindow(QMainWindow):
             "inspect": self.middle.toggle_inspection,
             "pilot": self._pilot,
             "preview": self._preview,
+            "tablet": lambda: self.tablet and self.tablet.server.renew(),
             "subject": self.show_subject,
             "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
             "open": self.rooms.choose,
@@ -239,6 +246,8 @@ class MainWindow(QMainWindow):
         save_place(self)
         self.bridge.end()
         self.rooms.leave()
+        if self.tablet is not None:
+            self.tablet.close()
         self.subject.hide()
         QGuiApplication.quit()
 
@@ -274,7 +283,8 @@ class MainWindow(QMainWindow):
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), line_settings(self.subject.screen()))
+        line = line_settings(self.subject.screen()) if self.tablet is None else self.tablet.line_settings()
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), line)
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return
@@ -303,12 +313,24 @@ class MainWindow(QMainWindow):
 
     def _show_subject_view(self, view: View) -> None:
         session = self.bridge.state.session
+        self.course.mirror.show_view(view.mirror, self.subject.size())
+        if self.tablet is not None:
+            self.tablet.session_offset = self.bridge.session_offset
+            self.tablet.show_view(view.subject, session)
+            if not self.subject.isVisible():
+                return  # no key here is an answer
         hand = None if session is None else session.plan.answering_hand
         was_scoring = self.subject.scoring
         self.subject.show_view(view.subject, hand)
-        self.course.mirror.show_view(view.mirror, self.subject.size())
         if not was_scoring:
             self._bring_subject()
+
+    def _tablet_changed(self) -> None:
+        """Say what is known of the tablet, and that it has gone where an answer is due."""
+        self._line_changed()
+        assert self.tablet is not None
+        if self.bridge.recording and not self.tablet.server.connected:
+            self.notice.warn("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
 
     def _bring_subject(self) -> None:
         """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""
@@ -328,7 +350,10 @@ class MainWindow(QMainWindow):
         self.activateWindow()
 
     def _line_changed(self) -> None:
-        self.page.show_line(millimetres(self.subject.screen()))
+        if self.tablet is None:
+            self.page.show_line(millimetres(self.subject.screen()))
+        else:
+            self.page.show_tablet(self.tablet.words, self.tablet.missing)
         if self.bridge.view.course is None:
             self._form_changed()
 
@@ -342,6 +367,8 @@ class MainWindow(QMainWindow):
         session = self.bridge.state.session
         try:
             self.live.model_says()
+            if self.tablet is not None and self.bridge.view.subject.force:
+                self.tablet.show_force(self.bridge.feed.trace)
             if self.subject.press.isVisible():
                 self.subject.press.show_force(self.bridge.feed.trace)
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)

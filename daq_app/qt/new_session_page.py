@@ -97,10 +97,16 @@ class NewSessionPage(QFrame):
             pair[chosen].setChecked(True)
         self._people_words = label("", "quiet", wrap=True)
         self._line_words = ""  # how far the length of the subject's line is known
+        self._tablet_missing = ""  # why the subject's page is on no tablet, where it should be
         self._screen = ""  # with that, which characters of the texts no font here has
         self._pilot = button("Pilot  F5", "pilot this protocol with simulated hand and answers", lambda: act("pilot"))
         self._pilot.setToolTip("Runs by itself, needs no subject, and is kept apart in the folder “pilots”")
         self._preview = button("Preview  F7", "preview every page that the subject will see", lambda: act("preview"))
+        self._ruler = button(
+            "Check with a ruler  Ctrl+M", "check the subject's line with a ruler", lambda: act("ruler")
+        )
+        self._new_code = button("New code", "let another tablet in, by a new code", lambda: act("tablet"))
+        self._new_code.hide()
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
@@ -138,6 +144,7 @@ class NewSessionPage(QFrame):
             normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
             area=self.area.text() if self.with_forces.isChecked() else "",
             simulated=self.simulated.isChecked(),
+            tablet=self._tablet_missing,
         )
 
     def show_bench(self, bench: Bench) -> None:
@@ -166,8 +173,18 @@ class NewSessionPage(QFrame):
         self._line_words = f"Line of {LENGTH:.0f} mm, {known.words}."
         self._show_screen()
 
+    def show_tablet(self, words: str, missing: str) -> None:
+        """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin."""
+        self._line_words, self._tablet_missing = words, missing
+        self._ruler.hide()  # there is one on the tablet's page
+        self._new_code.show()
+        self._show_screen()
+
     def _show_screen(self) -> None:
         """Say what is worth knowing of the subject's screen: the line's length, and characters no font here has."""
+        if not self._new_code.isHidden():
+            self._screen = self._line_words  # the tablet has fonts of its own
+            return
         _, texts = subject_texts(self.form())
         words = translator(self.form().language or ENGLISH)
         lost = missing_glyphs([*texts, *map(words, SubjectText)], self.font())
@@ -345,9 +362,8 @@ class NewSessionPage(QFrame):
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
         field(layout, "Language that the subject reads", self.language)
-        layout.addWidget(
-            button("Check with a ruler  Ctrl+M", "check the subject's line with a ruler", lambda: self._act("ruler"))
-        )
+        layout.addWidget(self._ruler)
+        layout.addWidget(self._new_code)
 
     def _build_disk(self, layout: QVBoxLayout) -> None:
         folder = QHBoxLayout()

@@ -13,6 +13,17 @@ FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
 
 
+def newest_force(trace: LiveTrace) -> float:
+    """Return the normal force of the last moment [N]; 0 where nothing is known."""
+    newest = trace.newest
+    if newest is None:
+        return 0.0
+    _, values = trace.between(newest - OVER, np.nextafter(newest, np.inf))
+    normal = values[CHANNELS.index("N")]
+    known = normal[np.isfinite(normal)]
+    return float(known.mean()) if len(known) else 0.0
+
+
 class PressBar(Painted):
     """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
@@ -25,13 +36,7 @@ class PressBar(Painted):
 
     def show_force(self, trace: LiveTrace) -> None:
         """Show the normal force of the last moment; an empty bar where nothing is known."""
-        newest = trace.newest
-        force = 0.0
-        if newest is not None:
-            _, values = trace.between(newest - OVER, np.nextafter(newest, np.inf))
-            normal = values[CHANNELS.index("N")]
-            known = normal[np.isfinite(normal)]
-            force = float(known.mean()) if len(known) else 0.0
+        force = newest_force(trace)
         if abs(force - self._force) * self.width() > FULL:  # a pixel
             self._force = force
             self.update()

@@ -1,5 +1,6 @@
 """Starts the window: checks that there is a screen, opens it at once with the simulated bench, and runs it."""
 
+import argparse
 import gc
 import sys
 from collections.abc import Callable
@@ -15,27 +16,34 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
     from daq_app.qt.analyst_window import AnalystWindow
     from daq_app.qt.bridge import Client
     from daq_app.qt.main_window import MainWindow
+    from daq_app.qt.tablet_screen import TabletScreen
     from daq_app.qt.tokens import Tokens
 
 SIMULATED_BENCH = "sim:?rate=200"
 ICON = Path(__file__).with_name("daq-app.svg")
 FAILED = 1  # exit code: could not be done
-WRONG = 2  # likewise: the command line was wrong
 
 
-def main() -> int:
-    """Open the window and return the exit code. What is missing is told in one sentence."""
-    return _shown(opened)
-
-
-def look_at(arguments: list[str]) -> int:
+def window(arguments: list[str]) -> int:
     """Open the analyst's window on the session named, or the experimenter's without one; return the exit code."""
-    if not arguments:
-        return main()
-    if len(arguments) > 1 or arguments[0].startswith("-"):
-        sys.stderr.write("usage: daq-app window [SESSION]\n\nExample: daq-app window recordings/P07\n")
-        return 0 if "--help" in arguments else WRONG
-    folder = Path(arguments[0])
+    parser = argparse.ArgumentParser(
+        "daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07"
+    )
+    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
+    parser.add_argument(
+        "--subject-screen",
+        choices=("window", "web"),
+        default="window",
+        help="where the subject's page is: a window here, or a tablet's browser on the lab's network (window)",
+    )
+    parser.add_argument(
+        "--subject-address", metavar="IP", help="this machine's address for the tablet (that of its own network)"
+    )
+    options = parser.parse_args(arguments)
+    folder: Path | None = options.session
+    if folder is None:
+        web = options.subject_screen == "web"
+        return _shown(lambda application: opened(application, tablet=_tablet(options.subject_address) if web else None))
     if not folder.is_dir():
         return _said(f"{folder} is no folder: give a session's folder")
 
@@ -52,21 +60,29 @@ def look_at(arguments: list[str]) -> int:
 
 
 def opened(
-    application: "QApplication", start: "Callable[[], Client] | None" = None, theme: "Tokens | None" = None
+    application: "QApplication",
+    start: "Callable[[], Client] | None" = None,
+    theme: "Tokens | None" = None,
+    tablet: "TabletScreen | None" = None,
 ) -> "MainWindow":
     """Return the experimenter's window with the simulated bench being connected; `start` makes a recorder.
 
-    Without a `theme` that of the system is followed.
+    Without a `theme` that of the system is followed. With a `tablet` the subject's page is there.
     """
     gc.disable()  # what is made now stays: looking through it again and again would only hold the window up
     try:
-        return _opened(application, start, theme)
+        return _opened(application, start, theme, tablet)
     finally:
         gc.freeze()
         gc.enable()
 
 
-def _opened(application: "QApplication", start: "Callable[[], Client] | None", theme: "Tokens | None") -> "MainWindow":
+def _opened(
+    application: "QApplication",
+    start: "Callable[[], Client] | None",
+    theme: "Tokens | None",
+    tablet: "TabletScreen | None",
+) -> "MainWindow":
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
 
@@ -82,7 +98,7 @@ def _opened(application: "QApplication", start: "Callable[[], Client] | None", t
     _dress(application, tokens, scale)
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
-    window = MainWindow(bridge, tokens, scale)
+    window = MainWindow(bridge, tokens, scale, tablet)
 
     def theme_changed() -> None:
         chosen = remembered.chosen_tokens()
@@ -107,6 +123,14 @@ def _opened(application: "QApplication", start: "Callable[[], Client] | None", t
     return window
 
 
+def _tablet(address: str | None) -> "TabletScreen":
+    """Return the subject's page on a tablet. Raises NoTabletServer."""
+    from daq_app.qt.tablet_screen import TabletScreen
+    from daq_app.tablet.server import PORT
+
+    return TabletScreen(address, PORT)
+
+
 def _shown(made: "Callable[[QApplication], QWidget]") -> int:
     """Show the window that is made until it is closed; return the exit code, or say what is missing."""
     if missing := what_is_missing():
@@ -115,8 +139,13 @@ def _shown(made: "Callable[[QApplication], QWidget]") -> int:
         from PySide6.QtWidgets import QApplication
     except ImportError as error:
         return _said(missing_library(error))
+    from daq_app.tablet.server import NoTabletServer
+
     application = QApplication(sys.argv[:1])
-    window = made(application)
+    try:
+        window = made(application)
+    except NoTabletServer as error:
+        return _said(str(error))
     window.show()
     return application.exec()
 

@@ -1,12 +1,14 @@
 """One answer on the line from 0 to 100 as it is given: every position with its time, and its corrections."""
 
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Literal
 
 from sessions.plan.plan import Hand
 from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
 Device = Literal["mouse", "touch", "pen", "keyboard"]
+Which = Literal["first", "second"]
 
 MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
 STEP = 1.0  # an arrow moves the mark by so much ...
@@ -66,16 +68,24 @@ class Answer:
 class Choice:
     """A number, or one of two, as it is given: what stands, and how it came to stand."""
 
-    value: float | Literal["first", "second"] | None = None
+    value: float | Which | None = None
     first_touch: float | None = None  # [s, session clock]
     corrections: int = 0  # how often another value took the place of one
     device: Device | None = None
 
-    def changed(self, time: float, value: float | Literal["first", "second"] | None, device: Device) -> "Choice":
-        """Return the answer with another value at `time` [s]; None takes it back."""
+    def chosen(self, time: float, value: Which, device: Device) -> "Choice":
+        """Return the answer with one of two at `time` [s]."""
         first = time if self.first_touch is None else self.first_touch
-        again = self.corrections + (self.value is not None and value is not None and value != self.value)
-        return Choice(value, first, again, device)
+        return Choice(value, first, self.corrections + (self.value not in (None, value)), device)
+
+    def typed(self, time: float, number: float | None) -> "Choice":
+        """Return the answer with another number in the field at `time` [s]; one that is not above 0 is none.
+
+        What stands while a number is typed is not yet an answer that is corrected.
+        """
+        value = number if number is not None and number > 0.0 and isfinite(number) else None
+        first = time if self.first_touch is None else self.first_touch
+        return Choice(value, first, self.corrections, "keyboard")
 
     def given(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
         """Return the event of an answer that is given."""

@@ -12,7 +12,7 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "Study and protocol": ("study", "protocol", "seed"),
     "Subject": ("subject",),
     "Transducer": ("forces", "simulated", "height", "area"),
-    "Subject's screen": (),
+    "Subject's screen": ("tablet",),
     "Disk": ("folder",),
 }  # of each card, the worst first
 

@@ -47,6 +47,7 @@ class SessionForm:
     practice: bool = False  # before the trials that count
     language: str = ""  # that the subject reads, its code; empty: the protocol's own
     simulated: bool = False  # the subject's judgement too, where the bench is simulated
+    tablet: str = ""  # why the subject's page is on no tablet, where it should be
     pilot: bool = False  # kept apart from what people do, in no study
 
 
@@ -161,6 +162,8 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
     The protocol is read and the disk is measured, so that what Start would refuse is known before anybody presses it.
     """
     wrong = _refusals(form, bench)
+    if form.tablet and not form.simulated:
+        wrong["tablet"] = form.tablet
     said = enrolment(form)
     if said is None:
         try:

@@ -31,6 +31,7 @@ class SubjectText(StrEnum):
     NEXT = "Next"
     FIRST = "The first"
     SECOND = "The second"
+    OFFLINE = "No connection. Your answer is kept on this device."
     # What a screen reader tells:
     LINE = "Line from {low} to {high}"
     UNANSWERED = "No answer yet. The arrow keys move the mark."

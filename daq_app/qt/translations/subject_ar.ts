@@ -92,6 +92,10 @@
         <translation>الثاني</translation>
     </message>
     <message>
+        <source>No connection. Your answer is kept on this device.</source>
+        <translation>لا يوجد اتصال. إجابتك محفوظة على هذا الجهاز.</translation>
+    </message>
+    <message>
         <source>Line from {low} to {high}</source>
         <translation>خط من {low} إلى {high}</translation>
     </message>

@@ -92,6 +92,10 @@
         <translation>Die zweite</translation>
     </message>
     <message>
+        <source>No connection. Your answer is kept on this device.</source>
+        <translation>Keine Verbindung. Ihre Antwort bleibt auf diesem Gerät gespeichert.</translation>
+    </message>
+    <message>
         <source>Line from {low} to {high}</source>
         <translation>Linie von {low} bis {high}</translation>
     </message>

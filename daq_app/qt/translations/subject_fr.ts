@@ -92,6 +92,10 @@
         <translation>La seconde</translation>
     </message>
     <message>
+        <source>No connection. Your answer is kept on this device.</source>
+        <translation>Pas de connexion. Votre réponse est conservée sur cet appareil.</translation>
+    </message>
+    <message>
         <source>Line from {low} to {high}</source>
         <translation>Ligne de {low} à {high}</translation>
     </message>

@@ -92,6 +92,10 @@
         <translation>二つ目</translation>
     </message>
     <message>
+        <source>No connection. Your answer is kept on this device.</source>
+        <translation>接続がありません。回答はこの端末に保存されています。</translation>
+    </message>
+    <message>
         <source>Line from {low} to {high}</source>
         <translation>{low}から{high}までの線</translation>
     </message>

@@ -1,0 +1,214 @@
+"""Serves the subject's page to one tablet on the lab's own network, and nothing else to anybody.
+
+There are two addresses: `/` is the page, which is the same for everybody and tells nothing, and `/socket` is the
+conversation. Whoever talks there must first say the code that the experimenter's window shows. It holds for one
+device. After `TRIES` wrong codes there is a new one. What is said crosses the network as plain text.
+"""
+
+import ipaddress
+import secrets
+import socket
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from http import HTTPStatus
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from daq_app.tablet.messages import LARGEST, FromTablet, Hello, Refused, ToTablet, Welcome, read, written
+
+if TYPE_CHECKING:  # an optional package
+    from websockets.http11 import Request, Response
+    from websockets.sync.server import ServerConnection
+
+PORT = 8377  # where nothing else listens there; unassigned by IANA
+TRIES = 5  # of wrong codes, before there is a new one
+WRONG_CODE = 1.0  # wait after a wrong code [s]: with 10^6 codes and `TRIES` a guess succeeds once in days
+ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
+PATIENCE = 10.0  # for the first message [s]
+PAGE = Path(__file__).with_name("page.html")
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
+MISSING = "the subject's page on a tablet needs the package websockets: pip install 'daq-app[tablet]'"
+
+
+class NoTabletServer(Exception):
+    """The page cannot be served; the sentence says why."""
+
+
+class TabletServer:
+    """A server in a thread of its own. All methods may be called from any thread."""
+
+    def __init__(
+        self, address: str, port: int, received: Callable[[FromTablet, float], None], changed: Callable[[], None]
+    ) -> None:
+        """Listen at an address of this machine. Raises NoTabletServer.
+
+        `received` takes each message of the tablet that was let in and the machine's monotonic clock [s] at its
+        arrival; `changed` is called when a tablet has come or gone, or the code is another one. A port that is taken is
+        replaced by a free one.
+        """
+        try:
+            from websockets.sync.server import serve
+        except ImportError as error:
+            raise NoTabletServer(MISSING) from error
+        self._received = received
+        self._changed = changed
+        self._lock = threading.Lock()
+        self._held: ServerConnection | None = None  # of the tablet that was let in
+        self._token = ""
+        self._wrong = 0
+        self._last: dict[type, str] = {}  # what a tablet that comes back has to know
+        self.code = _new_code()
+        listening = _listening(address, port)
+        self.url = "http://{}:{}".format(*listening.getsockname()[:2])
+        self._page = PAGE.read_text(encoding="utf-8")
+        self._server = serve(
+            self._talk,
+            sock=listening,
+            process_request=self._answer,
+            origins=[self.url],  # pyright: ignore[reportArgumentType]  a text, of a type of its own
+            max_size=LARGEST,
+            ping_interval=ALIVE / 2,
+            ping_timeout=ALIVE / 2,
+            compression=None,
+        )
+        threading.Thread(target=self._server.serve_forever, name="the tablet's server", daemon=True).start()
+
+    @property
+    def connected(self) -> bool:
+        """Say whether the tablet is there."""
+        return self._held is not None
+
+    def send(self, message: ToTablet) -> None:
+        """Send something to the tablet; one that comes later gets the last message of each kind that tells a state."""
+        text = written(message)
+        with self._lock:  # so that a tablet that comes now does not hear of it too early
+            self._last[type(message)] = text
+            if self._held is not None:
+                _tell(self._held, text)
+
+    def renew(self) -> None:
+        """Let go of the tablet, and let in whoever says the new code."""
+        with self._lock:
+            held, self._held, self._token = self._held, None, ""
+            self.code, self._wrong = _new_code(), 0
+        if held is not None:
+            held.close()
+        self._changed()
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._server.shutdown()
+
+    def _answer(self, connection: "ServerConnection", request: "Request") -> "Response | None":
+        """Answer a request for a page; None where it begins a conversation."""
+        if request.path == "/socket":
+            return None
+        if request.path != "/":
+            return connection.respond(HTTPStatus.NOT_FOUND, "Nothing is here.\n")
+        page = connection.respond(HTTPStatus.OK, self._page)
+        del page.headers["Content-Type"]
+        page.headers["Content-Type"] = "text/html; charset=utf-8"
+        page.headers["Content-Security-Policy"] = POLICY
+        page.headers["Cache-Control"] = "no-store"
+        return page
+
+    def _talk(self, connection: "ServerConnection") -> None:
+        """Let a tablet in, and take what it says until it goes."""
+        from websockets.exceptions import ConnectionClosed
+
+        with suppress(ConnectionClosed, TimeoutError, msgspec.DecodeError):
+            hello = read(connection.recv(PATIENCE))
+            if not isinstance(hello, Hello) or not self._let_in(connection, hello):
+                return
+            try:
+                self._received(hello, time.monotonic())
+                while True:
+                    said = read(connection.recv())
+                    self._received(said, time.monotonic())
+            finally:
+                with self._lock:
+                    if gone := self._held is connection:
+                        self._held = None
+                if gone:
+                    self._changed()
+
+    def _let_in(self, connection: "ServerConnection", hello: Hello) -> bool:
+        """Say whether a tablet is the one; a tablet that comes back takes the place of its own lost connection."""
+        before = None
+        with self._lock:
+            known = bool(self._token) and secrets.compare_digest(hello.token, self._token)
+            fresh = not self._token and secrets.compare_digest(hello.code, self.code)
+            if known or fresh:
+                before, self._held = self._held, connection
+                self._token = self._token or secrets.token_urlsafe()
+                for text in (written(Welcome(self._token)), *self._last.values()):
+                    _tell(connection, text)
+        if not (known or fresh):
+            self._refuse(connection, hello)
+            return False
+        if before is not None:
+            before.close()
+        self._changed()
+        return True
+
+    def _refuse(self, connection: "ServerConnection", hello: Hello) -> None:
+        """Say no, after a while; another code takes the place of one that is guessed at."""
+        time.sleep(WRONG_CODE)
+        with self._lock:
+            taken = bool(self._token)
+            self._wrong += bool(hello.code)
+            renewed = self._wrong >= TRIES and not taken
+            if renewed:
+                self.code, self._wrong = _new_code(), 0
+        if renewed:
+            self._changed()
+        why = "Another device shows this page. Ask for a new code." if taken else "This is not the code."
+        _tell(connection, written(Refused(why)))
+
+
+def own_address() -> str:
+    """Return the address of this machine on its network, the machine's own loop where it has none.
+
+    No packet is sent: the system only looks up which way one would take.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        try:
+            asked.connect(("192.0.2.1", 9))  # documentation's own network (RFC 5737): no machine is there
+            return str(asked.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"
+
+
+def _listening(address: str, port: int) -> socket.socket:
+    """Return a socket that listens at an address, at a free port where the one asked for is taken."""
+    try:
+        private = ipaddress.IPv4Address(address).is_private and address != "0.0.0.0"
+    except ValueError as error:
+        raise NoTabletServer(f"{address} is no IPv4 address: give this machine's, such as 192.168.1.20") from error
+    if not private:
+        raise NoTabletServer(
+            f"{address} is no address of a private network: the subject's page is served in the lab alone;"
+            " give --subject-address with this machine's address there"
+        )
+    for asked in (port, 0):
+        try:
+            return socket.create_server((address, asked))
+        except OSError as error:
+            refused = error
+    raise NoTabletServer(f"{address} is no address of this machine ({refused.strerror}); give --subject-address")
+
+
+def _new_code() -> str:
+    return f"{secrets.randbelow(10**6):06d}"
+
+
+def _tell(connection: "ServerConnection", text: str) -> None:
+    """Send a text to a tablet; where it is gone, the thread that listens to it finds out."""
+    from websockets.exceptions import ConnectionClosed
+
+    with suppress(ConnectionClosed, OSError):
+        connection.send(text)

@@ -1,0 +1,109 @@
+"""What becomes of an answer on the tablet: told once, acknowledged when safe, never lost, never taken for another."""
+
+import json
+
+import pytest
+from session_messages import BEGUN, FIRST, PLAN, SCORE, after, logged
+
+from daq_app.tablet.dialogue import Dialogue, event_of
+from daq_app.tablet.messages import Act, Page, Stored, read
+from daq_app.window.view_subject import subject_view
+from sessions.run import steps
+
+ACTS = [[1000.0, "press", 20.0, "touch"], [1500.0, "drag", 60.0, "touch"], [1600.0, "release", None, "touch"]]
+
+
+def given(key, acts=ACTS):
+    return read(json.dumps({"type": "given", "key": key, "acts": acts, "sent": 2000.0}))
+
+
+class Tablet:
+    """A dialogue with what it has sent."""
+
+    def __init__(self):
+        self.sent = []
+        self.dialogue = Dialogue(self.sent.append)
+
+    def show(self, *messages):
+        session = after(*messages).session
+        self.dialogue.show(subject_view(session), session, str, mirrored=False)
+        return next(message for message in reversed(self.sent) if isinstance(message, Page))
+
+    def give(self, key):
+        return self.dialogue.take(given(key), lambda at: at * 1e-3)
+
+
+def test_a_page_is_sent_once_and_tells_nothing_of_the_stimulus():
+    tablet = Tablet()
+    page = tablet.show(*SCORE)
+    tablet.show(*SCORE)
+    assert len(tablet.sent) == 1
+    assert (page.kind, page.ends) == ("line", ("low end", "high end"))
+    told = repr(page).replace(page.key, "")
+    assert not any(trial.stimulus.code in told for trial in PLAN.trials)
+
+
+def test_an_answer_goes_to_the_recorder_once_and_is_acknowledged_when_it_is_safe():
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    answer = tablet.give(key)
+    assert answer == steps.Scored(60.0, ((1.0, 20.0), (1.5, 60.0)), 1.0, 0, PLAN.answering_hand, "touch")
+    assert tablet.give(key) is None  # the tablet asks again: it has heard of nothing yet
+    assert not [sent for sent in tablet.sent if isinstance(sent, Stored)]
+    tablet.show(*SCORE, logged("scored", 1, score=60.0))
+    assert tablet.sent.count(Stored(key)) == 1
+    assert tablet.give(key) is None  # its acknowledgement got lost: it is told again
+    assert tablet.sent.count(Stored(key)) == 2
+
+
+def test_an_answer_that_comes_too_late_is_written_down_as_a_note():
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    tablet.show(*SCORE, logged("take_discarded", 1, reason="redo"), steps.StartTake(1, 2), steps.AskStroke(FIRST))
+    note = tablet.give(key)
+    assert isinstance(note, steps.Note)
+    assert "60.0" in note.text
+    assert key in note.text
+    assert Stored(key) in tablet.sent
+
+
+def test_an_answer_waits_on_the_tablet_while_no_session_runs():
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    tablet.dialogue.show(subject_view(None), None, str, mirrored=False)
+    assert tablet.give(key) is None
+    assert not [sent for sent in tablet.sent if isinstance(sent, Stored)]
+    tablet.show(*BEGUN)
+    assert isinstance(tablet.give(key), steps.Note)
+
+
+def test_an_answer_of_another_kind_than_asked_for_is_no_answer():
+    tablet = Tablet()
+    key = tablet.show(*SCORE).key
+    other = read(json.dumps({"type": "given", "key": key, "acts": [[1.0, "choose", "first", "touch"]], "sent": 2.0}))
+    assert isinstance(tablet.dialogue.take(other, float), steps.Note)
+
+
+@pytest.mark.parametrize(
+    ("acts", "expected"),
+    [
+        (
+            [(1.0, "press", 150.0, "pen"), (2.0, "release", None, "pen"), (3.0, "press", 40.04, "pen")],
+            steps.Scored(40.0, ((1.0, 100.0), (3.0, 40.04)), 1.0, 1, None, "pen"),
+        ),
+        (
+            [(1.0, "step", 1.0, "keyboard"), (1.5, "step", -10.0, "keyboard")],
+            steps.Scored(40.0, ((1.0, 50.0), (1.5, 40.0)), 1.0, 0, None, "keyboard"),
+        ),
+        (
+            [(1.0, "number", 1.0, "keyboard"), (2.0, "number", 12.5, "keyboard")],
+            steps.MagnitudeEstimate(12.5, 1.0, 0, None, "keyboard"),
+        ),
+        (
+            [(1.0, "choose", "second", "touch"), (2.0, "choose", "first", "touch")],
+            steps.PairedChoice("first", 1.0, 1, None, "touch"),
+        ),
+    ],
+)
+def test_acts_make_the_answer_that_the_same_acts_make_in_the_window(acts, expected):
+    assert event_of([Act(*act) for act in acts], lambda at: at, None) == expected

@@ -1,0 +1,131 @@
+"""The tablet's server: one page, one device, one code, and nothing else for anybody."""
+
+import json
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from threading import Event
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from daq_app.tablet import server as module
+from daq_app.tablet.messages import Force, Given, Hello
+from daq_app.tablet.server import NoTabletServer, TabletServer
+
+pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
+
+
+@pytest.fixture
+def server(monkeypatch):
+    monkeypatch.setattr(module, "WRONG_CODE", 0.01)
+    heard, news = [], Event()
+    made = TabletServer("127.0.0.1", 0, lambda said, _at: heard.append(said), news.set)
+    made.heard, made.news = heard, news
+    yield made
+    made.close()
+
+
+def place(server):
+    return server.url.replace("http", "ws") + "/socket"
+
+
+@contextmanager
+def socket(server, **hello):
+    with connect(place(server), origin=server.url) as talk:
+        talk.send(json.dumps({"type": "hello", **hello}))
+        yield talk
+
+
+def said(talk):
+    return json.loads(talk.recv(5.0))
+
+
+def status_of(url):
+    try:
+        with urllib.request.urlopen(url) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_nothing_but_the_page_is_reachable(server):
+    with urllib.request.urlopen(server.url + "/") as answer:
+        assert answer.headers["Content-Security-Policy"].startswith("default-src 'none'")
+        page = answer.read().decode()
+    assert server.code not in page
+    for path in ("/page.html", "/../pyproject.toml", "/socket/", "/session.sqlite", "/?x=1", "/index.html"):
+        assert status_of(server.url + path) == 404
+    assert status_of(server.url + "/socket") in (400, 426)
+
+
+def test_another_page_cannot_talk_in_the_name_of_the_browser(server):
+    with pytest.raises(InvalidStatus), connect(place(server), origin="http://elsewhere.example"):
+        pass
+
+
+def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
+    server.send(Force(0.5))
+    with socket(server, code=server.code, pixels_per_mm=4.0) as first:
+        welcome = said(first)
+        assert welcome["type"] == "welcome"
+        assert said(first) == {"type": "force", "part": 0.5}  # what came before it
+        assert socket_refused(server, code=server.code)  # the code is used
+    with socket(server, token=welcome["token"]) as again:
+        assert said(again)["type"] == "welcome"
+        assert server.connected
+    assert [type(one) for one in server.heard] == [Hello, Hello]
+    assert server.heard[0].pixels_per_mm == 4.0
+
+
+def socket_refused(server, **hello):
+    with socket(server, **hello) as talk:
+        return said(talk)["type"] == "refused"
+
+
+def test_a_code_that_is_guessed_at_becomes_another(server):
+    code = server.code
+    wrong = f"{(int(code) + 1) % 10**6:06d}"
+    for _ in range(module.TRIES):
+        assert server.code == code
+        assert socket_refused(server, code=wrong)
+    assert server.code != code
+    assert not server.connected
+
+
+def test_a_new_code_lets_go_of_the_device_that_was_there(server):
+    with socket(server, code=server.code) as first:
+        token = said(first)["token"]
+        server.renew()
+        with pytest.raises(ConnectionClosed):
+            first.recv(5.0)
+    assert socket_refused(server, token=token)
+    with socket(server, code=server.code) as second:
+        assert said(second)["type"] == "welcome"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[]", '{"type": "given"}', '{"type": "stop"}', "\x00", '{"type": "given", "key": 1}', "9" * 999]
+)
+def test_nonsense_ends_the_conversation_and_nothing_else(server, text):
+    with socket(server, code=server.code) as talk:
+        token = said(talk)["token"]
+        talk.send(text)
+        with pytest.raises(ConnectionClosed):
+            talk.recv(5.0)
+    with socket(server, token=token) as talk:
+        assert said(talk)["type"] == "welcome"
+        talk.send(json.dumps({"type": "given", "key": "a", "acts": [[1.0, "press", 5.0, "pen"]], "sent": 2.0}))
+        server.news.clear()
+    assert server.news.wait(5.0)
+    assert isinstance(server.heard[-1], Given)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [("8.8.8.8", "private"), ("0.0.0.0", "private"), ("lab", "IPv4"), ("10.255.255.254", "no address of this machine")],
+)
+def test_an_address_that_is_not_the_labs_own_is_refused_with_a_sentence(address, words):
+    with pytest.raises(NoTabletServer, match=words):
+        TabletServer(address, 0, lambda *_: None, lambda: None)

@@ -1,0 +1,141 @@
+"""A session whose subject answers in a real browser: by touch, by key, and while the network is away."""
+
+from pathlib import Path
+
+import pytest
+from browser import CHROMIUM
+from PySide6.QtWidgets import QLabel
+from tablet_browser import Browser
+
+from daq_app.qt.start import opened
+from daq_app.qt.tablet_screen import TabletScreen
+from daq_app.recorder.client import Recorder
+from daq_app.recorder.messages import Stop
+from daq_app.window.live_model_process import LiveModel
+from daq_app.window.messages import NewSession
+from daq_app.window.new_session import bench_of
+from sessions.recording import Recording
+from sessions.run import steps
+from tests.daq_app.qt.conftest import Driver, application  # noqa: F401  a fixture
+
+pytestmark = [pytest.mark.qt, pytest.mark.skipif(CHROMIUM is None, reason="there is no browser here")]
+
+
+@pytest.fixture
+def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
+    monkeypatch.setattr(LiveModel, "prepare", lambda _: None)
+    window = opened(application, Recorder.start, tablet=TabletScreen("127.0.0.1", 0))
+    driver = Driver(application, window)
+    window.show()
+    page = window.page
+    page.folder.setText(str(tmp_path / "recordings"))
+    page.scores_only.setChecked(True)
+    page.subject.setText("P01")
+    browser = Browser(tmp_path / "browser", application.processEvents)
+    yield driver, browser
+    browser.close()
+    if driver.session is not None and not driver.session.over:
+        window.bridge.send(Stop())
+        driver.until(lambda: driver.session.over, "the end")
+    window.tablet.close()
+    window.bridge.end()
+    for widget in (window.subject, window):
+        widget.hide()
+        widget.deleteLater()
+
+
+def answered(driver, number):
+    driver.until(lambda: driver.session.of(number).answer is not None, f"the answer to {number}")
+    return driver.session.of(number).answer
+
+
+def ask(driver):
+    """Bring the session in hand to its next question, doing each step once."""
+    done = []
+
+    def asked():
+        here, primary = (driver.session.phase, driver.session.trial), driver.view.course.primary
+        if here[0] != "scoring" and primary is not None and primary.sends is not None and here not in done:
+            done.append(here)
+            driver.window.bridge.send(primary.sends)
+        return here[0] == "scoring"
+
+    driver.until(asked, "a question")
+
+
+def shown_words(window):
+    return " ".join(one.text() for one in window.notice.findChildren(QLabel))
+
+
+def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
+    driver, browser = desk
+    window, server = driver.window, driver.window.tablet.server
+    card = next(
+        card
+        for card in window.page.check(bench_of(window.bridge.state.bench), anew=True)
+        if card.name == "Subject's screen"
+    )
+    assert not card.ready
+    assert server.code in card.words
+    browser.call("Page.navigate", url=server.url)
+    browser.until("document.readyState == 'complete' && !!document.getElementById('code')")
+    browser.click("code")
+    browser.type(server.code)
+    browser.key("Enter")
+    browser.value("document.getElementById('entry').requestSubmit()")
+    browser.until("!document.getElementById('ruler').hidden", "the line to be measured")
+    browser.click("measured")
+    browser.type("80")
+    browser.value("document.getElementById('ruler').requestSubmit()")
+    browser.until("document.getElementById('title').textContent == 'Welcome'")
+    driver.until(lambda: "checked with a ruler" in window.tablet.words and "not" not in window.tablet.words)
+    window.act("primary")
+    driver.phase("idle")
+    assert not window.subject.isVisible()
+
+    ask(driver)  # by touch
+    browser.until("!document.getElementById('line').parentElement.hidden", "the line")
+    assert not browser.shown("next")
+    assert browser.value("document.getElementById('line').getBoundingClientRect().width") == pytest.approx(
+        100 * 100 * 96 / 25.4 / 80, abs=1
+    )
+    assert not window.subject.isVisible()
+    browser.touch("line", 0.2, 0.4, 0.7)
+    browser.until("!document.getElementById('next').hidden")
+    browser.click("next")
+    assert answered(driver, 1) == "score 70"
+    browser.until("pending.length == 0", "the acknowledgement")
+
+    ask(driver)  # by key
+    browser.until("asked() && document.activeElement.id == 'line'", "the line")
+    browser.key("ArrowRight")
+    browser.key("PageUp")
+    browser.key("Enter")
+    assert answered(driver, 2) == "score 60"
+
+    ask(driver)  # while the network is away
+    browser.until("asked()", "the line")
+    browser.value("connect = () => {}; socket.close()")
+    driver.until(lambda: not server.connected)
+    driver.until(lambda: "tablet does not answer" in shown_words(window))
+    browser.touch("line", 0.3)
+    browser.click("next")
+    browser.until("document.body.innerText.includes('kept on this device')")
+    assert driver.session.of(3).answer is None
+    browser.call("Page.reload")  # and it is back
+    assert answered(driver, 3) == "score 30"
+    browser.until("pending.length == 0", "the acknowledgement")
+
+    folder = Path(driver.session.folder)
+    window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    scored = [event for event in Recording.open(folder).events if event.kind == "scored"]
+    assert [event.data["score"] for event in scored] == [70.0, 60.0, 30.0]
+    assert [event.data["input_device"] for event in scored] == ["touch", "keyboard", "touch"]
+    for event in scored:  # the tablet's clock became the session's
+        times = [time for time, _ in event.data["positions"]]
+        assert times == sorted(times)
+        assert 0.0 < event.time_ns * 1e-9 - times[-1] < 20.0
+    settings = Recording.open(folder).provenance["settings"]
+    assert settings["subject's screen"]["value"] == "web"
+    window.bridge.send(NewSession())
