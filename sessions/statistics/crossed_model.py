@@ -9,6 +9,7 @@ from scipy import linalg, optimize
 from sessions.statistics.reml import Array
 
 _WIDEST = 1e3  # spread relative to what is left: scores have three figures, and a step of the search may not go beyond
+_TO_ROUND_OFF = 1e-9  # gradient of the deviance: an error of a spread enters the deviance squared
 _STARTS = (0.1, 1.0)  # spreads relative to what is left; the criterion is smooth, and the best of four is kept
 
 
@@ -35,16 +36,29 @@ def crossed_deviance(
     inner, across, total = random.T @ random, random.T @ columns, columns.T @ columns
     n = len(values)
 
-    def deviance(spread: Array) -> float:
-        scale = np.abs(spread)[whose]
+    def deviance(spread: Array) -> tuple[float, Array]:
+        """Return the deviance at two relative spreads, and its derivatives by them."""
+        scale = spread[whose]
         root = linalg.cholesky(np.eye(len(scale)) + scale[:, None] * inner * scale, lower=True)
         half = linalg.solve_triangular(root, scale[:, None] * across, lower=True)
+        wide = linalg.solve_triangular(root, scale[:, None] * inner, lower=True)
         left = total - half.T @ half
-        rest = float(left[2, 2] - left[:2, 2] @ np.linalg.solve(left[:2, :2], left[:2, 2]))
-        return 2.0 * float(np.log(np.diag(root)).sum()) + n * (1.0 + float(np.log(2.0 * np.pi * rest / n)))
+        fixed = np.linalg.solve(left[:2, :2], left[:2, 2])
+        rest = float(left[2, 2] - left[:2, 2] @ fixed)
+        told = (across - wide.T @ half) @ np.append(-fixed, 1.0)  # Z' V^-1 of what the fixed terms leave
+        slope = np.diag(inner) - (wide**2).sum(axis=0) - n / rest * told**2
+        value = 2.0 * float(np.log(np.diag(root)).sum()) + n * (1.0 + float(np.log(2.0 * np.pi * rest / n)))
+        return value, 2.0 * spread * np.bincount(whose, slope)
 
     fits = [
-        optimize.minimize(deviance, start, method="L-BFGS-B", bounds=[(0.0, _WIDEST)] * 2)
+        optimize.minimize(
+            deviance,
+            start,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(0.0, _WIDEST)] * 2,
+            options={"ftol": 0.0, "gtol": _TO_ROUND_OFF},
+        )
         for start in product(_STARTS, _STARTS)
     ]
     return min(float(one.fun) for one in fits)

@@ -33,7 +33,19 @@ AGAINST_ONE = (
     "spearman_p",
     "without",
     "without_subject",
+    "weight",
 )
+
+
+def near(path):
+    """Return how near a number has to come.
+
+    A comparison of two quantities that go with each other to r divides by 1 - r^2 or less, and r is 0.99 to 0.999 here:
+    with the round-off of r itself and of what r is made of, that leaves nine figures. An estimated error is a
+    difference of answers that agree to three figures.
+    """
+    name = str(path[-1])
+    return 1e3 * NEAR if "contrast" in path or name.startswith("partial") or name.endswith("error") else NEAR
 
 
 def others(cache):
@@ -89,5 +101,5 @@ def test_kernels_of_other_processors_give_every_number_of_a_study_within_1e_12(t
         off = {
             path: abs(there[path][0] - value) / max(size, np.finfo(float).tiny) for path, (value, size) in here.items()
         }
-        worst = max(off, key=lambda path: off[path])
-        assert off[worst] <= NEAR, (name, worst, here[worst], there[worst])
+        worst = max(off, key=lambda path: off[path] / near(path))
+        assert off[worst] <= near(worst), (name, worst, here[worst], there[worst])

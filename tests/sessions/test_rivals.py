@@ -192,6 +192,20 @@ def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
     assert crossed_deviance([str(one) for one in who], what, y, x) == pytest.approx(least.fun, abs=1e-5)
 
 
+def test_round_off_in_the_scores_leaves_the_crossed_deviance_as_it_is():
+    """A deviance that stops short moves with the processor, and the weights with it."""
+    draw = np.random.default_rng(34)
+    who, what = np.repeat(np.arange(4), 10), np.tile(np.repeat(np.arange(5), 2), 4)
+    for _ in range(10):
+        x = draw.normal(size=5)[what] + 0.05 * draw.normal(size=40)
+        y = 20.0 * draw.normal(size=4)[who] + 2.0 * draw.normal(size=5)[what] + 30.0 * x + 5.0 * draw.normal(size=40)
+        moved = [
+            crossed_deviance([str(one) for one in who], what, y * (1.0 + 1e-14 * draw.normal(size=40)), x)
+            for _ in range(4)
+        ]
+        assert max(moved) - min(moved) < 1e-10
+
+
 def test_surfaces_that_explain_almost_everything_leave_a_deviance_still():
     draw = np.random.default_rng(334)  # of 335 such draws the first in which the search leapt to an endless spread
     who, what = np.repeat(np.arange(10), 5), np.tile(np.arange(5), 10)
