@@ -81,7 +81,7 @@ class Bodies:
 
 
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
-    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `load`, each to 3 %.
+    """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `load`, to 3 and 4 %.
 
     Below those of the scene; the force is None where the scene gives none, and either where it is not known.
     """

@@ -40,12 +40,12 @@ AGAINST_ONE = (
 def near(path):
     """Return how near a number has to come.
 
-    A comparison of two quantities that go with each other to r divides by 1 - r^2 or less, and r is 0.99 to 0.999 here:
-    with the round-off of r itself and of what r is made of, that leaves nine figures. An estimated error is a
-    difference of answers that agree to three figures.
+    Rivals are compared by differences of correlations and by what is left once another is given: both divide by
+    1 - r^2 of two quantities, and r is 0.99 to 0.999 here. With the round-off of r itself that leaves nine figures. An
+    estimated error is a difference of answers that agree to three figures.
     """
-    name = str(path[-1])
-    return 1e3 * NEAR if "contrast" in path or name.startswith("partial") or name.endswith("error") else NEAR
+    loses = "rivals" in path or "rivals_of_means" in path or str(path[-1]).endswith(("error", "error_estimate"))
+    return 1e3 * NEAR if loses else NEAR
 
 
 def others(cache):

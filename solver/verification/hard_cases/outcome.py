@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
-from solver.response.solution import solve_many
+from solver.response.solution import UNKNOWN, solve_many
 from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
@@ -51,7 +51,7 @@ def _answered(found: Prediction) -> Outcome:
         flaws.append("smallest_det_F")
     if not found.sed_ending > 0.0:
         flaws.append("sed_ending")
-    if not 0.0 < found.error_estimate < NOTHING:
+    if not 0.0 < found.error_estimate < NOTHING and UNKNOWN not in found.warnings:
         flaws.append("error_estimate")
     numbers = (found.sed_ending, found.sed_point, found.normal_force, found.tangential_force, found.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)
