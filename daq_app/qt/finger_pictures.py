@@ -1,9 +1,11 @@
 """What the finger's picture shows, written to a file: one state as PNG, SVG or numbers, a history as a film."""
 
 import io
+import subprocess
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
@@ -18,6 +20,8 @@ from sessions.atomic_file import write_whole
 DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
 SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
 COLOURS = 256  # of a frame of a GIF: all that the format has
+FILM_SUFFIXES = (".gif", ".mp4")
+NO_MP4 = "MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF"
 
 
 def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
@@ -58,7 +62,7 @@ def _draw(canvas: FingerCanvas, painter: QPainter, head: str) -> None:
 
 
 class FilmWriter(QObject):
-    """Writes the states of a history as an animated GIF, one state at each turn of the event loop."""
+    """Writes the states of a history as GIF or MP4, one state at each turn of the event loop."""
 
     ended = Signal(str)  # with a sentence: where it is, or why there is none
 
@@ -80,7 +84,7 @@ class FilmWriter(QObject):
         self._timer.timeout.connect(self._step)
 
     def write(self, path: Path) -> None:
-        """Begin to write to `path`; `ended` follows."""
+        """Begin to write to `path`, an MP4 where its suffix says so; `ended` follows."""
         self._path = path
         self._timer.start(0)
 
@@ -92,7 +96,8 @@ class FilmWriter(QObject):
             image = _image(self._canvas, 1.0, self._head)
             size = (image.width(), image.height())
             whole = Image.frombytes("RGB", size, bytes(image.constBits()), "raw", "RGB", image.bytesPerLine())
-            self._frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE))
+            gif = self._path.suffix.lower() != ".mp4"
+            self._frames.append(whole.quantize(COLOURS, Image.Quantize.FASTOCTREE) if gif else whole)
             self._dialog.setValue(len(self._frames))
         elif self._writing is None:
             self._dialog.setCancelButton(None)
@@ -111,6 +116,29 @@ class FilmWriter(QObject):
 
 
 def _write_film(path: Path, frames: list[Image.Image]) -> None:
+    """Write the film whole or not at all."""
+    if path.suffix.lower() == ".mp4":
+        write_whole(path, _mp4(frames))
+        return
     content = io.BytesIO()
     frames[0].save(content, "GIF", save_all=True, append_images=frames[1:], duration=SHOWN, loop=0)
     write_whole(path, content.getvalue())
+
+
+def _mp4(frames: list[Image.Image]) -> bytes:
+    """Return an MP4 (H.264) that every browser shows. Raises ImportError where the encoder is not installed."""
+    try:
+        from imageio_ffmpeg import get_ffmpeg_exe
+    except ImportError as error:
+        raise ImportError(NO_MP4) from error
+    width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
+    taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / SHOWN:g}", "-i", "-"]
+    made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
+    pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
+    with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it
+        film = Path(folder) / "film.mp4"
+        encoder = [get_ffmpeg_exe(), "-loglevel", "error", *taken, *made, str(film)]
+        done = subprocess.run(encoder, input=pixels, capture_output=True, check=False)
+        if done.returncode != 0:
+            raise OSError(f"the encoder stopped: {done.stderr.decode(errors='replace').strip()[:200]}")
+        return film.read_bytes()

@@ -17,7 +17,7 @@ from daq_app.qt.field_bar import OWN, FieldBar
 from daq_app.qt.field_plot import LINE, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
-from daq_app.qt.finger_pictures import FilmWriter, write_picture
+from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
 from daq_app.qt.parts import Shortened, Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
@@ -58,7 +58,7 @@ class ModelColumn(QWidget):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
-        self.film = button("Film", "save the history as a film (GIF)", self._ask_film, "small")
+        self.film = button("Film", "save the history as a film, GIF or MP4", self._ask_film, "small")
         self._filming = False
         self.save = SaveButtons("the finger", self._save_finger)
         self.player = TransportBar("the history", tells_time=False)
@@ -230,9 +230,9 @@ class ModelColumn(QWidget):
 
     def _ask_film(self) -> None:
         proposed = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the film as GIF", proposed)
+        path, _ = QFileDialog.getSaveFileName(self, "Save the film", proposed, "GIF (*.gif);;MP4 (*.mp4)")
         if path:
-            self.write_film(Path(path if path.lower().endswith(".gif") else f"{path}.gif"))
+            self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 
     def write_film(self, path: Path) -> FilmWriter:
         """Begin to write the history that is shown as a film; `said` tells what came of it."""

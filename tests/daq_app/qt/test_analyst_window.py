@@ -1,10 +1,13 @@
 """The analyst's window, driven as a person does, on a recorded session that is analysed by the real work."""
 
 import re
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import imageio_ffmpeg
 import numpy as np
 import pyqtgraph
 import pytest
@@ -500,6 +503,37 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
         assert written.size == (window.model.finger.width(), window.model.finger.height())
     assert len(ranges) == 1
     assert "Step 4 of 4" in window.model.finger.accessibleName()
+
+
+def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.write_film(tmp_path / "film.mp4")
+    until(application, lambda: "Saved" in window._words.toolTip())
+    finger = window.model.finger
+    width, height = finger.width() // 2 * 2, finger.height() // 2 * 2
+    read = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-i",
+        str(tmp_path / "film.mp4"),
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-",
+    ]
+    done = subprocess.run(read, capture_output=True, check=True)
+    assert re.search(rf"Video: h264.*{width}x{height}.* 10 fps", done.stderr.decode())
+    pictures = np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
+    assert len(pictures) == 4
+    assert np.std(pictures[-1]) > 10.0  # there is something to see
+
+
+def test_a_film_as_mp4_without_its_encoder_is_one_sentence(application, window, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.write_film(tmp_path / "film.mp4")
+    until(application, lambda: "daq-app[film]" in window._words.toolTip())
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
