@@ -128,7 +128,7 @@ def _write_film(path: Path, frames: list[Image.Image]) -> None:
 def _mp4(frames: list[Image.Image]) -> bytes:
     """Return an MP4 (H.264) that every browser shows. Raises ImportError where the encoder is not installed."""
     try:
-        from imageio_ffmpeg import get_ffmpeg_exe
+        from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingTypeStubs]
     except ImportError as error:
         raise ImportError(NO_MP4) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
