@@ -24,7 +24,7 @@ POINTS = """## What the paper shows
 | in the paper | here |
 | --- | --- |
 | Fig. 2, mean scores of ten subjects with 95 % intervals | a study's page, from a lab's own subjects; the printed scores are not in the program |
-| Figs 3 and 4, forces of each stroke | the report, stroke by stroke; no picture lays the strokes of one series over each other |
+| Figs 3 and 4, forces of each stroke | the report's appendix: the strokes of each series laid over each other, N and T apart |
 | Tables 1 and 2, \u00b5, \u03c4 max and speed | taken as they are; \u03c4 max is read as force over 1 cm\u00b2, a hundred times what the heading says |
 | Table 3, stiffness of the tissues | taken as it is |
 | Fig. 5, speed of the finger | slope of the centre of pressure over the steady window |

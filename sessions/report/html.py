@@ -82,7 +82,7 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
 
 def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
-    order = ("scores", "course", "friction", "speed", "finger", "response", "relation", "paths")
+    order = ("scores", "course", "friction", "speed", "finger", "response", "relation", "paths", "forces")
     numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
     return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
 
@@ -101,7 +101,7 @@ def _contents(
         ("paths", "many paths", "paths" in figures),
         ("model", "the model", bool(report.modelled or report.left_out)),
         ("again", "to do it again", True),
-        ("further", "appendix: further tables", further),
+        ("further", "appendix", further or "forces" in figures),
     )
     return tuple((anchor, words) for anchor, words, there in parts if there)
 

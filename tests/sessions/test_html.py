@@ -226,6 +226,21 @@ def test_the_numbers_beside_a_picture_are_those_of_the_report(tmp_path, report):
     assert (min(inside), max(inside)) == (pytest.approx(0.8), pytest.approx(2.0))
 
 
+@pytest.mark.usefixtures("drawn_before")
+@pytest.mark.parametrize(
+    ("name", "column", "values"), [("normal-force", "N [N]", "normal"), ("tangential-force", "T [N]", "tangential")]
+)
+def test_forces_of_a_series_lie_over_each_other_stroke_by_stroke(tmp_path, report, name, column, values):
+    write_figures(report, tmp_path)
+    lines = (tmp_path / f"{name}-slipperiness.csv").read_text(encoding="utf-8").splitlines()
+    rows = list(csv.DictReader(lines[1:]))
+    of_series = [stroke for stroke in report.strokes if stroke.experiment == "slipperiness"]
+    assert {row["stroke"] for row in rows} == {str(stroke.number) for stroke in of_series}
+    for stroke in of_series:
+        drawn = [float(row[column]) for row in rows if row["stroke"] == str(stroke.number)]
+        assert drawn == list(getattr(stroke.trace, values))
+
+
 def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
     (panel,) = [p for plate in drawn for p in plate.panels if p.name == "relation-stickiness"]
     link = re.search(r'download="relation-stickiness.csv" href="data:text/csv;charset=utf-8;base64,([^"]*)"', made)

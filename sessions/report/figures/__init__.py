@@ -10,7 +10,7 @@ from sessions.report.figures.recording import course_panel
 from sessions.report.figures.relation import relation_panel
 from sessions.report.figures.responses import response_panel
 from sessions.report.figures.scores import score_panel
-from sessions.report.figures.strokes import friction_panel, speed_panel
+from sessions.report.figures.strokes import MU, NORMAL, SPEED, TANGENTIAL, StrokeQuantity, stroke_panel
 from sessions.report.figures.style import Panel, Plate, look
 from sessions.report.responses import shown_response
 
@@ -62,7 +62,7 @@ def _friction(report: Report) -> Plate:
         "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
         "left out where the normal force is too small to divide by."
     )
-    return _of_strokes("friction", caption, friction_panel, report)
+    return Plate("friction", caption, _of_strokes(report, MU))
 
 
 def _speed(report: Report) -> Plate:
@@ -71,13 +71,26 @@ def _speed(report: Report) -> Plate:
         "by rolling and by skin shear as well as by sliding, most of all at onset; the tables give its mean slope "
         "over the steady window. Strokes whose speed was refused are left out."
     )
-    return _of_strokes("speed", caption, speed_panel, report)
+    return Plate("speed", caption, _of_strokes(report, SPEED))
 
 
-def _of_strokes(name: str, caption: str, panel: Callable[..., Panel | None], report: Report) -> Plate:
-    """Return a figure with a panel for the strokes of each experiment of which something can be drawn."""
-    panels = [panel(strokes, experiment, simulated=report.simulated) for experiment, strokes in _grouped(report)]
-    return Plate(name, caption, tuple(each for each in panels if each is not None))
+def _forces(report: Report) -> Plate:
+    caption = (
+        "Normal force N and tangential force T of the strokes of each series, laid over each other from contact onset "
+        "on, zero taken off and filtered as for the analysis. Thick: the steady window. Dashed: a stroke without a "
+        "steady window."
+    )
+    return Plate("forces", caption, _of_strokes(report, NORMAL, TANGENTIAL))
+
+
+def _of_strokes(report: Report, *quantities: StrokeQuantity) -> tuple[Panel, ...]:
+    """Return a panel for each quantity of the strokes of each experiment of which something can be drawn."""
+    panels = [
+        stroke_panel(one, strokes, experiment, simulated=report.simulated)
+        for experiment, strokes in _grouped(report)
+        for one in quantities
+    ]
+    return tuple(each for each in panels if each is not None)
 
 
 def _fingers(report: Report) -> Plate:
@@ -140,6 +153,7 @@ _PLATES: Mapping[str, Callable[[Report], Plate]] = {
     "scores": _scores,
     "friction": _friction,
     "speed": _speed,
+    "forces": _forces,
     "finger": _fingers,
     "response": _responses,
     "relation": _relations,

@@ -1,4 +1,4 @@
-"""Friction and speed in the course of the strokes, with their steady windows."""
+"""Forces, friction and speed in the course of the strokes, laid over each other, with their steady windows."""
 
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 
 from sessions.report import StrokeFinding, Trace
 from sessions.report.figures.labels import Label, label_right
-from sessions.report.figures.style import GREY, PURPLE, Panel, Sheet, shades, sheet, svg
+from sessions.report.figures.style import GREY, PURPLE, SKY, VERMILLION, Panel, Sheet, shades, sheet, svg
 
 MOST_LABELLED = 12  # more curves in one picture cannot be told apart by labels
 
 
-class _Quantity(NamedTuple):
+class StrokeQuantity(NamedTuple):
     """What is drawn in the course of strokes."""
 
     name: str  # of its figure
@@ -28,21 +28,25 @@ class _Quantity(NamedTuple):
     colour: str
 
 
-_MU = _Quantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
-_SPEED = _Quantity("speed", "speed", "speed", "speed [mm/s]", "speed of the centre of pressure [mm/s]", "speed", GREY)
+NORMAL = StrokeQuantity("normal-force", "normal", "normal_force", "N [N]", "normal force N [N]", "N", SKY)
+TANGENTIAL = StrokeQuantity(
+    "tangential-force", "tangential", "tangential_force", "T [N]", "tangential force T [N]", "T", VERMILLION
+)
+MU = StrokeQuantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
+SPEED = StrokeQuantity(
+    "speed", "speed", "speed", "speed [mm/s]", "speed of the centre of pressure [mm/s]", "speed", GREY
+)
 
 
-def friction_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
-    """Return mu(t) of the strokes of one experiment from contact onset on; None where nothing can be drawn."""
-    return _panel(_MU, strokes, name, simulated=simulated)
+def stroke_panel(
+    of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str, *, simulated: bool
+) -> Panel | None:
+    """Return a quantity of one experiment's strokes from contact onset on; None where nothing can be drawn.
 
-
-def speed_panel(strokes: Sequence[StrokeFinding], name: str, *, simulated: bool) -> Panel | None:
-    """Return the speed of the centre of pressure likewise; strokes whose speed was refused are left out."""
-    return _panel(_SPEED, [stroke for stroke in strokes if stroke.speed is not None], name, simulated=simulated)
-
-
-def _panel(of: _Quantity, strokes: Sequence[StrokeFinding], experiment: str, *, simulated: bool) -> Panel | None:
+    Strokes whose speed was refused are left out of speeds.
+    """
+    if of is SPEED:
+        strokes = [stroke for stroke in strokes if stroke.speed is not None]
     drawn = sheet(328, 290)
     (axes,) = drawn.axes
     axes.set_title(experiment)
@@ -50,7 +54,7 @@ def _panel(of: _Quantity, strokes: Sequence[StrokeFinding], experiment: str, *, 
     rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
-    if of is _SPEED:
+    if of is SPEED:
         fastest = max(stroke.speed for stroke in strokes if stroke.speed is not None and stroke.trace is not None)
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
@@ -63,7 +67,7 @@ def _panel(of: _Quantity, strokes: Sequence[StrokeFinding], experiment: str, *, 
 Row = tuple[int, int | None, float, float, int]
 
 
-def _draw(drawn: Sheet, of: _Quantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
+def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
     """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
     (axes,) = drawn.axes
     ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
