@@ -10,6 +10,7 @@ import against_the_paper
 import looks
 
 from daq_app.cli import main
+from daq_app.qt import start
 
 SCENE = "solver.scene.tables"
 PROTOCOL = "sessions.plan.protocols.protocol"
@@ -35,9 +36,11 @@ def write(folder: Path) -> None:
 def command_line() -> str:
     """Return the help of every verb, as argparse prints it."""
     lines = ["# Command line", "", "`daq-app VERB --help` prints the same.", ""]
+    parsers = [("window", "open the window, which `daq-app` alone does too", start.command_line())]
     for name, does in main.VERBS.items():
         verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
-        parser = main._parser(name, verb)  # noqa: SLF001 - the one place that makes a verb's parser
+        parsers.append((name, does, main._parser(name, verb)))  # noqa: SLF001 - the one place that makes a verb's parser
+    for name, does, parser in parsers:
         lines += [
             f"## {name}",
             "",

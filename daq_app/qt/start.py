@@ -26,24 +26,14 @@ FAILED = 1  # exit code: could not be done
 
 def window(arguments: list[str]) -> int:
     """Open the analyst's window on the session named, or the experimenter's without one; return the exit code."""
-    parser = argparse.ArgumentParser(
-        "daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07"
-    )
-    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
-    parser.add_argument(
-        "--subject-screen",
-        choices=("window", "web"),
-        default="window",
-        help="where the subject's page is: a window here, or a tablet's browser on the lab's network (window)",
-    )
-    parser.add_argument(
-        "--subject-address", metavar="IP", help="this machine's address for the tablet (that of its own network)"
-    )
+    parser = command_line()
     options = parser.parse_args(arguments)
     folder: Path | None = options.session
+    web = options.subject_screen == "web"
     if folder is None:
-        web = options.subject_screen == "web"
         return _shown(lambda application: opened(application, tablet=_tablet(options.subject_address) if web else None))
+    if web:
+        parser.error("a session that is reviewed has no subject: leave out SESSION or --subject-screen")
     if not folder.is_dir():
         return _said(f"{folder} is no folder: give a session's folder")
 
@@ -57,6 +47,24 @@ def window(arguments: list[str]) -> int:
         return AnalystWindow(folder, tokens)
 
     return _shown(analyst)
+
+
+def command_line() -> argparse.ArgumentParser:
+    """Return what `daq-app window` understands."""
+    parser = argparse.ArgumentParser(
+        "daq-app window", description="Open the window.", epilog="Example: daq-app window recordings/P07"
+    )
+    parser.add_argument("session", nargs="?", type=Path, metavar="SESSION", help="a session to review (a new one)")
+    parser.add_argument(
+        "--subject-screen",
+        choices=("window", "web"),
+        default="window",
+        help="where the subject's page is: a window here, or a tablet's browser on the lab's network (window)",
+    )
+    parser.add_argument(
+        "--subject-address", metavar="IP", help="this machine's address for the tablet (that of its own network)"
+    )
+    return parser
 
 
 def opened(

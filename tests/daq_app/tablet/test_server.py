@@ -1,6 +1,8 @@
 """The tablet's server: one page, one device, one code, and nothing else for anybody."""
 
 import json
+import subprocess
+import sys
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
@@ -129,3 +131,18 @@ def test_nonsense_ends_the_conversation_and_nothing_else(server, text):
 def test_an_address_that_is_not_the_labs_own_is_refused_with_a_sentence(address, words):
     with pytest.raises(NoTabletServer, match=words):
         TabletServer(address, 0, lambda *_: None, lambda: None)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["window", "--subject-screen", "tv"], 2, "invalid choice"),
+        (["window", ".", "--subject-screen", "web"], 2, "leave out SESSION or --subject-screen"),
+        (["--subject-screen", "web", "--subject-address", "8.8.8.8"], 1, "no address of a private network"),
+    ],
+)
+def test_what_the_command_line_asks_for_in_vain_is_one_sentence(arguments, code, words):
+    done = subprocess.run([sys.executable, "-m", "daq_app", *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
