@@ -139,3 +139,33 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     settings = Recording.open(folder).provenance["settings"]
     assert settings["subject's screen"]["value"] == "web"
     window.bridge.send(NewSession())
+
+
+@pytest.mark.parametrize(
+    ("protocol", "give", "expected"),
+    [
+        ("magnitude-estimation", lambda browser: (browser.click("number"), browser.type("12,5")), "number 12.5"),
+        ("paired-comparison", lambda browser: browser.key("2"), "the second"),
+    ],
+)
+def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give, expected):
+    driver, browser = desk
+    window, server = driver.window, driver.window.tablet.server
+    window.page.protocol.setCurrentText(protocol)
+    browser.call("Page.navigate", url=server.url)
+    browser.until("document.readyState == 'complete' && !!document.getElementById('code')")
+    browser.value(f"connect({{ code: '{server.code}' }})")
+    browser.until("ruling")
+    browser.click("skip")
+    driver.until(lambda: server.connected)
+    driver.until(lambda: not window.tablet.missing)
+    window.act("primary")
+    driver.phase("idle")
+    ask(driver)
+    browser.until("asked()", "the question")
+    assert not browser.shown("next")
+    give(browser)
+    browser.until("!document.getElementById('next').hidden")
+    browser.click("next")
+    assert answered(driver, driver.session.trial) == expected
+    browser.until("pending.length == 0", "the acknowledgement")
