@@ -35,8 +35,10 @@ SHADES = 64
 NOTCH = 120.0  # of a wheel, in Qt's eighths of a degree
 ZOOM = 1.25  # of a notch or a key [-]: three of them double the picture
 STEP = 0.1  # of the picture's width that an arrow key moves it
+END_STEP = 0.2  # of `STEP`, by which an arrow key moves an end of a line
 # Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
+LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
 ARROWS = {
     Qt.Key.Key_Left: (STEP, 0.0),
     Qt.Key.Key_Right: (-STEP, 0.0),
@@ -72,7 +74,8 @@ class FingerCanvas(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
         self.setToolTip(
-            "Wheel, + and −: zoom. Drag or arrows: move. Shift and drag: draw a line. Home or double-click: all."
+            "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
+            "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
         )
         self.setAccessibleName("finger of the model: none")
 
@@ -160,7 +163,7 @@ class FingerCanvas(QWidget):
         super().leaveEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Zoom with + and −, move with arrows, show all with Home; leave every other key to the window."""
+        """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
         key, view = event.key(), self.view()
         if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
             self.zoom(ZOOM)
@@ -168,11 +171,25 @@ class FingerCanvas(QWidget):
             self.zoom(1.0 / ZOOM)
         elif key == Qt.Key.Key_Home:
             self.show_view(None)
+        elif key == Qt.Key.Key_Delete and self.line is not None:
+            self.set_line(None)
+        elif key in ARROWS and view is not None and event.modifiers() & LINE_KEYS:
+            self._move_end(view, key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
         elif key in ARROWS and view is not None:
             across, down = ARROWS[Qt.Key(key)]
             self.show_view(view.moved(across * self.width(), down * self.width()))
         else:
             super().keyPressEvent(event)
+
+    def _move_end(self, view: View, key: int, *, begins: bool) -> None:
+        """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
+        middle = self._box().center()
+        line = self.line or (view.place(middle.x(), middle.y()),) * 2
+        across, down = ARROWS[Qt.Key(key)]
+        along = END_STEP * self.width() / view.per_mm
+        x, y = line[0 if begins else 1]
+        moved = (x - across * along, y + down * along)
+        self.set_line((moved, line[1]) if begins else (line[0], moved))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Paint anew at another size."""

@@ -346,6 +346,20 @@ def test_a_drag_moves_the_finger_and_the_next_step_of_its_history_leaves_it_ther
     assert canvas.line is None
 
 
+def test_a_line_is_drawn_moved_and_taken_away_by_keys(application, window):
+    canvas, _ = small_finger(application, window)
+    view, press = canvas.view(), lambda key, held: QTest.keyClick(canvas, key, held)
+    for _ in range(5):
+        press(Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    press(Qt.Key.Key_Up, Qt.KeyboardModifier.ControlModifier)
+    assert canvas.view() == view  # the picture stays where it is
+    (x, y), (to_x, to_y) = canvas.line
+    assert (to_x - x) * view.per_mm == pytest.approx(5 * 0.02 * canvas.width())
+    assert (y - to_y) * view.per_mm == pytest.approx(0.02 * canvas.width())
+    QTest.keyClick(canvas, Qt.Key.Key_Delete)
+    assert canvas.line is None
+
+
 def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_pointer(application, window):
     canvas, pixel = small_finger(application, window)
     at = pixel(0.25, 0.25)
