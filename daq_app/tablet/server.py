@@ -6,6 +6,7 @@ device. After `TRIES` wrong codes there is a new one. What is said crosses the n
 """
 
 import ipaddress
+import logging
 import secrets
 import socket
 import threading
@@ -57,6 +58,7 @@ class TabletServer:
         self._received = received
         self._changed = changed
         self._lock = threading.Lock()
+        self._door = threading.Lock()  # one guess at a time, however many ask at once
         self._held: ServerConnection | None = None  # of the tablet that was let in
         self._token = ""
         self._wrong = 0
@@ -74,6 +76,7 @@ class TabletServer:
             ping_interval=ALIVE / 2,
             ping_timeout=ALIVE / 2,
             compression=None,
+            logger=_silent(),
         )
         threading.Thread(target=self._server.serve_forever, name="the tablet's server", daemon=True).start()
 
@@ -138,25 +141,32 @@ class TabletServer:
 
     def _let_in(self, connection: "ServerConnection", hello: Hello) -> bool:
         """Say whether a tablet is the one; a tablet that comes back takes the place of its own lost connection."""
-        before = None
+        if self._admit(connection, hello.token, by_code=False):
+            return True
+        with self._door:
+            if self._admit(connection, hello.code, by_code=True):
+                return True
+            why = self._guessed(hello)
+        _tell(connection, written(Refused(why)))
+        return False
+
+    def _admit(self, connection: "ServerConnection", said: str, *, by_code: bool) -> bool:
+        """Let a tablet in that says the token, or the code while there is no token yet; return whether it did."""
         with self._lock:
-            known = bool(self._token) and secrets.compare_digest(hello.token, self._token)
-            fresh = not self._token and secrets.compare_digest(hello.code, self.code)
-            if known or fresh:
-                before, self._held = self._held, connection
-                self._token = self._token or secrets.token_urlsafe()
-                for text in (written(Welcome(self._token)), *self._last.values()):
-                    _tell(connection, text)
-        if not (known or fresh):
-            self._refuse(connection, hello)
-            return False
+            right = self.code if by_code else self._token
+            if by_code == bool(self._token) or not secrets.compare_digest(said.encode(), right.encode()):
+                return False
+            before, self._held = self._held, connection
+            self._token = self._token or secrets.token_urlsafe()
+            for text in (written(Welcome(self._token)), *self._last.values()):
+                _tell(connection, text)
         if before is not None:
             before.close()
         self._changed()
         return True
 
-    def _refuse(self, connection: "ServerConnection", hello: Hello) -> None:
-        """Say no, after a while; another code takes the place of one that is guessed at."""
+    def _guessed(self, hello: Hello) -> str:
+        """Return why a tablet is refused, after a while; another code takes the place of one that is guessed at."""
         time.sleep(WRONG_CODE)
         with self._lock:
             taken = bool(self._token)
@@ -166,8 +176,7 @@ class TabletServer:
                 self.code, self._wrong = _new_code(), 0
         if renewed:
             self._changed()
-        why = "Another device shows this page. Ask for a new code." if taken else "This is not the code."
-        _tell(connection, written(Refused(why)))
+        return "Another device shows this page. Ask for a new code." if taken else "This is not the code."
 
 
 def own_address() -> str:
@@ -200,6 +209,14 @@ def _listening(address: str, port: int) -> socket.socket:
         except OSError as error:
             refused = error
     raise NoTabletServer(f"{address} is no address of this machine ({refused.strerror}); give --subject-address")
+
+
+def _silent() -> logging.Logger:
+    """Return a log that nobody reads: what a stranger on the network sends is no news for a terminal."""
+    log = logging.getLogger(__name__)
+    log.propagate = False
+    log.addHandler(logging.NullHandler())
+    return log
 
 
 def _new_code() -> str:

@@ -7,7 +7,9 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from socket import create_connection
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -95,6 +97,32 @@ def test_a_code_that_is_guessed_at_becomes_another(server):
         assert socket_refused(server, code=wrong)
     assert server.code != code
     assert not server.connected
+
+
+def test_many_who_guess_at_once_wait_for_each_other(server, monkeypatch):
+    waiting, most, pause = [], [], time.sleep
+
+    def slept(seconds):
+        waiting.append(1)
+        most.append(len(waiting))
+        pause(seconds)
+        waiting.pop()
+
+    monkeypatch.setattr(module.time, "sleep", slept)
+    with ThreadPoolExecutor(8) as pool:
+        refused = list(pool.map(lambda code: socket_refused(server, code=code), ["1", "", "٤", "x" * 200] * 2))
+    assert all(refused)
+    assert max(most) == 1
+
+
+def test_what_strangers_send_reaches_no_terminal(server, capfd):
+    host, port = server.url.removeprefix("http://").split(":")
+    for text in (b"\x00\xff\x16\x03", b"GET / HTTP/1.1\r\nHost: x\r\n", b"POST / HTTP/1.1\r\n\r\n"):
+        with create_connection((host, int(port))) as stranger:
+            stranger.sendall(text)
+    assert status_of(server.url + "/") == 200
+    time.sleep(0.2)
+    assert capfd.readouterr().err == ""
 
 
 def test_a_new_code_lets_go_of_the_device_that_was_there(server):
