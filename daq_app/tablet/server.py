@@ -212,7 +212,7 @@ def _listening(address: str, port: int) -> socket.socket:
 
 
 def _silent() -> logging.Logger:
-    """Return a log that nobody reads: what a stranger on the network sends is no news for a terminal."""
+    """Return a log that nobody reads: a traceback is nothing for the terminal that opened the window."""
     log = logging.getLogger(__name__)
     log.propagate = False
     log.addHandler(logging.NullHandler())

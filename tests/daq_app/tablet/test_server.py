@@ -9,7 +9,6 @@ import urllib.error
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from socket import create_connection
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -115,14 +114,16 @@ def test_many_who_guess_at_once_wait_for_each_other(server, monkeypatch):
     assert max(most) == 1
 
 
-def test_what_strangers_send_reaches_no_terminal(server, caplog):
-    host, port = server.url.removeprefix("http://").split(":")
-    for text in (b"\x00\xff\x16\x03", b"GET / HTTP/1.1\r\nHost: x\r\n", b"POST / HTTP/1.1\r\n\r\n"):
-        with create_connection((host, int(port))) as stranger:
-            stranger.sendall(text)
-    assert status_of(server.url + "/") == 200
-    time.sleep(0.2)
+def test_an_error_of_ours_ends_one_conversation_and_reaches_no_terminal(server, caplog):
+    server._received = None  # no function
+    with socket(server, code=server.code) as talk:
+        token = said(talk)["token"]
+        with pytest.raises(ConnectionClosed):
+            talk.recv(5.0)
     assert caplog.records == []
+    server._received = lambda *_: None
+    with socket(server, token=token) as talk:
+        assert said(talk)["type"] == "welcome"
 
 
 def test_a_new_code_lets_go_of_the_device_that_was_there(server):
