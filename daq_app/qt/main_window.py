@@ -353,7 +353,7 @@ class MainWindow(QMainWindow):
         if self.tablet is None:
             self.page.show_line(millimetres(self.subject.screen()))
         else:
-            self.page.show_tablet(self.tablet.words, self.tablet.missing)
+            self.page.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
         if self.bridge.view.course is None:
             self._form_changed()
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QButtonGroup,
@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QHBoxLayout,
+    QLabel,
     QRadioButton,
     QVBoxLayout,
     QWidget,
@@ -105,6 +106,9 @@ class NewSessionPage(QFrame):
         self._ruler = button(
             "Check with a ruler  Ctrl+M", "check the subject's line with a ruler", lambda: act("ruler")
         )
+        self.camera = QLabel()
+        self.camera.setAccessibleName("address and code for the tablet's camera")
+        self.camera.hide()
         self._new_code = button("New code", "let another tablet in, by a new code", lambda: act("tablet"))
         self._new_code.hide()
         self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
@@ -173,9 +177,16 @@ class NewSessionPage(QFrame):
         self._line_words = f"Line of {LENGTH:.0f} mm, {known.words}."
         self._show_screen()
 
-    def show_tablet(self, words: str, missing: str) -> None:
-        """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin."""
+    def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
+        """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin.
+
+        `picture` is its address for a camera (PNG), or empty.
+        """
         self._line_words, self._tablet_missing = words, missing
+        shown = QPixmap()
+        shown.loadFromData(picture)
+        self.camera.setPixmap(shown)
+        self.camera.setVisible(bool(picture))
         self._ruler.hide()  # there is one on the tablet's page
         self._new_code.show()
         self._show_screen()
@@ -363,6 +374,7 @@ class NewSessionPage(QFrame):
     def _build_screen(self, layout: QVBoxLayout) -> None:
         field(layout, "Language that the subject reads", self.language)
         layout.addWidget(self._ruler)
+        layout.addWidget(self.camera)
         layout.addWidget(self._new_code)
 
     def _build_disk(self, layout: QVBoxLayout) -> None:

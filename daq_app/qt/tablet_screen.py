@@ -1,5 +1,6 @@
 """The subject's page on a tablet, as the window sees it: it shows views and gives answers, and it may be away."""
 
+import io
 import time
 from functools import partial
 
@@ -48,6 +49,16 @@ class TabletScreen(QObject):
             return f"Open {self.server.url} on the tablet, and type the code {self.server.code}."
         checked = "checked" if self._pixels else "not checked"
         return f"The tablet shows the page. Line of {LENGTH:.0f} mm, {checked} with a ruler."
+
+    def picture(self) -> bytes:
+        """Return the address with the code as a QR code, PNG; nothing while the tablet is there."""
+        if self.server.connected:
+            return b""
+        import segno  # an optional package, which the server has looked for
+
+        drawn = io.BytesIO()
+        segno.make(self.server.link, micro=False).save(drawn, kind="png", scale=4, border=4)
+        return drawn.getvalue()
 
     @property
     def missing(self) -> str:

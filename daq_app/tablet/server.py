@@ -32,7 +32,7 @@ ALIVE = 5.0  # a tablet that says nothing for so long is gone [s]
 PATIENCE = 10.0  # for the first message [s]
 PAGE = Path(__file__).with_name("page.html")
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'"
-MISSING = "the subject's page on a tablet needs the package websockets: pip install 'daq-app[tablet]'"
+MISSING = "the subject's page on a tablet needs the packages websockets and segno: pip install 'daq-app[tablet]'"
 
 
 class NoTabletServer(Exception):
@@ -52,6 +52,7 @@ class TabletServer:
         replaced by a free one.
         """
         try:
+            import segno  # noqa: F401  # pyright: ignore[reportUnusedImport]  the window draws the link with it
             from websockets.sync.server import serve
         except ImportError as error:
             raise NoTabletServer(MISSING) from error
@@ -84,6 +85,11 @@ class TabletServer:
     def connected(self) -> bool:
         """Say whether the tablet is there."""
         return self._held is not None
+
+    @property
+    def link(self) -> str:
+        """Return the address that holds the code too, behind a # that no browser sends."""
+        return f"{self.url}/#{self.code}"
 
     def send(self, message: ToTablet) -> None:
         """Send something to the tablet; one that comes later gets the last message of each kind that tells a state."""
