@@ -3,10 +3,11 @@
 from collections import defaultdict
 from dataclasses import dataclass
 
+from daq_app.wording import tr_noop
 from sessions.report.contents import Report
 
 Number = float | None
-NAMES = ("µ", "SED [kPa]", "score")
+NAMES = tr_noop(("µ", "SED [kPa]", "score"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.analyst.frame import TOP, Frame, step_above
+from daq_app.wording import tr, tr_noop
 from solver.quantities import FIELDS, SED
 
 Array = NDArray[np.float64]
@@ -33,12 +34,12 @@ class FieldChoice:
 
     def words(self, value: float) -> str:
         """Return a value with its unit."""
-        return f"{self.label} {value:.4g} {self.unit}".removesuffix(" -").replace(" -", " −")
+        return f"{tr(self.label)} {value:.4g} {self.unit}".removesuffix(" -").replace(" -", " −")
 
     @property
     def axis(self) -> str:
         """What an axis of it says."""
-        return f"{self.label} [{self.unit}]"
+        return f"{tr(self.label)} [{self.unit}]"
 
 
 FIELD_CHOICES = (
@@ -52,7 +53,7 @@ FIELD_CHOICES = (
         )
         for one in FIELDS
     ),
-    FieldChoice("displacement", "displacement from the bone", "mm", 1.0, signed=False),
+    FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),
 )
 
 

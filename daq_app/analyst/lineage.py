@@ -5,6 +5,7 @@ from typing import Literal
 
 from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
+from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
 
 Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
@@ -26,14 +27,14 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         return ()
     made = [Link(state.folder.name, "session", str(state.folder))]
     if row.trial is not None:
-        made.append(Link(f"trial {row.trial}", "trial"))
+        made.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
     said, stroke = row.prediction, row.stroke
     if said is not None and said.sed is not None:
         made.append(
             Link(
                 f"SED {1000.0 * said.sed:.3f} kPa",
                 "prediction",
-                f"{condition(state.report, said)}, averaged over the ending",
+                tr("{condition}, averaged over the ending", condition=condition(state.report, said)),
             )
         )
     if stroke is None:
@@ -42,21 +43,27 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
     if stroke.steady is not None:
         begin, end = stroke.steady
         made.append(
-            Link(f"steady window {begin:.3f} to {end:.3f} s", "window", f"of stroke {stroke.number}, device's clock")
+            Link(
+                tr("steady window {begin:.3f} to {end:.3f} s", begin=begin, end=end),
+                "window",
+                tr("of stroke {number}, device's clock", number=stroke.number),
+            )
         )
     read = state.read
     if read is not None and read.stroke == stroke.number:
-        made.append(Link(f"{len(read.readings)} readings", "readings", read.readings.place))
+        made.append(Link(tr("{count} readings", count=len(read.readings)), "readings", read.readings.place))
     else:
-        made.append(Link("raw readings", "readings", "counts, sequence and device counter, as they were recorded"))
+        made.append(
+            Link(tr("raw readings"), "readings", tr("counts, sequence and device counter, as they were recorded"))
+        )
     return tuple(made)
 
 
 def _friction(stroke: StrokeFinding, given: tuple[float, str] | None) -> Link:
     if given is not None:
         mu, rule = given
-        tau = "" if stroke.tau_max is None else f", τ max {1000.0 * stroke.tau_max:.1f} kPa"
-        return Link(f"µ {mu:.3f}{tau}", "friction", f"the model was given the {rule}")
+        tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
+        return Link(f"µ {mu:.3f}{tau}", "friction", tr("the model was given the {rule}", rule=tr(rule)))
     if stroke.mu_dynamic is None:
         return Link("µ –", "friction", stroke.reasons.get("mu_dynamic", ""))
-    return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", "mean over the steady window")
+    return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", tr("mean over the steady window"))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Frame, Parts
+from daq_app.wording import tr
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -53,7 +54,7 @@ def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: flo
     values, triangles = value_at(frame, parts, field, np.array([[x, y]]))
     triangle = int(triangles[0])
     if triangle < 0:
-        return f"{where} · no tissue"
+        return tr("{where} · no tissue", where=where)
     return f"{field.words(float(values[0]))} · {where} · {TISSUES[int(parts.region[triangle])]}"
 
 

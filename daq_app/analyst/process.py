@@ -12,6 +12,7 @@ from typing import Any
 
 from daq_app.analyst import messages as m
 from daq_app.child_process import fresh_processes
+from daq_app.wording import tr
 
 Connection = Any  # one end of a pipe; its type is another one on each system
 PATIENCE = 0.15  # work that has not stopped by itself after so long is ended [s]
@@ -116,7 +117,9 @@ class Analyst:
             except (EOFError, OSError):
                 self._gone()
                 if not said or not isinstance(said[-1], m.Problem):
-                    said.append(m.Problem("The work has stopped without a word; what is asked next begins it anew."))
+                    said.append(
+                        m.Problem(tr("The work has stopped without a word; what is asked next begins it anew."))
+                    )
         if any(isinstance(one, m.Cancelled) for one in said):
             self._stopped = None
         if self._stopped is not None and time.monotonic() - self._stopped > PATIENCE:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.wording import tr
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording
 from sessions.recording.schema import LIVE_FILE, SEALED_FILE
@@ -76,12 +77,12 @@ class RawFile:
         """Return file and data set of readings, with the rows they have there."""
         folder = self._recording.folder
         if not len(block):
-            return f"{folder.name}: no readings"
+            return tr("{name}: no readings", name=folder.name)
         first = self._row(int(block.sequence[0]), int(block.received_ns[0]))
-        rows = "" if first is None else f", rows {first} to {first + len(block) - 1}"
+        rows = "" if first is None else tr(", rows {first} to {last}", first=first, last=first + len(block) - 1)
         if (folder / SEALED_FILE).is_file():
-            return f"{folder.name}/{SEALED_FILE}, data sets readings/…{rows}"
-        return f"{folder.name}/{LIVE_FILE}, table blocks{rows}"
+            return tr("{name}/{file}, data sets readings/…{rows}", name=folder.name, file=SEALED_FILE, rows=rows)
+        return tr("{name}/{file}, table blocks{rows}", name=folder.name, file=LIVE_FILE, rows=rows)
 
     def _row(self, sequence: int, received_ns: int) -> int | None:
         """Return the row of a reading; None where its block is damaged or gone."""
@@ -104,7 +105,7 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
     before = np.flatnonzero(block.time < (-np.inf if onset is None else onset))
     free = before[-max(round(MOST_FOR_ZERO * rate), 1) :]
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
-    words = f"mean of the {len(free)} readings before contact" if len(free) else "as recorded"
+    words = tr("mean of the {count} readings before contact", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
     return RawReadings(
         place=place,

@@ -5,13 +5,14 @@ from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
 from daq_app.analyst.frame import Frame
 from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
+from daq_app.wording import tr, tr_noop
 from sessions.report.contents import PredictionFinding
 
 PHASES = {
-    "pressing": "pressing down",
-    "sticking": "sticking: dragged, nothing slips yet",
-    "slipping in part": "slipping in part",
-    "sliding": "sliding: every point slips",
+    "pressing": tr_noop("pressing down"),
+    "sticking": tr_noop("sticking: dragged, nothing slips yet"),
+    "slipping in part": tr_noop("slipping in part"),
+    "sliding": tr_noop("sliding: every point slips"),
 }
 
 
@@ -37,16 +38,19 @@ def finger_words(state: AnalystState | None) -> str:
     if state is None or row is None:
         return ""
     said = row.prediction
-    name = "stroke" if row.trial is None else f"trial {row.trial}"
+    name = "stroke" if row.trial is None else tr("trial {trial}", trial=row.trial)
     if said is None:
         if state.halted:
-            return f"The finger of {name} was not solved: the work was stopped. 'Go on' solves it."
-        return f"The finger of {name} is being solved."
+            return tr("The finger of {name} was not solved: the work was stopped. 'Go on' solves it.", name=name)
+        return tr("The finger of {name} is being solved.", name=name)
     if said.sed is None:
         why = said.reasons.get("sed", "no reason is known")
-        return f"No settled finger. {why}"
+        return tr("No settled finger. {why}", why=why)
     finger = state.fingers.get(row.key)
-    parts = [f"Finger of {name}, settled", f"SED {condition(state.report, said)} {1000.0 * said.sed:.3f} kPa"]
+    parts = [
+        tr("Finger of {name}, settled", name=name),
+        f"SED {condition(state.report, said)} {1000.0 * said.sed:.3f} kPa",
+    ]
     if finger is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)
@@ -60,16 +64,28 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
         if not film.why:
             return ""
         last = film.film.instants[-1]
-        return (
-            f"No settled state. The last good one, before tissue folds, is step {len(film.film.instants)}: "
-            f"at {last.time:.3f} s, {last.depth:.3g} mm deep after {abs(last.travel):.3g} mm of sliding; "
-            f"⊗ marks its most squeezed tissue. {film.why}"
+        return tr(
+            "No settled state. The last good one, before tissue folds, is step {step}: at {time:.3f} s, "
+            "{depth:.3g} mm deep after {slid:.3g} mm of sliding; ⊗ marks its most squeezed tissue. {why}",
+            step=len(film.film.instants),
+            time=last.time,
+            depth=last.depth,
+            slid=abs(last.travel),
+            why=film.why,
         )
     now, frame = film.film.instants[at], film.film.frames[at]
     count = len(film.film.instants)
-    return (
-        f"Step {at + 1} of {count}, {now.time:.3f} s · {PHASES[now.phase]} · {now.depth:.2f} mm deep, "
-        f"{abs(now.travel):.2f} mm slid · SED {1000.0 * now.sed:.3f} kPa · {_contact_words(frame)}"
+    return tr(
+        "Step {at} of {count}, {time:.3f} s · {phase} · {depth:.2f} mm deep, {slid:.2f} mm slid · "
+        "SED {sed:.3f} kPa · {contact}",
+        at=at + 1,
+        count=count,
+        time=now.time,
+        phase=tr(PHASES[now.phase]),
+        depth=now.depth,
+        slid=abs(now.travel),
+        sed=1000.0 * now.sed,
+        contact=_contact_words(frame),
     )
 
 
@@ -77,4 +93,8 @@ def _contact_words(frame: Frame) -> str:
     states = frame.contact.state
     touching = sum(state != "open" for state in states)
     slipping = sum(state in ("slip", "cap") for state in states)
-    return f"{slipping} of {touching} touching points slip" if touching else "nothing touches"
+    return (
+        tr("{slipping} of {touching} touching points slip", slipping=slipping, touching=touching)
+        if touching
+        else tr("nothing touches")
+    )

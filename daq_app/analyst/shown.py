@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
+from daq_app.wording import tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 
 
@@ -22,7 +23,7 @@ def words_of(row: Row) -> str:
     """Return a line of the list of trials; what its marks mean is told by `marks_of`."""
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
-        return _named(row.prediction) + "  no stroke"
+        return _named(row.prediction) + tr("  no stroke")
     mu = "µ –" if row.stroke.mu_dynamic is None else f"µ {row.stroke.mu_dynamic:.2f}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
@@ -33,11 +34,11 @@ def marks_of(row: Row) -> str:
     """Return what the marks of a line mean, for who hovers and for screen readers."""
     told: list[str] = []
     if row.stroke is not None and row.stroke.flaws:
-        told.append("! has flaws: " + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
+        told.append(tr("! has flaws: ") + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
     if row.stroke is not None and row.stroke.decided:
-        told.append("✎ somebody decided something about it")
+        told.append(tr("✎ somebody decided something about it"))
     if row.prediction is not None and row.prediction.sed is None:
-        told.append("✗ the model has no SED for it")
+        told.append(tr("✗ the model has no SED for it"))
     return "; ".join(told)
 
 
@@ -51,26 +52,26 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
         why = stroke.reasons
         interval = "" if stroke.mu_interval is None else f"  [{stroke.mu_interval[0]:.3f}, {stroke.mu_interval[1]:.3f}]"
         told += [
-            ("µ over the steady window", _value(stroke.mu_dynamic, "{:.3f}" + interval, why, "mu_dynamic")),
-            ("µ at its greatest", _value(stroke.mu_max, "{:.3f}", why, "mu_max")),
-            ("traction bound", _value(_kpa(stroke.tau_max), "{:.1f} kPa", why, "tau_max")),
-            ("speed", _value(stroke.speed, "{:.1f} mm/s", why, "speed")),
-            ("normal force", _value(stroke.normal_force, "{:.2f} N", why, "normal_force")),
-            ("flaws", ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or "none"),
+            (tr("µ over the steady window"), _value(stroke.mu_dynamic, "{:.3f}" + interval, why, "mu_dynamic")),
+            (tr("µ at its greatest"), _value(stroke.mu_max, "{:.3f}", why, "mu_max")),
+            (tr("traction bound"), _value(_kpa(stroke.tau_max), "{:.1f} kPa", why, "tau_max")),
+            (tr("speed"), _value(stroke.speed, "{:.1f} mm/s", why, "speed")),
+            (tr("normal force"), _value(stroke.normal_force, "{:.2f} N", why, "normal_force")),
+            (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
         ]
     if (said := row.prediction) is not None:
         error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.1f} %"
         told += [
             (
-                f"SED {condition(state.report, said)}, averaged over the ending",
+                tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
                 _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed"),
             ),
-            ("model: µ", _value(said.mu, "{:.3f} (" + said.mu_rule + ")", said.reasons, "mu")),
-            ("model: indentation", _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
-            ("model: normal force", _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
+            (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
+            (tr("model: indentation"), _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
+            (tr("model: normal force"), _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
         ]
     elif state.stage == "analysed":
-        told.append(("SED", "– stopped before this trial" if state.halted else "not predicted yet"))
+        told.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
     return tuple(told)
 
 
@@ -79,24 +80,25 @@ def condition(report: Report | None, said: PredictionFinding) -> str:
 
     The window shows another number while a session runs: that at the measured force.
     """
-    depth = "" if said.indentation is None else f"at {said.indentation:.3g} mm"
-    strain = "" if report is None else report.model.split(",")[0]
+    depth = "" if said.indentation is None else tr("at {depth:.3g} mm", depth=said.indentation)
+    strain = "" if report is None else tr(report.model.split(",")[0])
     return ", ".join(part for part in (depth, strain) if part)
 
 
+RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
 FRICTION_HEAD = (
-    "trial",
-    "stimulus",
-    "µ steady",
+    tr_noop("trial"),
+    tr_noop("stimulus"),
+    tr_noop("µ steady"),
     "95 %",
-    "µ greatest",
-    "τ max [kPa]",
+    tr_noop("µ greatest"),
+    tr_noop("τ max [kPa]"),
     "V [mm/s]",
     "N [N]",
-    "way",
-    "flaws",
+    tr_noop("way"),
+    tr_noop("flaws"),
 )
-WAYS = {1: "distal", -1: "proximal"}
+WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 
 def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
@@ -110,12 +112,16 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     said = None if row is None else row.prediction
     told: list[tuple[str, str, str]] = []
     if said is not None:
-        way = "" if said.direction is None else f"{WAYS[said.direction]}, as measured"
+        way = "" if said.direction is None else tr("{way}, as measured", way=tr(WAYS[said.direction]))
         told += [
-            ("µ of this trial", _value(said.mu, "{:.4f}", said.reasons, "mu"), said.mu_rule),
-            ("τ max of this trial", _value(_kpa(said.tau_max), "{:.2f} kPa", said.reasons, "tau_max"), ""),
-            ("indentation", _value(said.indentation, "{:.3g} mm", said.reasons, "indentation"), "of the block's plan"),
-            ("way", way or "–", ""),
+            (tr("µ of this trial"), _value(said.mu, "{:.4f}", said.reasons, "mu"), tr(said.mu_rule)),
+            (tr("τ max of this trial"), _value(_kpa(said.tau_max), "{:.2f} kPa", said.reasons, "tau_max"), ""),
+            (
+                tr("indentation"),
+                _value(said.indentation, "{:.3g} mm", said.reasons, "indentation"),
+                tr("of the block's plan"),
+            ),
+            (tr("way"), way or "–", ""),
         ]
     report = state.report
     if report is not None:
@@ -134,13 +140,13 @@ def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
         return ()
     experiments = [experiment.name for experiment in report.experiments] or [""]
     kinds = {
-        "relation": "SED against score",
-        "scores": "scores",
-        "friction": "friction over time",
-        "speed": "speed over time",
-        "response": "response over time",
+        "relation": tr("SED against score"),
+        "scores": tr("scores"),
+        "friction": tr("friction over time"),
+        "speed": tr("speed over time"),
+        "response": tr("response over time"),
     }
-    made = [("course", "forces over the whole recording")]
+    made = [("course", tr("forces over the whole recording"))]
     for kind, words in kinds.items():
         made += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
     return tuple(made)
@@ -173,15 +179,19 @@ def progress_words(step: Step | None) -> str:
     """
     if step is None:
         return ""
-    left = "" if step.left is None else f", about {int(step.left) + 1} s left"
+    left = "" if step.left is None else tr(", about {seconds} s left", seconds=int(step.left) + 1)
     steps = step.load_steps
-    done = f"load step {round(step.part * steps)} of {steps}" if steps else f"{100 * step.part:.0f} %"
-    return f"{step.words}  {done}{left}"
+    done = (
+        tr("load step {step} of {steps}", step=round(step.part * steps), steps=steps)
+        if steps
+        else f"{100 * step.part:.0f} %"
+    )
+    return f"{tr(step.words)}  {done}{left}"
 
 
 def _named(of: StrokeFinding | PredictionFinding) -> str:
     if of.trial is None:
-        return f"stroke {of.number}" if isinstance(of, StrokeFinding) else "stroke –"
+        return tr("stroke {number}", number=of.number) if isinstance(of, StrokeFinding) else tr("stroke –")
     return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"
 
 
@@ -195,9 +205,11 @@ def _value(value: float | None, form: str, reasons: dict[str, str], name: str) -
 
 def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
     stimulus = f"{s.experiment} {s.code if s.index is None else s.index}".strip()
-    interval = "–" if s.mu_interval is None else f"{s.mu_interval[0]:.3f} to {s.mu_interval[1]:.3f}"
+    interval = (
+        "–" if s.mu_interval is None else tr("{low:.3f} to {high:.3f}", low=s.mu_interval[0], high=s.mu_interval[1])
+    )
     return (
-        f"stroke {s.number}" if s.trial is None else str(s.trial),
+        tr("stroke {number}", number=s.number) if s.trial is None else str(s.trial),
         stimulus or "–",
         _or_dash(s.mu_dynamic, "{:.3f}"),
         interval,
@@ -205,7 +217,7 @@ def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
         _or_dash(_kpa(s.tau_max), "{:.1f}"),
         _or_dash(s.speed, "{:.1f}"),
         _or_dash(s.normal_force, "{:.2f}"),
-        "–" if s.direction is None else WAYS[s.direction],
+        "–" if s.direction is None else tr(WAYS[s.direction]),
         ", ".join(flaw.replace("_", " ") for flaw in s.flaws),
     )
 

@@ -7,10 +7,11 @@ from typing import Literal
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Finger
+from daq_app.wording import tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 
 Stage = Literal["opening", "analysed", "predicted"]
-OPENING = m.Step(0.0, "opening")
+OPENING = m.Step(0.0, tr_noop("opening"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,14 +77,14 @@ def _gone_on(
         case m.Idle():
             return replace(state, step=None)
         case m.Written(path):
-            return replace(state, told=f"Written: {path}")
+            return replace(state, told=tr("Written: {path}", path=path))
         case m.Decided(sentence):
             return replace(state, told=sentence)
         case m.Problem(sentence):
             return replace(state, step=None, told=sentence)
         case m.Cancelled():
-            kept = "" if state.report is None else " What was done before is kept."
-            return replace(state, step=None, told=f"Stopped.{kept}", halted=state.stage != "predicted")
+            kept = "" if state.report is None else tr(" What was done before is kept.")
+            return replace(state, step=None, told=tr("Stopped.{kept}", kept=kept), halted=state.stage != "predicted")
 
 
 def _asked(state: AnalystState, asked: m.Ask) -> AnalystState:
@@ -91,15 +92,15 @@ def _asked(state: AnalystState, asked: m.Ask) -> AnalystState:
         case m.Choose(row):
             return replace(state, row=max(0, min(row, len(rows(state)) - 1)))
         case m.Write(what, path):
-            return replace(state, step=m.Step(0.0, f"writing {what} to {path}"), told="")
+            return replace(state, step=m.Step(0.0, tr("writing {what} to {path}", what=what, path=path)), told="")
         case m.GoOn():
-            return replace(state, step=m.Step(0.0, "predicting"), told="", halted=False)
+            return replace(state, step=m.Step(0.0, tr("predicting")), told="", halted=False)
         case m.Stop():
-            return replace(state, step=m.Step(0.0, "stopping"))
+            return replace(state, step=m.Step(0.0, tr("stopping")))
         case m.ShowReadings():
             return state
         case _:
-            return replace(state, step=m.Step(0.0, "working"), told="")
+            return replace(state, step=m.Step(0.0, tr("working")), told="")
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:

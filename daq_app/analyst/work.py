@@ -13,6 +13,7 @@ from daq_app.analyst.edges import brought_back, decision_meant, decision_of, tak
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
 from daq_app.batch.derived import analysis_document, settings_kept
+from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
 from sessions.plan.plan import Blinded
 from sessions.prediction import TrialPrediction, Way, predict
@@ -40,7 +41,7 @@ class Work:
     def __init__(self, folder: Path, say: Say, urgent: Urgent = lambda: False) -> None:
         """Open and analyse it, and say what is found."""
         self._say, self._urgent = say, urgent
-        say(m.Step(0.0, "opening"))
+        say(m.Step(0.0, tr("opening")))
         self._recording = _opened(folder)
         self._raw = RawFile(self._recording)
         self._chosen = 0
@@ -57,7 +58,7 @@ class Work:
 
     def go_on(self) -> None:
         """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
-        told = self.timed("predicting")
+        told = self.timed(tr("predicting"))
         self._prediction = predict(
             self._analysis, self._recording.plan, progress=told, watch=self._answered, first=self._first()
         )
@@ -102,7 +103,7 @@ class Work:
         return told
 
     def _analyse(self) -> None:
-        self._say(m.Step(0.0, "analysing"))
+        self._say(m.Step(0.0, tr("analysing")))
         self._analysis = analyse(self._recording, settings_kept(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
@@ -112,17 +113,26 @@ class Work:
         stroke = self._report.strokes[asked.stroke - 1]
         made = append(self._recording, decision_of(stroke, asked.edge, asked.time, asked.by, asked.why))
         self._analyse()
-        self._say(m.Decided(f"Recorded: {made.sentence}"))
+        self._say(m.Decided(tr("Recorded: {sentence}", sentence=made.sentence)))
 
     def _undo(self, by: str, *, again: bool) -> None:
         decisions = read(self._recording.folder)
         line = brought_back(decisions, by) if again else taken_back(decisions, by)
         if line is None:
-            raise NothingToShow("There is nothing to redo." if again else "There is no decision to undo.")
+            raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
         made = append(self._recording, line)
         self._analyse()
         meant = decision_meant(decisions, line)
-        self._say(m.Decided(f"{'Redone' if again else 'Undone'}, as decision {made.number}: {meant.sentence}"))
+        self._say(
+            m.Decided(
+                tr(
+                    "{act}, as decision {number}: {sentence}",
+                    act=tr("Redone") if again else tr("Undone"),
+                    number=made.number,
+                    sentence=meant.sentence,
+                )
+            )
+        )
 
     def _first(self) -> int | None:
         """Return the position among predicted rows of the trial that is chosen."""
@@ -151,7 +161,7 @@ class Work:
         return self._sketches[id(mesh)]
 
     def _draw(self, name: str) -> None:
-        self._say(m.Step(0.0, "drawing"))
+        self._say(m.Step(0.0, tr("drawing")))
         panel, png = self._panel(name)
         self._say(m.Drawn(name, "" if panel is None else panel.title, png))
 
@@ -220,18 +230,20 @@ class Work:
     def _film(self, key: m.Key) -> None:
         found = self._ways.get(key)
         if found is None:
-            raise NothingToShow("The model has no way to show for this trial: it was not solved.")
+            raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
         prediction, way = found
         if way.march is not None:
-            told = self.timed("drawing the history", len(way.march))
+            told = self.timed(tr("drawing the history"), len(way.march))
             self._filmed = m.Filmed(key, film_of(way, way.march, self._sketch(way), told))
             self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:
-            raise NothingToShow("The way of tissues that relax is not kept as states that can be drawn.")
-        film, why = lost_film(way, self._sketch(way), self.timed("drawing the history"))
+            raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
+        film, why = lost_film(way, self._sketch(way), self.timed(tr("drawing the history")))
         first = prediction.reasons.get("sed", "")
-        self._filmed = m.Filmed(key, film, f"{first} Followed from first touch: {why}" if why else first)
+        self._filmed = m.Filmed(
+            key, film, tr("{first} Followed from first touch: {why}", first=first, why=why) if why else first
+        )
         self._say(self._filmed)
 
     def _read(self, number: int) -> None:
@@ -239,10 +251,10 @@ class Work:
         self._say(m.Read(number, self._raw.around(stroke)))
 
     def _compare(self, folder: Path) -> None:
-        self._say(m.Step(0.0, f"opening {folder.name}"))
+        self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))
         recording = _opened(folder)
         analysis = analyse(recording, settings_kept(recording))
-        told = self.timed(f"predicting {folder.name}")
+        told = self.timed(tr("predicting {name}", name=folder.name))
         self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told))
         self._say(m.Compared(str(folder), self._other))
 
@@ -251,14 +263,14 @@ class Work:
         path = Path(asked.path)
         if asked.what.startswith("picture "):
             return self._write_picture(asked.what.removeprefix("picture "), path)
-        self._say(m.Step(0.0, f"writing {asked.what}"))
+        self._say(m.Step(0.0, tr("writing {what}", what=asked.what)))
         if self._prediction is None:
             self.go_on()
         assert self._prediction is not None  # it was just made
         if asked.what == "report":
             from sessions.report import html
 
-            told = self.timed("carrying the uncertainty of friction through")
+            told = self.timed(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
             self._prediction = with_intervals(self._analysis, with_them, progress=told)
             html.write_report(findings(self._recording, self._analysis, self._prediction), path)
@@ -267,7 +279,7 @@ class Work:
         source = ExportSource(
             self._recording, made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
         )
-        told = self.timed(f"writing {asked.what}")
+        told = self.timed(tr("writing {what}", what=asked.what))
 
         def shown(part: float) -> None:
             if not told(part):
@@ -279,10 +291,10 @@ class Work:
         from sessions.atomic_file import write_whole
         from sessions.report.html import panel_csv, swap_in
 
-        self._say(m.Step(0.0, f"writing {path.name}"))
+        self._say(m.Step(0.0, tr("writing {name}", name=path.name)))
         panel, png = self._panel(name)
         if panel is None:
-            raise NothingToShow("There are no numbers for this picture.")
+            raise NothingToShow(tr("There are no numbers for this picture."))
         match path.suffix.lower():
             case ".svg":
                 swap_in(path, panel.svg)

@@ -30,6 +30,7 @@ from daq_app.qt.parts import Shortened, button, choice, label, panel
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens, font_scale
 from daq_app.qt.trials_column import TrialsColumn
+from daq_app.wording import tr
 from sessions.exchange import FORMATS
 
 LOOK = 30  # between two looks at the work [ms]
@@ -59,7 +60,7 @@ class AnalystWindow(QMainWindow):
         """Open `folder`; `work` is done by another process, begun here where none is given."""
         super().__init__()
         self.setWindowTitle(f"{folder.name} – daq-app")
-        self.setAccessibleName("analyst's window")
+        self.setAccessibleName(tr("analyst's window"))
         self.state = AnalystState(folder)
         self._work: Work = work or Analyst(folder)
         self.keys: KeysPage | None = None  # made when somebody asks for it
@@ -75,20 +76,22 @@ class AnalystWindow(QMainWindow):
         for column in (self.trials, self.stroke, self.model):
             column.asked.connect(self.ask)
         self.progress = QProgressBar()
-        self.progress.setAccessibleName("progress")
+        self.progress.setAccessibleName(tr("progress"))
         self._words = Shortened("quiet")
-        self.stop = button("Stop  Esc", "stop what is being done", lambda: self.ask(m.Stop()))
-        self.go_on = button("Go on", "have the model answer the trials that are left", lambda: self.ask(m.GoOn()))
-        self.report = button("Report…", "write the report", self.write_report)
+        self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
+        self.go_on = button(
+            tr("Go on"), tr("have the model answer the trials that are left"), lambda: self.ask(m.GoOn())
+        )
+        self.report = button(tr("Report…"), tr("write the report"), self.write_report)
         self.format, self.export = (
-            choice("format of the export"),
-            button("Export…", "write an export", self.write_export),
+            choice(tr("format of the export")),
+            button(tr("Export…"), tr("write an export"), self.write_export),
         )
         self.format.addItems(sorted(FORMATS))
         self._scrolled: list[QScrollArea] = []
         self._parts = [self._panel(name, column) for name, column in self._named()]
         self._pages = QTabWidget()
-        self._pages.setAccessibleName("trials, stroke or model")
+        self._pages.setAccessibleName(tr("trials, stroke or model"))
         self._beside = QWidget()
         self._row = QHBoxLayout(self._beside)
         self._row.setContentsMargins(0, 0, 0, 0)
@@ -174,19 +177,19 @@ class AnalystWindow(QMainWindow):
 
     def write_report(self) -> None:
         """Ask for a file, and have the report written."""
-        name, _ = QFileDialog.getSaveFileName(self, "Report", str(self.state.folder / "report.html"), "*.html")
+        name, _ = QFileDialog.getSaveFileName(self, tr("Report"), str(self.state.folder / "report.html"), "*.html")
         if name:
             self.write("report", name)
 
     def write_export(self) -> None:
         """Ask for a folder, and have the chosen export written."""
         what = self.format.currentText()
-        name, _ = QFileDialog.getSaveFileName(self, "New folder", f"{self.state.folder.name}-{what}")
+        name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{what}")
         if name:
             self.write(what, name)
 
     def _choose_other(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, "Session to compare with", str(self.state.folder.parent))
+        name = QFileDialog.getExistingDirectory(self, tr("Session to compare with"), str(self.state.folder.parent))
         if name:
             self.ask(m.Compare(name))
 
@@ -228,14 +231,14 @@ class AnalystWindow(QMainWindow):
             made.setEnabled(not busy and state.report is not None)
         head = "" if state.report is None else state.report.head
         self._head.setVisible(bool(head))
-        self._head.setText("SIMULATED")
+        self._head.setText(tr("SIMULATED"))
         self._head.setToolTip(head)
         self.way.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
 
     def _named(self) -> tuple[tuple[str, QWidget], ...]:
-        return ("Trials", self.trials), ("Stroke", self.stroke), ("Model", self.model)
+        return (tr("Trials"), self.trials), (tr("Stroke"), self.stroke), (tr("Model"), self.model)
 
     def _panel(self, name: str, column: QWidget) -> QFrame:
         frame, layout = panel(name.lower())

@@ -21,10 +21,17 @@ from daq_app.window.bench_load import AXES
 from daq_app.window.messages import Message
 from daq_app.window.view_bench import BenchView
 from daq_app.window.view_life import NAMES
+from daq_app.wording import tr, tr_noop
 
-SHOWN_COUNTERS = ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
+SHOWN_COUNTERS = tr_noop(
+    ("lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "lag")
+)
 
-SPOKEN = {"tare": "mean of the zero", "drift": "drift of the zero"}  # where a caption alone does not say of what
+FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
+SPOKEN = {
+    "tare": tr_noop("mean of the zero"),
+    "drift": tr_noop("drift of the zero"),
+}  # where a caption alone does not say of what
 
 
 class BenchPanel(QFrame):
@@ -36,27 +43,27 @@ class BenchPanel(QFrame):
         """Show no transducer; `send` takes what is asked for, `search` looks for devices."""
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("bench")
+        self.setAccessibleName(tr("bench"))
         self._send = send
         self._view: BenchView | None = None
-        self._lamp = Lamp(tokens, "transducer")
-        self._lamp_words = label("not connected", wrap=True)
-        self._fields = {name: label("–", wrap=True) for name in ("serial", "calibration", "rate", "tare", "drift")}
+        self._lamp = Lamp(tokens, tr("transducer"))
+        self._lamp_words = label(tr("not connected"), wrap=True)
+        self._fields = {name: label("–", wrap=True) for name in FIELDS}
         self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
         self._life = {name: label("–", wrap=True) for name in NAMES}
         self._name = Shortened("title")
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
-        self._choice = choice("transducer to connect: choose one, or type its address")
+        self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(self._typed, self._leave))
         self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
         self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
-        self.search = button("Search", "search for transducers", search)
-        self.connect_button = button("Connect", "connect the chosen transducer", self._connect)
-        self.tare = button("Zero T", "measure the zero of the bench", lambda: send(Tare()))
+        self.search = button(tr("Search"), tr("search for transducers"), search)
+        self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self._connect)
+        self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
         self.acknowledge = button(
-            "Acknowledge A", "acknowledge overloads: begin to watch anew", lambda: send(AcknowledgeOverloads())
+            tr("Acknowledge A"), tr("acknowledge overloads: begin to watch anew"), lambda: send(AcknowledgeOverloads())
         )
         self._search_words = label("", "quiet", wrap=True)
         self._content = self._built()
@@ -80,23 +87,23 @@ class BenchPanel(QFrame):
             ("tare", view.tare),
             ("drift", view.drift),
         ):
-            say(self._fields[name], text, SPOKEN.get(name, name))
+            say(self._fields[name], text, tr(SPOKEN.get(name, name)))
         for name, text in view.life:
-            say(self._life[name], text, name)
+            say(self._life[name], text, tr(name))
         for name, text in view.counters:
             if name in self._counters:
-                say(self._counters[name], text, name)
+                say(self._counters[name], text, tr(name))
                 regrade(self._counters[name], "look" if name != "lag" and text != "0" else "")
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
         if before is None or before.devices != view.devices:
             self._show_devices(view)
-        self.search.setText("Searching" if view.searching else "Search")
+        self.search.setText(tr("Searching") if view.searching else tr("Search"))
         self.search.setEnabled(not view.searching)
         say(self._search_words, view.search_words)
         self._search_words.setVisible(bool(view.search_words))
-        self.connect_button.setText("Disconnect" if view.lamp not in ("off",) else "Connect")
-        self.connect_button.setAccessibleName(self.connect_button.text() + " the transducer")
+        self.connect_button.setText(tr("Disconnect") if view.lamp not in ("off",) else tr("Connect"))
+        self.connect_button.setAccessibleName(self.connect_button.text() + tr(" the transducer"))
         self.connect_button.setEnabled(view.lamp == "off" or view.connect is not None)
         self._choice.setEnabled(view.lamp == "off")
         self.tare.setEnabled(view.can_tare)
@@ -158,7 +165,9 @@ class BenchPanel(QFrame):
         layout.addLayout(row)
         layout.addWidget(self._search_words)
         layout.addLayout(_rows([(name, self._fields[name]) for name in ("serial", "calibration", "rate")]))
-        layout.addWidget(label("Load: share of the rated range, most since acknowledged, noise", "section", wrap=True))
+        layout.addWidget(
+            label(tr("Load: share of the rated range, most since acknowledged, noise"), "section", wrap=True)
+        )
         bars = QVBoxLayout()
         bars.setSpacing(0)
         for bar in self._bars.values():
@@ -168,11 +177,11 @@ class BenchPanel(QFrame):
         acts.addWidget(self.tare, 2)
         acts.addWidget(self.acknowledge, 3)
         layout.addLayout(acts)
-        layout.addWidget(label("Readings since the stream began", "section", wrap=True))
+        layout.addWidget(label(tr("Readings since the stream began"), "section", wrap=True))
         layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
-        layout.addWidget(label("Zero", "section"))
-        layout.addLayout(_rows([("mean", self._fields["tare"]), ("drift", self._fields["drift"])]))
-        layout.addWidget(label("This serial number, over its life here", "section", wrap=True))
+        layout.addWidget(label(tr("Zero"), "section"))
+        layout.addLayout(_rows([(tr_noop("mean"), self._fields["tare"]), ("drift", self._fields["drift"])]))
+        layout.addWidget(label(tr("This serial number, over its life here"), "section", wrap=True))
         layout.addLayout(_rows([(name, self._life[name]) for name in NAMES]))
         layout.addStretch(1)
         return scrolled(inside)
@@ -185,13 +194,13 @@ class BenchStrip(QFrame):
         """Show no transducer; `expand` shows the bench whole."""
         super().__init__()
         self.setProperty("role", "strip")
-        self.setAccessibleName("bench, folded")
-        self._lamp = Lamp(tokens, "transducer")
+        self.setAccessibleName(tr("bench, folded"))
+        self._lamp = Lamp(tokens, tr("transducer"))
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
         self.setFixedWidth(round(150 * scale))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.addWidget(button("Bench  B", "show the bench", expand))
+        layout.addWidget(button(tr("Bench  B"), tr("show the bench"), expand))
         row = QHBoxLayout()
         self._words = label("", "quiet", wrap=True)
         row.addWidget(self._lamp)
@@ -220,7 +229,7 @@ def _rows(fields: list[tuple[str, QLabel]]) -> QGridLayout:
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
     for row, (name, value) in enumerate(fields):
-        grid.addWidget(label(name, "quiet"), row, 0, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(label(tr(name), "quiet"), row, 0, Qt.AlignmentFlag.AlignTop)
         grid.addWidget(value, row, 1)
     grid.setColumnStretch(1, 1)
     return grid
@@ -232,7 +241,7 @@ def _counters(fields: list[tuple[str, QLabel]]) -> QGridLayout:
     grid.setVerticalSpacing(2)
     for at, (name, value) in enumerate(fields):
         value.setAlignment(Qt.AlignmentFlag.AlignRight)
-        grid.addWidget(label(name, "quiet"), at // 2, 2 * (at % 2))
+        grid.addWidget(label(tr(name), "quiet"), at // 2, 2 * (at % 2))
         grid.addWidget(value, at // 2, 2 * (at % 2) + 1)
     for column in (1, 3):
         grid.setColumnStretch(column, 1)

@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout
 from daq_app.qt.parts import label, regrade, say
 from daq_app.qt.tokens import GRID
 from daq_app.window.checklist import Card
+from daq_app.wording import tr
 
 
 class CardFrame(QFrame):
@@ -21,7 +22,7 @@ class CardFrame(QFrame):
         head = QHBoxLayout()
         head.setSpacing(GRID)
         head.addWidget(self._mark)
-        head.addWidget(label(name, "name", wrap=True), 1)
+        head.addWidget(label(tr(name), "name", wrap=True), 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.setSpacing(4)
@@ -39,7 +40,9 @@ class CardFrame(QFrame):
         say(self._mark, "✓" if card.ready else "○")
         say(self.words, card.words)
         self.words.setVisible(bool(card.words))
-        self.setAccessibleName(f"{self._name}: {'ready' if card.ready else 'not ready'}. {card.words}".strip())
+        self.setAccessibleName(
+            f"{tr(self._name)}: {tr('ready') if card.ready else tr('not ready')}. {card.words}".strip()
+        )
         regrade(self.words, "")
 
     def insist(self) -> None:

@@ -8,6 +8,7 @@ from daq_app.analyst.compared import NAMES, ComparedRow
 from daq_app.qt.parts import Shortened, button
 from daq_app.qt.picture_view import PictureView, Save
 from daq_app.qt.text_table import TextTable
+from daq_app.wording import tr
 
 PICTURE = "compared"  # its name
 
@@ -19,11 +20,11 @@ class ComparedView(QWidget):
         """Show nothing yet."""
         super().__init__()
         self.words = Shortened("quiet")
-        self.choose = button("Compare with…", "compare with another session", choose)
-        head = ("stimulus", *(f"{name} {part}" for name in NAMES for part in ("A", "B", "B − A")))
-        self.table = TextTable("two sessions compared", head)
+        self.choose = button(tr("Compare with…"), tr("compare with another session"), choose)
+        head = (tr("stimulus"), *(f"{tr(name)} {part}" for name in NAMES for part in ("A", "B", "B − A")))
+        self.table = TextTable(tr("two sessions compared"), head)
         self.table.setMinimumHeight(130)
-        self.picture = PictureView("the picture of both sessions", save)
+        self.picture = PictureView(tr("the picture of both sessions"), save)
         top = QHBoxLayout()
         top.addWidget(self.words, 1)
         top.addWidget(self.choose)
@@ -37,7 +38,7 @@ class ComparedView(QWidget):
     def show_rows(self, rows: Sequence[ComparedRow], sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
         there = bool(sessions[1])
-        self.words.show_whole(f"A: {sessions[0]}   B: {sessions[1]}" if there else "No second session is open.")
+        self.words.show_whole(f"A: {sessions[0]}   B: {sessions[1]}" if there else tr("No second session is open."))
         self.table.setVisible(there)
         self.picture.setVisible(there)
         lines: list[tuple[str, ...]] = []

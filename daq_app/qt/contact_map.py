@@ -8,6 +8,7 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
 from daq_app.qt.painted_widget import PaintedWidget
 from daq_app.qt.shapes import blank, lines
 from daq_app.qt.tokens import MU, SMALL, Tokens, font
+from daq_app.wording import tr
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class ContactMap(PaintedWidget):
         self._touching = False
         self._direction = 0
         self.setMinimumSize(100, 60)
-        self.setAccessibleName("centre of pressure on the sample: nothing touches")
+        self.setAccessibleName(tr("centre of pressure on the sample: nothing touches"))
 
     def show_direction(self, direction: int) -> None:
         """Show which way the stroke is to go: +1 away from the subject, -1 towards, 0 none."""
@@ -43,8 +44,8 @@ class ContactMap(PaintedWidget):
             return
         self._trail = shown
         self._touching = touching
-        where = f"x {shown[-1, 0]:.0f}, y {shown[-1, 1]:.0f} mm" if touching else "nothing touches"
-        self.setAccessibleName(f"centre of pressure on the sample: {where}")
+        where = f"x {shown[-1, 0]:.0f}, y {shown[-1, 1]:.0f} mm" if touching else tr("nothing touches")
+        self.setAccessibleName(tr("centre of pressure on the sample: {where}", where=where))
         self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
@@ -87,11 +88,11 @@ class ContactMap(PaintedWidget):
         painter.setFont(font(SMALL, self._scale))
         painter.setPen(QColor(t.quiet))
         beside = QRectF(0, box.top(), box.left() - 2 * MARGIN, box.height())
-        for edge, text in ((Qt.AlignmentFlag.AlignTop, "distal"), (Qt.AlignmentFlag.AlignBottom, "proximal")):
+        for edge, text in ((Qt.AlignmentFlag.AlignTop, tr("distal")), (Qt.AlignmentFlag.AlignBottom, tr("proximal"))):
             painter.drawText(beside, Qt.AlignmentFlag.AlignRight | edge, text)
         beside.moveLeft(box.right() + 2 * MARGIN)
         low = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom | Qt.TextFlag.TextWordWrap
-        painter.drawText(beside, low, "10 mm grid")
+        painter.drawText(beside, low, tr("10 mm grid"))
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm

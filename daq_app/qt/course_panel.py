@@ -21,6 +21,7 @@ from daq_app.qt.parts import EntryLine, button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
+from daq_app.wording import tr
 from sessions.run import steps
 
 ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
@@ -33,23 +34,25 @@ class CoursePanel(QFrame):
         """Show no plan; `send` takes what is done."""
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("course of the session")
+        self.setAccessibleName(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
         self._asking = ""
         self._asked_for = ""  # the question that stands over the line
         self.plan = QListWidget()
-        self.plan.setAccessibleName("plan: trials done, in hand and coming")
+        self.plan.setAccessibleName(tr("plan: trials done, in hand and coming"))
         self.plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.redo = button("Redo R", "redo the trial, with a reason", lambda: self.ask("redo"), "small")
-        self.skip = button("Skip S", "skip the trial, with a reason", lambda: self.ask("skip"), "small")
-        self.pause = button("Pause P", "pause", self._pause, "small")
-        self.note = button("Note N", "write a note", lambda: self.ask("note"), "small")
-        self.no_answer = button("No answer 0", "the subject gives no answer", lambda: self.ask("no answer"), "small")
-        self.end = button("End Ctrl+E", "end the session, with a reason", self._end, "small")
+        self.redo = button(tr("Redo R"), tr("redo the trial, with a reason"), lambda: self.ask("redo"), "small")
+        self.skip = button(tr("Skip S"), tr("skip the trial, with a reason"), lambda: self.ask("skip"), "small")
+        self.pause = button(tr("Pause P"), tr("pause"), self._pause, "small")
+        self.note = button(tr("Note N"), tr("write a note"), lambda: self.ask("note"), "small")
+        self.no_answer = button(
+            tr("No answer 0"), tr("the subject gives no answer"), lambda: self.ask("no answer"), "small"
+        )
+        self.end = button(tr("End Ctrl+E"), tr("end the session, with a reason"), self._end, "small")
         self._all = (self.skip, self.redo, self.pause, self.note, self.no_answer, self.end)
         self.line = EntryLine(self._given, self.leave)
-        self.line.setAccessibleName("reason or note")
+        self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
         self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
@@ -58,7 +61,7 @@ class CoursePanel(QFrame):
         self.mirror = Mirror(tokens, scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
         head = QHBoxLayout()
-        head.addWidget(label("Plan", "section"), 1)
+        head.addWidget(label(tr("Plan"), "section"), 1)
         head.addWidget(self._timer)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
@@ -76,7 +79,9 @@ class CoursePanel(QFrame):
     def show_view(self, view: CourseView) -> None:
         """Show the course."""
         before, self._view = self._view, view
-        say(self._timer, f"waiting {view.timer}" if view.timer else "", "Time since this was asked:")
+        say(
+            self._timer, tr("waiting {timer}", timer=view.timer) if view.timer else "", tr("Time since this was asked:")
+        )
         if before is not None and before.rows == view.rows and _buttons(before) == _buttons(view):
             return
         if before is None or before.rows != view.rows:
@@ -120,7 +125,7 @@ class CoursePanel(QFrame):
     def _given(self) -> None:
         text = self.line.text().strip()
         if not text:
-            say(self._question, f"{self._asked_for} A word is enough; Esc leaves it.")
+            say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
             return
         made: dict[str, Callable[[str], Message]] = {
             "redo": steps.Redo,
@@ -157,8 +162,8 @@ class CoursePanel(QFrame):
         layout.addWidget(self._question)
         layout.addWidget(self.line)
         row = QHBoxLayout()
-        row.addWidget(button("Keep  Enter", "keep what was typed", self._given))
-        row.addWidget(button("Leave  Esc", "leave it", self.leave))
+        row.addWidget(button(tr("Keep  Enter"), tr("keep what was typed"), self._given))
+        row.addWidget(button(tr("Leave  Esc"), tr("leave it"), self.leave))
         layout.addLayout(row)
         page.setMinimumHeight(round(88 * scale))
         return page
@@ -196,5 +201,5 @@ def _buttons(view: CourseView) -> tuple[Button, ...]:
 
 
 def _show_button(made: QPushButton, shown: Button) -> None:
-    made.setText(f"{shown.label} {shown.key}".strip())
+    made.setText(f"{shown.label} {tr(shown.key)}".strip())
     made.setEnabled(shown.enabled)

@@ -11,6 +11,7 @@ from daq_app.qt.parts import button, choice, label
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.messages import Message
 from daq_app.window.new_session import Unfinished, unfinished
+from daq_app.wording import tr
 
 
 class CutShort(QFrame):
@@ -23,10 +24,10 @@ class CutShort(QFrame):
         self._shown: tuple[Unfinished, ...] = ()
         self.setProperty("role", "banner")
         self.setProperty("grade", "look")
-        self._sessions = choice("sessions that were cut short")
-        self.go_on = button("Go on with it", "go on with the session that was cut short", self._resumed)
+        self._sessions = choice(tr("sessions that were cut short"))
+        self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
         layout = QVBoxLayout(self)
-        for widget in (label("▲ Sessions that were cut short", wrap=True), self._sessions, self.go_on):
+        for widget in (label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on):
             layout.addWidget(widget)
         self.show_sessions(())
 

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 from daq_app.analyst import messages as m
 from daq_app.qt.parts import Wrapped, button, label
 from daq_app.qt.tokens import GRID
+from daq_app.wording import tr
 
 BY = "analyst/by"  # where the code is remembered
 NOBODY = "analyst"  # who decided, where nobody gave a code
@@ -22,20 +23,24 @@ class DecisionsBar(QWidget):
         super().__init__()
         self.by = QLineEdit(str(QSettings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)
-        self.by.setAccessibleName("code of who decides; never a name")
+        self.by.setAccessibleName(tr("code of who decides; never a name"))
         self.by.setMaximumWidth(110)
         self.by.editingFinished.connect(lambda: QSettings().setValue(BY, self.by.text()))
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)
-        self.why.setAccessibleName("why an edge is moved")
-        self.undo = button("Undo", "undo the last decision, Ctrl+Z", lambda: self.take_back(again=False), "small")
-        self.redo = button("Redo", "redo what was undone, Ctrl+Shift+Z", lambda: self.take_back(again=True), "small")
+        self.why.setAccessibleName(tr("why an edge is moved"))
+        self.undo = button(
+            tr("Undo"), tr("undo the last decision, Ctrl+Z"), lambda: self.take_back(again=False), "small"
+        )
+        self.redo = button(
+            tr("Redo"), tr("redo what was undone, Ctrl+Shift+Z"), lambda: self.take_back(again=True), "small"
+        )
         self.told = Wrapped("value", "look")
         line = QHBoxLayout()
         line.setSpacing(GRID // 2)
-        line.addWidget(label("by", "quiet"))
+        line.addWidget(label(tr("by"), "quiet"))
         line.addWidget(self.by)
-        line.addWidget(label("why", "quiet"))
+        line.addWidget(label(tr("why"), "quiet"))
         line.addWidget(self.why, 1)
         line.addWidget(self.undo)
         line.addWidget(self.redo)

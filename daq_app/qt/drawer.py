@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QSplitter, QWidget
 from daq_app.qt.openness import Openness
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
 from daq_app.qt.screens import settings
+from daq_app.wording import tr
 
 SHARES = (500, 300)  # of the width, before somebody moved the handle [-]
 
@@ -29,7 +30,7 @@ class Drawer(QSplitter):
         sizes = settings().value(DRAWER_SIZES)
         if isinstance(sizes, QByteArray):
             self.restoreState(sizes)
-        self.handle(1).setAccessibleName("edge of the drawer")
+        self.handle(1).setAccessibleName(tr("edge of the drawer"))
         self.splitterMoved.connect(self._keep_sizes)
         self._open = Openness(DRAWER)
         self._place()

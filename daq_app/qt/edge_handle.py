@@ -6,8 +6,9 @@ from PySide6.QtWidgets import QPushButton, QSizePolicy
 
 from daq_app.analyst.edges import LEAP, STEP, Placed
 from daq_app.analyst.messages import Edge
+from daq_app.wording import tr, tr_noop
 
-NAMES: dict[Edge, str] = {"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"}
+NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "steady end": "to", "lift": "lift"})
 
 
 class EdgeHandle(QPushButton):
@@ -69,15 +70,17 @@ class EdgeHandle(QPushButton):
             self.moved.emit(self.edge, self._placed.time)
 
     def _show(self) -> None:
-        name, placed = NAMES[self.edge], self._placed
+        name, placed = tr(NAMES[self.edge]), self._placed
         if placed is None:
             self.setText(name)
-            self.setAccessibleName(f"{name}: no stroke")
+            self.setAccessibleName(tr("{name}: no stroke", name=name))
             return
         at = f"{self._time - self._origin:.3f}"
         mark = "✎ " if placed.decided else "" if placed.found else "○ "
         self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
-        state = placed.decided or ("as found" if placed.found else "not found; where it could be")
-        self.setToolTip(f"{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back")
-        spoken = {"steady begin": "steady from", "steady end": "steady to"}.get(self.edge, name)
+        state = placed.decided or (tr("as found") if placed.found else tr("not found; where it could be"))
+        self.setToolTip(
+            tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
+        )
+        spoken = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
         self.setAccessibleName(f"{spoken} {at} s, {state}{', Enter records' if self._away else ''}")

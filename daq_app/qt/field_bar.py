@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
 from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice, Range
 from daq_app.qt.parts import choice
 from daq_app.qt.tokens import GRID, TARGET
+from daq_app.wording import tr
 
 ALL_TRIALS, OWN, FIXED = range(3)
 LARGEST = 1e6  # in a number field: far beyond any stress or strain of tissue
@@ -20,11 +21,11 @@ class FieldBar(QWidget):
         """Offer the SED, with one range for all trials."""
         super().__init__()
         self._automatic: Range = (0.0, 1.0)
-        self.which = choice("field that is drawn")
-        self.which.addItems([field.label for field in FIELD_CHOICES])
-        self.ranges = choice("range of the colours")
-        self.ranges.addItems(["All trials", "Own scale", "Fixed"])
-        self.low, self.high = _number("colours begin at"), _number("colours end at")
+        self.which = choice(tr("field that is drawn"))
+        self.which.addItems([tr(field.label) for field in FIELD_CHOICES])
+        self.ranges = choice(tr("range of the colours"))
+        self.ranges.addItems([tr("All trials"), tr("Own scale"), tr("Fixed")])
+        self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)

@@ -14,15 +14,16 @@ from daq_app.analyst.probe import Line, along_line, along_skin, read_out
 from daq_app.qt.parts import button, choice
 from daq_app.qt.tokens import GRID, MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.wording import tr, tr_noop
 
 pg: Any = pyqtgraph  # it has no types
 
 RECEPTORS, SKIN, LINE = range(3)
-SOURCES = ("SED of the receptors", "Field along the skin", "Field along the line")
+SOURCES = (tr_noop("SED of the receptors"), tr_noop("Field along the skin"), tr_noop("Field along the line"))
 PLACES = (
-    "along the skin, proximal to distal [mm]",
-    "along the skin at rest, proximal to distal [mm]",
-    "from A to B [mm]",
+    tr_noop("along the skin, proximal to distal [mm]"),
+    tr_noop("along the skin at rest, proximal to distal [mm]"),
+    tr_noop("from A to B [mm]"),
 )
 
 
@@ -34,9 +35,9 @@ class FieldPlot(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         """Show nothing yet."""
         super().__init__()
-        self.source = choice("what is plotted under the finger")
-        self.source.addItems(SOURCES)
-        self.draw = button("Line", "draw a line over the finger with the mouse", lambda: None, "small")
+        self.source = choice(tr("what is plotted under the finger"))
+        self.source.addItems([tr(words) for words in SOURCES])
+        self.draw = button(tr("Line"), tr("draw a line over the finger with the mouse"), lambda: None, "small")
         self.draw.setCheckable(True)
         self.plot = ZoomedPlot(tokens)
         self.plot.read = self._read
@@ -70,9 +71,9 @@ class FieldPlot(QWidget):
             place, values = along_skin(frame, parts, field)
         elif frame is not None and line is not None:
             place, values = along_line(frame, parts, field, line)
-        words = PLACES[source]
+        words = tr(PLACES[source])
         if source == LINE and line is None:
-            words = "Press Line and drag over the finger, or drag with Shift."
+            words = tr("Press Line and drag over the finger, or drag with Shift.")
         self._curve.setData(place, values, symbol="o" if source == RECEPTORS else None, symbolBrush=MODEL)
         self._here.setVisible(source != LINE)
         self.plot.getPlotItem().setLabel("bottom", f"{axis} {words}" if len(place) else words)

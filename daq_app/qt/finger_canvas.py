@@ -27,6 +27,7 @@ from daq_app.analyst.probe import Line, probe_words
 from daq_app.analyst.viewport import View
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
+from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
 
@@ -74,10 +75,12 @@ class FingerCanvas(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
         self.setToolTip(
-            "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
-            "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
+            tr(
+                "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
+                "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
+            )
         )
-        self.setAccessibleName("finger of the model: none")
+        self.setAccessibleName(tr("finger of the model: none"))
 
     def show_frame(self, frame: Frame | None, parts: Parts, words: str, look: Look) -> None:
         """Show a state, and how; what was moved or zoomed stays so."""
@@ -86,7 +89,7 @@ class FingerCanvas(QWidget):
         if look.near != self._look.near:
             self._view = None
         self._frame, self._parts, self._words, self._look = frame, parts, words, look
-        self.setAccessibleName(words or "finger of the model: none")
+        self.setAccessibleName(words or tr("finger of the model: none"))
         self._renew()
         self._probe()
 

@@ -15,6 +15,7 @@ from daq_app.analyst.viewport import Box, View
 from daq_app.qt.indicators import paint_lost
 from daq_app.qt.shapes import faces
 from daq_app.qt.tokens import Tokens
+from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
 NEAR = (4.6, -2.6, 4.4)  # half width, below and above of the close view [mm]
 COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
 STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
-STATE_WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
+STATE_WORDS = {"slip": tr_noop("slips"), "cap": tr_noop("slips at the bound"), "stick": tr_noop("sticks")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +135,7 @@ class FingerPainter:
         words.moveCenter(middle)
         corners = (words.topLeft(), words.topRight(), words.bottomLeft(), words.bottomRight())
         if all(bone.containsPoint(corner, Qt.FillRule.OddEvenFill) for corner in corners):
-            self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, "bone")
+            self.painter.drawText(words, Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextDontClip, tr("bone"))
 
     def _paint_line(self, line: Line) -> None:
         ends = self._placed(np.array(line))
@@ -174,7 +175,7 @@ class FingerPainter:
             ends = [place for _, place in run]
             painter.setPen(QPen(ink, 3.0, STYLES[state], Qt.PenCapStyle.FlatCap))
             painter.drawLine(QPointF(ends[0] - 1.5, level), QPointF(ends[-1] + 1.5, level))
-            words = STATE_WORDS[state]
+            words = tr(STATE_WORDS[state])
             if ends[-1] - ends[0] > painter.fontMetrics().horizontalAdvance(words):
                 box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
                 painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)

@@ -15,13 +15,14 @@ from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from daq_app.qt.finger_canvas import FingerCanvas
+from daq_app.wording import tr, tr_noop
 from sessions.atomic_file import write_whole
 
 DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
 SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed
 COLOURS = 256  # of a frame of a GIF: all that the format has
 FILM_SUFFIXES = (".gif", ".mp4")
-NO_MP4 = "MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF"
+NO_MP4 = tr_noop("MP4 needs the package imageio-ffmpeg: pip install 'daq-app[film]', or save the film as GIF")
 
 
 def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
@@ -74,9 +75,9 @@ class FilmWriter(QObject):
         self._frames: list[Image.Image] = []
         self._pool = ThreadPoolExecutor(1)
         self._writing: Future[None] | None = None
-        self._dialog = QProgressDialog("Writing the film", "", 0, count + 1, canvas.window())
-        cancel = QPushButton("Cancel")
-        cancel.setAccessibleName("cancel the film")
+        self._dialog = QProgressDialog(tr("Writing the film"), "", 0, count + 1, canvas.window())
+        cancel = QPushButton(tr("Cancel"))
+        cancel.setAccessibleName(tr("cancel the film"))
         self._dialog.setCancelButton(cancel)
         self._dialog.setWindowModality(Qt.WindowModality.WindowModal)
         self._dialog.setMinimumDuration(0)
@@ -90,7 +91,7 @@ class FilmWriter(QObject):
 
     def _step(self) -> None:
         if self._dialog.wasCanceled() and self._writing is None:
-            self._end(f"The film was cancelled: {self._path} was not written.")
+            self._end(tr("The film was cancelled: {path} was not written.", path=self._path))
         elif len(self._frames) < self._count:
             self._show(len(self._frames))
             image = _image(self._canvas, 1.0, self._head)
@@ -104,7 +105,11 @@ class FilmWriter(QObject):
             self._writing = self._pool.submit(_write_film, self._path, self._frames)
         elif self._writing.done():
             error = self._writing.exception()
-            self._end(f"Saved: {self._path}" if error is None else f"The film could not be written: {error}")
+            self._end(
+                tr("Saved: {path}", path=self._path)
+                if error is None
+                else tr("The film could not be written: {error}", error=error)
+            )
 
     def _end(self, sentence: str) -> None:
         self._timer.stop()
@@ -130,7 +135,7 @@ def _mp4(frames: list[Image.Image]) -> bytes:
     try:
         from imageio_ffmpeg import get_ffmpeg_exe  # pyright: ignore[reportMissingTypeStubs]
     except ImportError as error:
-        raise ImportError(NO_MP4) from error
+        raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
     taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / SHOWN:g}", "-i", "-"]
     made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]

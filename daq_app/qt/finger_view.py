@@ -13,6 +13,7 @@ from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
 from daq_app.window.live_model import Picture
 from daq_app.window.plot_scale import PlotScale
 from daq_app.window.view_model import ModelWords
+from daq_app.wording import tr
 from solver.prediction import ROW
 
 Array = NDArray[np.float64]
@@ -43,7 +44,7 @@ class FingerView(Painted):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setMinimumSize(100, 1)  # it is folded where it is low
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setAccessibleName("finger as the model sees it")
+        self.setAccessibleName(tr("finger as the model sees it"))
 
     def show_model(self, picture: Picture | None, row: Array, words: ModelWords, clock: float) -> None:
         """Show a state; `row` (r,) [MPa] at `solver.prediction.ROW`, `clock` [s] is for the scales' patience."""
@@ -56,7 +57,7 @@ class FingerView(Painted):
         known = self._row[np.isfinite(self._row)]
         if len(known):
             self._heights = self._heights.following(0.0, float(known.max()), clock)
-        self.setAccessibleName(f"finger as the model sees it: {words.words}")
+        self.setAccessibleName(tr("finger as the model sees it: {words}", words=words.words))
         self.setToolTip(words.words)
         self.update()
 
@@ -108,7 +109,7 @@ class FingerView(Painted):
         painter.drawText(
             box.adjusted(4, 0, -4, -2),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
-            f"0 to {self._colours.high:g} kPa",
+            tr("0 to {high:g} kPa", high=self._colours.high),
         )
 
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
@@ -127,13 +128,13 @@ class FingerView(Painted):
         line = painter.fontMetrics().height()
         plot = box.adjusted(6, 2, -6, -line)
         painter.setPen(QColor(self.tokens.quiet))
-        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, "  SED along the skin [kPa]")
+        painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, tr("  SED along the skin [kPa]"))
         painter.drawText(
             box.adjusted(0, 0, -6, 0),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
             f"{self._heights.high:g}",
         )
-        ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), f"{ROW[-1]:g} mm distal")
+        ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), tr("{row:g} mm distal", row=ROW[-1]))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
         if plot.height() < 10:

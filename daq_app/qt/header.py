@@ -12,6 +12,7 @@ from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
+from daq_app.wording import tr
 
 
 class Header(QWidget):
@@ -21,10 +22,10 @@ class Header(QWidget):
         """Show no session; `subject` and `keys` show the subject's window and the keys."""
         super().__init__()
         self._heading = Shortened("title")
-        self._simulated = label("SIMULATED", "simulated")
+        self._simulated = label(tr("SIMULATED"), "simulated")
         self._simulated.setVisible(False)
-        self._lamp = Lamp(tokens, "recording")
-        self._words = label("not recording", "title")
+        self._lamp = Lamp(tokens, tr("recording"))
+        self._words = label(tr("not recording"), "title")
         self._saved = label("", "quiet")
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         layout = QHBoxLayout(self)
@@ -36,8 +37,8 @@ class Header(QWidget):
         layout.addWidget(self._lamp)
         layout.addWidget(self._words)
         layout.addWidget(self._saved)
-        layout.addWidget(button("Subject  F6", "show the subject's window", subject))
-        layout.addWidget(button("Keys  F1", "show the keys of this window", keys))
+        layout.addWidget(button(tr("Subject  F6"), tr("show the subject's window"), subject))
+        layout.addWidget(button(tr("Keys  F1"), tr("show the keys of this window"), keys))
         self._device = Shortened("quiet")
         layout.insertWidget(1, self._device, 2)
         self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
@@ -48,7 +49,7 @@ class Header(QWidget):
         self._device.show_whole(f"{view.bench.name}: {view.bench.lamp_words}")
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
-        self._simulated.setAccessibleName(view.simulated or "nothing is simulated")
+        self._simulated.setAccessibleName(view.simulated or tr("nothing is simulated"))
         self._lamp.show_grade(view.lamp.grade, view.lamp.words)
         say(self._words, view.lamp.words)
         regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
@@ -70,7 +71,7 @@ class Notice(QFrame):
         self._warning: str | None = None
         self.setProperty("role", "banner")
         self._words = label("", wrap=True)
-        self._button = button("", "what the notice offers", self._do)
+        self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
         self._scale = scale
         self._folds = False
@@ -91,7 +92,7 @@ class Notice(QFrame):
         self._banner = banner
         mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
         text = f"{mark}{banner.sentence}" if banner else told[:1].upper() + told[1:]
-        say(self._words, text, "Notice:")
+        say(self._words, text, tr("Notice:"))
         regrade(self, banner.grade if banner else "")
         self._button.setVisible(banner is not None and banner.sends is not None)
         if self._folds:
@@ -123,13 +124,13 @@ class ToDo(QFrame):
         """Show nothing to do; `review` opens the session that has ended."""
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("what to do now")
+        self.setAccessibleName(tr("what to do now"))
         self._small = False
         self._arrow = Arrow(tokens)
         self.sentence = label("", "headline", wrap=True)
         self.sentence.setMinimumHeight(2 * GRID)
-        self.primary = button("", "do it", primary, "primary")
-        self.second = button("Review  F4", "look at the session that has ended", review)
+        self.primary = button("", tr("do it"), primary, "primary")
+        self.second = button(tr("Review  F4"), tr("look at the session that has ended"), review)
         self.second.hide()
         policy = self.primary.sizePolicy()
         policy.setRetainSizeWhenHidden(True)
@@ -148,7 +149,7 @@ class ToDo(QFrame):
         say(self.sentence, sentence)
         self._arrow.show_direction(direction)
         if primary is not None:
-            text = f"{primary.label}   {primary.key}"
+            text = f"{primary.label}   {tr(primary.key)}"
             if self.primary.text() != text:
                 self.primary.setText(text)
                 self.primary.setAccessibleName(f"{primary.label}: {sentence}")

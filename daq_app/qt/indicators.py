@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QSizePolicy
 from daq_app.qt.painted import Painted
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.window.view_bench import Bar
+from daq_app.wording import tr
 
 Grade = Literal["off", "on", "well", "look", "wrong"]
 
@@ -64,7 +65,7 @@ class LoadBar(Painted):
         super().__init__(tokens)
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
-        self.setAccessibleName(f"load on {name}")
+        self.setAccessibleName(tr("load on {name}", name=name))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(round(2.75 * GRID * scale))
 
@@ -77,11 +78,15 @@ class LoadBar(Painted):
         if bar == self._bar:
             return
         self._bar = bar
-        now = "no rated range" if bar.share is None else f"{100 * bar.share:.0f} % of the rated load"
-        peak = "" if bar.peak is None else f", at most {100 * bar.peak:.0f} %"
-        state = ", OVERLOAD" if bar.over else ""
-        noise = f", noise {bar.noise}" if bar.noise else ""
-        self.setAccessibleName(f"load on {bar.name}: {now}{peak}{state}{noise}")
+        now = (
+            tr("no rated range") if bar.share is None else tr("{share:.0f} % of the rated load", share=100 * bar.share)
+        )
+        peak = "" if bar.peak is None else tr(", at most {peak:.0f} %", peak=100 * bar.peak)
+        state = tr(", OVERLOAD") if bar.over else ""
+        noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""
+        self.setAccessibleName(
+            tr("load on {name}: {now}{peak}{state}{noise}", name=bar.name, now=now, peak=peak, state=state, noise=noise)
+        )
         self.setToolTip(self.accessibleName())
         self.update()
 
@@ -109,7 +114,7 @@ class LoadBar(Painted):
             painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)
         if right:
             painter.setPen(QColor(t.wrong if bar.over else t.quiet))
-            words = "OVERLOAD" if bar.over else bar.noise
+            words = tr("OVERLOAD") if bar.over else bar.noise
             place = QRectF(self.width() - right + 4, 0, right - 4, self.height())
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
 
@@ -122,13 +127,17 @@ class Arrow(Painted):
         super().__init__(tokens)
         self._direction = 0
         self.setFixedSize(5 * GRID, 7 * GRID)
-        self.setAccessibleName("no stroke asked for")
+        self.setAccessibleName(tr("no stroke asked for"))
 
     def show_direction(self, direction: int) -> None:
         """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
         if direction != self._direction:
             self._direction = direction
-            words = {1: "stroke away from the subject", -1: "stroke towards the subject", 0: "no stroke asked for"}
+            words = {
+                1: tr("stroke away from the subject"),
+                -1: tr("stroke towards the subject"),
+                0: tr("no stroke asked for"),
+            }
             self.setAccessibleName(words[direction])
             self.setToolTip(words[direction])
             self.update()

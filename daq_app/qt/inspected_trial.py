@@ -16,11 +16,12 @@ from daq_app.window.live_trace import Columns
 from daq_app.window.plot_scale import PlotScale
 from daq_app.window.stroke_quality import PICTURE
 from daq_app.window.view_trials import Inspection
+from daq_app.wording import tr, tr_noop
 
 PLOTS = (
-    ("N and T [N]", (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
+    (tr_noop("N and T [N]"), (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
     ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
-    ("speed [mm/s]", (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
+    (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
 )
 
 
@@ -38,7 +39,7 @@ class InspectedTrial(QWidget):
         self._plots = [LivePlot(*plot, tokens, scale, PICTURE) for plot in PLOTS]
         head = QHBoxLayout()
         head.addWidget(self.heading, 1)
-        head.addWidget(button("Back  I", "back to the signals of this moment", back))
+        head.addWidget(button(tr("Back  I"), tr("back to the signals of this moment"), back))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)
@@ -48,7 +49,7 @@ class InspectedTrial(QWidget):
         layout.addLayout(self._cells())
         for at, plot in enumerate(self._plots):
             plot.show_times(at == len(self._plots) - 1)
-            plot.show_end("end")
+            plot.show_end(tr("end"))
             layout.addWidget(plot, 3 if at == 0 else 2)
         layout.addStretch(0)
 

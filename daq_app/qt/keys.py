@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout
 
 from daq_app.qt.parts import button, label, panel
 from daq_app.qt.tokens import GRID
+from daq_app.wording import tr, tr_noop
 
 WIDTH, HEIGHT = 720, 560  # of the page, before the font's scale
 
@@ -22,56 +23,78 @@ class Key:
 
 
 KEYS = (
-    Key("Space", "primary", "do what the sentence says (Enter too)"),
+    Key(tr_noop("Space"), "primary", tr_noop("do what the sentence says (Enter too)")),
     Key(
         "R",
         "redo",
-        "redo the trial that the button names; the reason is asked for, or taken from what was found of the stroke",
+        tr_noop(
+            "redo the trial that the button names; the reason is asked for, or taken from what was found of the stroke"
+        ),
     ),
-    Key("S", "skip", "skip the trial, with a reason"),
-    Key("P", "pause", "pause, and go on"),
-    Key("N", "note", "write a note, kept with its time"),
-    Key("0", "no answer", "the subject gives no answer to this trial; where a number is due, use the button"),
-    Key("Ctrl+E", "end", "end the session before its last trial, with a reason"),
-    Key("Ctrl+N", "new", "new session, after one has ended"),
-    Key("F2", "go to prepare", "prepare a session"),
-    Key("F3", "go to run", "go to the session in hand"),
-    Key("F4", "go to review", "look at recorded sessions, the last one first"),
-    Key("T", "tare", "measure the zero of the bench, outside a session"),
-    Key("A", "acknowledge", "acknowledge overloads"),
-    Key("H", "hold", "hold the picture; readings go on"),
-    Key("+", "longer", "show a longer stretch of time"),
-    Key("-", "shorter", "show a shorter stretch of time"),
-    Key("M", "model", "live model at finite strain, or at small strain again"),
-    Key("D", "drawer", "open or close the drawer: six axes, sample and finger"),
-    Key("V", "mirror", "show or fold a small picture of the page that the subject sees now"),
-    Key("I", "inspect", "inspect the last stroke's trial, and go back; a click on a tile inspects any trial"),
-    Key("B", "bench", "show or fold the bench"),
-    Key("F5", "pilot", "pilot the protocol of the page with simulated hand and answers"),
-    Key("F6", "subject", "show the subject's window and go to it"),
-    Key("F7", "preview", "preview every page that the subject will see, by the protocol and language of the page"),
-    Key("Ctrl+M", "ruler", "hold the subject's line against a ruler"),
-    Key("Ctrl+O", "open", "look at a recorded session: strokes, predictions, report, exports"),
-    Key("F1", "keys", "show or hide these keys"),
-    Key("Esc", "leave", "leave what is being typed, or these keys"),
+    Key("S", "skip", tr_noop("skip the trial, with a reason")),
+    Key("P", "pause", tr_noop("pause, and go on")),
+    Key("N", "note", tr_noop("write a note, kept with its time")),
+    Key("0", "no answer", tr_noop("the subject gives no answer to this trial; where a number is due, use the button")),
+    Key("Ctrl+E", "end", tr_noop("end the session before its last trial, with a reason")),
+    Key("Ctrl+N", "new", tr_noop("new session, after one has ended")),
+    Key("F2", "go to prepare", tr_noop("prepare a session")),
+    Key("F3", "go to run", tr_noop("go to the session in hand")),
+    Key("F4", "go to review", tr_noop("look at recorded sessions, the last one first")),
+    Key("T", "tare", tr_noop("measure the zero of the bench, outside a session")),
+    Key("A", "acknowledge", tr_noop("acknowledge overloads")),
+    Key("H", "hold", tr_noop("hold the picture; readings go on")),
+    Key("+", "longer", tr_noop("show a longer stretch of time")),
+    Key("-", "shorter", tr_noop("show a shorter stretch of time")),
+    Key("M", "model", tr_noop("live model at finite strain, or at small strain again")),
+    Key("D", "drawer", tr_noop("open or close the drawer: six axes, sample and finger")),
+    Key("V", "mirror", tr_noop("show or fold a small picture of the page that the subject sees now")),
+    Key("I", "inspect", tr_noop("inspect the last stroke's trial, and go back; a click on a tile inspects any trial")),
+    Key("B", "bench", tr_noop("show or fold the bench")),
+    Key("F5", "pilot", tr_noop("pilot the protocol of the page with simulated hand and answers")),
+    Key("F6", "subject", tr_noop("show the subject's window and go to it")),
+    Key(
+        "F7",
+        "preview",
+        tr_noop("preview every page that the subject will see, by the protocol and language of the page"),
+    ),
+    Key("Ctrl+M", "ruler", tr_noop("hold the subject's line against a ruler")),
+    Key("Ctrl+O", "open", tr_noop("look at a recorded session: strokes, predictions, report, exports")),
+    Key("F1", "keys", tr_noop("show or hide these keys")),
+    Key("Esc", "leave", tr_noop("leave what is being typed, or these keys")),
 )
 
 ANALYST_KEYS = (
-    Key("Tab", "next", "go to the next control; in the line at the top to the next element of the way to the readings"),
-    Key("Enter", "follow", "follow that element: to the trial, the prediction, the friction, the window, the readings"),
-    Key("Up  Down", "trial", "choose another trial, in the list"),
-    Key("Left  Right", "edge", "move the edge whose button has the focus by 5 ms; with Shift by 50 ms"),
-    Key("Enter", "record", "record where the edge is now, as a decision with who and why"),
-    Key("Esc", "back", "put the edge back where it was"),
-    Key("Home", "all", "show the whole stroke again after zooming; a double-click on a plot too"),
-    Key("Ctrl+C", "copy", "copy the selected cells of a table as tab-separated values; a click on its head sorts"),
-    Key("Ctrl+Z", "undo", "undo the last decision; that too is recorded"),
-    Key("Ctrl+Shift+Z", "redo", "redo what was undone last"),
-    Key("Space", "play", "play and pause, in the replay or in the history"),
-    Key("Left  Right", "step", "one reading, or one state of the history, back and on; Home and End: to its ends"),
-    Key("Ctrl+1 2 3", "pages", "go to the trials, the stroke, the model"),
-    Key("Esc", "stop", "stop what is being done; what was done is kept"),
-    Key("F1", "keys", "show or hide these keys"),
+    Key(
+        "Tab",
+        "next",
+        tr_noop("go to the next control; in the line at the top to the next element of the way to the readings"),
+    ),
+    Key(
+        "Enter",
+        "follow",
+        tr_noop("follow that element: to the trial, the prediction, the friction, the window, the readings"),
+    ),
+    Key("Up  Down", "trial", tr_noop("choose another trial, in the list")),
+    Key("Left  Right", "edge", tr_noop("move the edge whose button has the focus by 5 ms; with Shift by 50 ms")),
+    Key(tr_noop("Enter"), "record", tr_noop("record where the edge is now, as a decision with who and why")),
+    Key("Esc", "back", tr_noop("put the edge back where it was")),
+    Key("Home", "all", tr_noop("show the whole stroke again after zooming; a double-click on a plot too")),
+    Key(
+        "Ctrl+C",
+        "copy",
+        tr_noop("copy the selected cells of a table as tab-separated values; a click on its head sorts"),
+    ),
+    Key("Ctrl+Z", "undo", tr_noop("undo the last decision; that too is recorded")),
+    Key("Ctrl+Shift+Z", "redo", tr_noop("redo what was undone last")),
+    Key("Space", "play", tr_noop("play and pause, in the replay or in the history")),
+    Key(
+        "Left  Right",
+        "step",
+        tr_noop("one reading, or one state of the history, back and on; Home and End: to its ends"),
+    ),
+    Key("Ctrl+1 2 3", "pages", tr_noop("go to the trials, the stroke, the model")),
+    Key(tr_noop("Esc"), "stop", tr_noop("stop what is being done; what was done is kept")),
+    Key("F1", "keys", tr_noop("show or hide these keys")),
 )
 
 _NAMED = {
@@ -118,11 +141,11 @@ class KeysPage(QWidget):
     def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
         """Build the page of these keys, hidden."""
         super().__init__(parent)
-        self.setAccessibleName("keys")
-        frame, inside = panel("keys of this window")
+        self.setAccessibleName(tr("keys"))
+        frame, inside = panel(tr("keys of this window"))
         head = QHBoxLayout()
-        head.addWidget(label("Keys", "title"), 1)
-        head.addWidget(button("Close  F1", "close the keys", self.hide))
+        head.addWidget(label(tr("Keys"), "title"), 1)
+        head.addWidget(button(tr("Close  F1"), tr("close the keys"), self.hide))
         inside.addLayout(head)
         rows = QWidget()
         rows.setObjectName("inside")
@@ -131,8 +154,8 @@ class KeysPage(QWidget):
         grid.setHorizontalSpacing(3 * GRID)
         grid.setVerticalSpacing(4)
         for row, known in enumerate(keys):
-            grid.addWidget(label(known.key, "value"), row, 0, Qt.AlignmentFlag.AlignTop)
-            grid.addWidget(label(known.words, "value", wrap=True), row, 1)
+            grid.addWidget(label(tr(known.key), "value"), row, 0, Qt.AlignmentFlag.AlignTop)
+            grid.addWidget(label(tr(known.words), "value", wrap=True), row, 1)
         grid.setColumnStretch(1, 1)
         scroll = QScrollArea()
         scroll.setWidget(rows)

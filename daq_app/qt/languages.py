@@ -1,26 +1,20 @@
-"""The subject's languages: Qt's translation files for the program's own texts, reading direction, missing glyphs."""
+"""The languages of subject and experimenter: the program's own texts, reading direction, missing glyphs."""
 
 from collections.abc import Iterable
-from functools import lru_cache
-from pathlib import Path
 from unicodedata import category, normalize
 
-from PySide6.QtCore import QLocale, Qt, QTranslator
+from PySide6.QtCore import QLocale, Qt
 from PySide6.QtGui import QFont, QFontMetrics
 
 from daq_app.window.subject_texts import Translate
+from daq_app.wording import SUBJECT, translations
 from sessions.plan.protocols.languages import ENGLISH
 
-FOLDER = Path(__file__).parent / "translations"  # subject_XX.ts, what translators edit, and subject_XX.qm made of them
-CONTEXT = "subject"
 
-
-@lru_cache
 def translator(language: str) -> Translate:
-    """Return what makes a language of the English texts; a text without a translation stays English."""
-    found = QTranslator()
-    found.load(str(FOLDER / f"subject_{language}.qm"))  # an unknown language leaves it empty
-    return lambda text: found.translate(CONTEXT, text) or str(text)
+    """Return what makes a subject's language of the English texts; a text without a translation stays English."""
+    texts = translations(SUBJECT, language)
+    return lambda text: texts.get(text, str(text))
 
 
 def direction(language: str) -> Qt.LayoutDirection:

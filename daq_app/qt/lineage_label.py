@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QLabel, QSizePolicy
 
 from daq_app.analyst.lineage import Link
 from daq_app.qt.tokens import Tokens
+from daq_app.wording import tr
 
 
 class LineageLabel(QLabel):
@@ -29,7 +30,7 @@ class LineageLabel(QLabel):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.linkActivated.connect(self.followed.emit)
         self.linkHovered.connect(self._tell)
-        self.setAccessibleName("from the number back to its readings")
+        self.setAccessibleName(tr("from the number back to its readings"))
 
     def show_links(self, links: tuple[Link, ...]) -> None:
         """Show a way."""
@@ -43,7 +44,7 @@ class LineageLabel(QLabel):
             )
         )
         whole = " → ".join(link.words for link in links)
-        self.setAccessibleName(f"from the number back to its readings: {whole}")
+        self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=whole))
 
     def _tell(self, place: str) -> None:
         self.setToolTip(next((link.more for link in self._links if link.place == place), ""))

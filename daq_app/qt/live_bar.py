@@ -11,11 +11,17 @@ from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWid
 from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import GRID, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.live_trace import CHANNELS
+from daq_app.wording import tr, tr_noop
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
-NAMES = {"N": "Normal force", "T": "Tangential force", "mu": "Friction coefficient", "speed": "Speed"}  # as spoken
+NAMES = {
+    "N": tr_noop("Normal force"),
+    "T": tr_noop("Tangential force"),
+    "mu": tr_noop("Friction coefficient"),
+    "speed": tr_noop("Speed"),
+}  # as spoken
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 
 
@@ -32,10 +38,14 @@ class LiveBar(QWidget):
         self._scale = scale
         self.values: dict[str, QLabel] = {}
         self._pairs: list[tuple[QLabel, QLabel]] = []
-        self.hold = button("Hold  H", "hold the picture; readings go on", hold)
-        self.finite = button("Finite  M", "live model at finite strain", lambda: finite(self.finite.isChecked()))
-        self.finite.setToolTip("Live model at small strain, or at finite strain where the forces are within its reach")
-        self.length = choice("stretch of time that is shown")
+        self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold)
+        self.finite = button(
+            tr("Finite  M"), tr("live model at finite strain"), lambda: finite(self.finite.isChecked())
+        )
+        self.finite.setToolTip(
+            tr("Live model at small strain, or at finite strain where the forces are within its reach")
+        )
+        self.length = choice(tr("stretch of time that is shown"))
         for seconds in LENGTHS:
             self.length.addItem(f"{seconds} s", seconds)
         self.length.activated.connect(self._chosen)
@@ -65,7 +75,7 @@ class LiveBar(QWidget):
 
     def show_held(self, held: bool) -> None:
         """Say whether the picture is held."""
-        self.hold.setText("Held  H" if held else "Hold  H")
+        self.hold.setText(tr("Held  H") if held else tr("Hold  H"))
 
     def show_numbers(self, values: NDArray[np.float64]) -> None:
         """Show the means of the last readings (channels, n)."""
@@ -136,9 +146,9 @@ def spoken(channel: str, text: str) -> str:
     >>> spoken("N", "1.20 N"), spoken("mu", "–")
     ('Normal force 1.20 N', 'Friction coefficient no number')
     """
-    return f"{NAMES[channel]} {'no number' if text == '–' else text}"
+    return f"{tr(NAMES[channel])} {tr('no number') if text == '–' else text}"
 
 
 def short_name(channel: str) -> str:
     """Return how a channel is written where there is little room."""
-    return {"mu": "µ"}.get(channel, channel)
+    return {"mu": "µ", "speed": tr("speed")}.get(channel, channel)

@@ -22,6 +22,7 @@ from daq_app.window.live_trace import CHANNELS
 from daq_app.window.plot_scale import PlotScale
 from daq_app.window.view_model import CHANNELS as MODEL_CHANNELS
 from daq_app.window.view_model import ModelTrace, model_words
+from daq_app.wording import tr, tr_noop
 
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
@@ -31,9 +32,9 @@ TAB = 24  # width of what opens and closes the drawer, before the font's scale [
 READ_EVERY = 0.25  # numbers beside the plots change no more often than they can be read [s]
 
 PLOTS = (
-    ("N and T [N]", (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
+    (tr_noop("N and T [N]"), (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
     ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
-    ("speed [mm/s]", (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
+    (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
 )
 AXES = (
     ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "fz")), PlotScale(-5.0, 5.0, 10.0)),
@@ -44,7 +45,7 @@ AXES = (
     ),
 )
 SED = (
-    "SED [kPa], model",
+    tr_noop("SED [kPa], model"),
     (Curve("SED", MODEL), Curve("SED instead", MODEL, dashed=True, named=False)),
     PlotScale(0.0, 5.0, 5.0),
 )
@@ -58,7 +59,7 @@ class LivePanel(QFrame):
         """Show what `feed` holds and what `model` says; nothing yet."""
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("live readings")
+        self.setAccessibleName(tr("live readings"))
         self._feed = feed
         self._model = model
         self._model_trace = ModelTrace()
@@ -78,7 +79,7 @@ class LivePanel(QFrame):
         layout.setSpacing(4)
         layout.addWidget(self.bar)
         self.drawer = Drawer(*self._placed())
-        self.tab = button("", "drawer", self.toggle_drawer, "handle")
+        self.tab = button("", tr("drawer"), self.toggle_drawer, "handle")
         self.tab.setFixedWidth(round(TAB * scale))
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self._pictures = QWidget()
@@ -122,7 +123,9 @@ class LivePanel(QFrame):
     def _show_tab(self) -> None:
         opened = self.drawer.is_open
         self.tab.setText("▸\nD" if opened else "◂\nD")
-        self.tab.setAccessibleName(f"{'close' if opened else 'open'} the drawer: six axes, sample and finger")
+        self.tab.setAccessibleName(
+            tr("{word} the drawer: six axes, sample and finger", word=tr("close") if opened else tr("open"))
+        )
         self.tab.setToolTip(self.tab.accessibleName())
 
     def show_forces(self, shown: bool) -> None:
@@ -177,7 +180,9 @@ class LivePanel(QFrame):
             self._show_until(self.plots[3:], now, seen, clock)
             frozen = newest is not None and end < newest
             for plot in (*self.plots[:3], self._model_plot):
-                plot.show_end("lift + 1 s" if frozen and self._held is None else "held" if frozen else "now")
+                plot.show_end(
+                    tr("lift + 1 s") if frozen and self._held is None else tr("held") if frozen else tr("now")
+                )
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)

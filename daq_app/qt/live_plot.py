@@ -18,6 +18,7 @@ from daq_app.qt.tokens import SMALL, Tokens, font
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.plot_scale import MARGIN, PlotScale, ticks, times
+from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]
 
@@ -41,20 +42,20 @@ class LivePlot(PaintedWidget):
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
         super().__init__(tokens)
-        self._name = name
+        self._name = tr(name)
         self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
         self._curves = tuple(curves)
         self._scale = scale
         self._type_scale = type_scale
         self._seconds = 10.0
         self._times_shown = True
-        self._end = "now"  # what the right edge is
+        self._end = tr("now")  # what the right edge is
         self._now = 0.0
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
-        self._words = {kind: QStaticText(kind) for kind in ("onset", "lift")}
+        self._words = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
         self.setMinimumSize(40, 32)
-        self.setAccessibleName(f"plot of {name}")
+        self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_seconds(self, seconds: float) -> None:
         """Show the last so many seconds."""

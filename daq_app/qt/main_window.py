@@ -40,6 +40,7 @@ from daq_app.window.messages import Message, NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
+from daq_app.wording import tr
 
 COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
 # Before the scale of the fonts [px]:
@@ -60,7 +61,7 @@ class MainWindow(QMainWindow):
         """Place the panels, and follow `bridge`; with a `tablet` the subject answers there."""
         super().__init__()
         self.setWindowTitle("daq-app")
-        self.setAccessibleName("experimenter's window")
+        self.setAccessibleName(tr("experimenter's window"))
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
         self._scale = scale
@@ -204,7 +205,8 @@ class MainWindow(QMainWindow):
             "go to prepare": lambda: self.go_to("prepare"),
             "go to run": lambda: self.go_to("run"),
             "go to review": lambda: self.go_to("review"),
-            "type size": lambda: self.notice.warn("The size of type that was chosen holds from the next start on."),
+            "type size": lambda: self.notice.warn(tr("The size of type that was chosen holds from the next start on.")),
+            "language": lambda: self.notice.warn(tr("The language that was chosen holds from the next start on.")),
             "quit": self.close,
         }
 
@@ -239,7 +241,7 @@ class MainWindow(QMainWindow):
         if running and now - self._close_asked > LEAVING:
             self._close_asked = now
             self.notice.warn(
-                "A session is being recorded: end it with Ctrl+E, or close once more to leave it; it can be resumed."
+                tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
             )
             event.ignore()
             return
@@ -274,7 +276,7 @@ class MainWindow(QMainWindow):
             bench = bench_of(self.bridge.state.bench)
             self._begin(pilot_form(self.page.form(), bench), bench)
         else:
-            self.notice.warn("A protocol is piloted in Prepare, while no session is in hand.")
+            self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
 
     def _preview(self) -> None:
         refused = open_preview(self.page.form(), self.subject.size(), self._tokens, self._scale, self)
@@ -298,7 +300,7 @@ class MainWindow(QMainWindow):
         self.page.show_bench(bench)
         cards = self.page.check(bench)
         ready = all(card.ready for card in cards)
-        self.to_do.show_what(headline(cards, self.page.subject.text()), Button("Start", "Enter", ready), 0)
+        self.to_do.show_what(headline(cards, self.page.subject.text()), Button(tr("Start"), "Enter", ready), 0)
 
     def _turn(self, page: int) -> None:
         """Show the page of a new session (0) or the course (1); keys go where they are of use there."""
@@ -330,7 +332,7 @@ class MainWindow(QMainWindow):
         self._line_changed()
         assert self.tablet is not None
         if self.bridge.recording and not self.tablet.server.connected:
-            self.notice.warn("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+            self.notice.warn(tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here."))
 
     def _bring_subject(self) -> None:
         """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""

@@ -11,16 +11,25 @@ from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QToolButton
 
 from daq_app.qt import remembered
 from daq_app.qt.keys import KEYS
+from daq_app.qt.languages import name_of
+from daq_app.qt.rail import ROOM_NAMES, ROOMS
+from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
-SESSION = (("redo", "Redo…"), ("skip", "Skip…"), ("pause", "Pause or go on"), ("note", "Note…"), ("end", "End…"))
+SESSION = (
+    ("redo", tr_noop("Redo…")),
+    ("skip", tr_noop("Skip…")),
+    ("pause", tr_noop("Pause or go on")),
+    ("note", tr_noop("Note…")),
+    ("end", tr_noop("End…")),
+)
 PANELS = (
-    ("bench", "Bench"),
-    ("drawer", "Drawer: axes, sample, finger"),
-    ("mirror", "The subject's page"),
-    ("inspect", "Inspect the last trial"),
-    ("hold", "Hold the picture"),
-    ("model", "Live model at finite strain"),
+    ("bench", tr_noop("Bench")),
+    ("drawer", tr_noop("Drawer: axes, sample, finger")),
+    ("mirror", tr_noop("The subject's page")),
+    ("inspect", tr_noop("Inspect the last trial")),
+    ("hold", tr_noop("Hold the picture")),
+    ("model", tr_noop("Live model at finite strain")),
 )
 LIBRARIES = ("PySide6", "numpy", "scipy", "numba")
 
@@ -34,40 +43,49 @@ class Menus:
         self._act = act
         bar = window.menuBar()
         if (more := bar.findChild(QToolButton)) is not None:
-            more.setAccessibleName("the rest of the menu")
-        file = bar.addMenu("&File")
-        self._add(file, "open", "Open session…")
-        self.recent = file.addMenu("Open recent")
+            more.setAccessibleName(tr("the rest of the menu"))
+        file = bar.addMenu(tr("&File"))
+        self._add(file, "open", tr("Open session…"))
+        self.recent = file.addMenu(tr("Open recent"))
         self.recent.aboutToShow.connect(self._list_recent)
         file.addSeparator()
-        self.report = self._add(file, "report", "Write report…")
-        self.export = self._add(file, "export", "Export…")
+        self.report = self._add(file, "report", tr("Write report…"))
+        self.export = self._add(file, "export", tr("Export…"))
         file.addSeparator()
-        self._add(file, "quit", "Quit")
-        self.session = bar.addMenu("&Session")
-        self._add(self.session, "new", "New session")
-        self.pilot = self._add(self.session, "pilot", "Pilot the protocol")
-        self._add(self.session, "preview", "Preview the subject's pages")
-        self._add(self.session, "tare", "Zero the bench")
+        self._add(file, "quit", tr("Quit"))
+        self.session = bar.addMenu(tr("&Session"))
+        self._add(self.session, "new", tr("New session"))
+        self.pilot = self._add(self.session, "pilot", tr("Pilot the protocol"))
+        self._add(self.session, "preview", tr("Preview the subject's pages"))
+        self._add(self.session, "tare", tr("Zero the bench"))
         self.session.addSeparator()
-        self.course = [self._add(self.session, name, words) for name, words in SESSION]
-        view = bar.addMenu("&View")
-        for room in ("prepare", "run", "review"):
-            self._add(view, f"go to {room}", room.capitalize())
+        self.course = [self._add(self.session, name, tr(words)) for name, words in SESSION]
+        view = bar.addMenu(tr("&View"))
+        for room in ROOMS:
+            self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
         view.addSeparator()
-        self.themes = self._choices(view.addMenu("Theme"), remembered.THEMES, remembered.theme(), theme)
+        self.themes = self._choices(view.addMenu(tr("Theme")), remembered.THEMES, remembered.theme(), theme)
         sizes = {f"{100 * scale:.0f} %": scale for scale in remembered.SCALES}
         now = next((words for words, scale in sizes.items() if scale == remembered.type_scale()), "")
-        self.sizes = self._choices(view.addMenu("Font size"), tuple(sizes), now, lambda words: self._size(sizes[words]))
-        panels = view.addMenu("Panels")
+        self.sizes = self._choices(
+            view.addMenu(tr("Font size")), tuple(sizes), now, lambda words: self._size(sizes[words])
+        )
+        spoken = {name_of(code): code for code in languages(EXPERIMENTER)}
+        self.languages = self._choices(
+            view.addMenu(tr("Language")),
+            tuple(spoken),
+            name_of(remembered.language()),
+            lambda words: self._speak(spoken[words]),
+        )
+        panels = view.addMenu(tr("Panels"))
         for name, words in PANELS:
-            self._add(panels, name, words)
-        self._add(view, "subject", "Subject's window")
-        help_menu = bar.addMenu("&Help")
-        self._add(help_menu, "keys", "Keys")
-        docs = help_menu.addAction("Documentation", lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(DOCS))))
+            self._add(panels, name, tr(words))
+        self._add(view, "subject", tr("Subject's window"))
+        help_menu = bar.addMenu(tr("&Help"))
+        self._add(help_menu, "keys", tr("Keys"))
+        docs = help_menu.addAction(tr("Documentation"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(DOCS))))
         docs.setEnabled(DOCS.exists())
-        help_menu.addAction("About daq-app", self._about)
+        help_menu.addAction(tr("About daq-app"), self._about)
 
     def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
         """Offer what can be done now."""
@@ -85,7 +103,7 @@ class Menus:
     def _choices(self, menu: QMenu, names: tuple[str, ...], now: str, take: Callable[[str], None]) -> QActionGroup:
         group = QActionGroup(menu)
         for name in names:
-            made = menu.addAction(name.capitalize(), lambda name=name: take(name))
+            made = menu.addAction(tr(name).capitalize(), lambda name=name: take(name))
             made.setCheckable(True)
             made.setChecked(name == now)
             group.addAction(made)
@@ -95,16 +113,20 @@ class Menus:
         remembered.choose_type_scale(scale)
         self._act("type size")
 
+    def _speak(self, code: str) -> None:
+        remembered.choose_language(code)
+        self._act("language")
+
     def _list_recent(self) -> None:
         self.recent.clear()
         listed = remembered.recent_sessions()
         for place in listed:
             self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
         if not listed:
-            self.recent.addAction("No session was recorded or opened yet").setEnabled(False)
+            self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
 
     def _about(self) -> None:
-        QMessageBox.about(self._window, "About daq-app", about_words())
+        QMessageBox.about(self._window, tr("About daq-app"), about_words())
 
 
 def about_words() -> str:

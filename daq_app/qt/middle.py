@@ -12,9 +12,10 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
+from daq_app.wording import tr, tr_noop
 
 GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
-HIDDEN = "Forces are not shown in this protocol."
+HIDDEN = tr_noop("Forces are not shown in this protocol.")
 
 
 class Middle(QWidget):
@@ -29,9 +30,9 @@ class Middle(QWidget):
         self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
         self.trial = InspectedTrial(tokens, scale, self.leave)
         self.stroke = label("", wrap=True)
-        self.redo = button("Redo  R", "redo the last stroke", lambda: act("redo"))
+        self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self._pages = QStackedWidget()
-        frame, inside = panel("inspected trial")
+        frame, inside = panel(tr("inspected trial"))
         inside.addWidget(scrolled(self.trial))
         for page in (self.live, frame):
             self._pages.addWidget(page)
@@ -55,15 +56,15 @@ class Middle(QWidget):
         self.strip.setVisible(course is not None)
         self.live.show_forces(course is None or course.forces_shown)
         if course is None:
-            self._show_stroke("No stroke yet.", "", "")
+            self._show_stroke(tr("No stroke yet."), "", "")
             self.redo.setEnabled(False)
             self.leave()
             return
         self.live.map.show_direction(course.direction)
-        words = course.stroke.words if course.forces_shown else HIDDEN
+        words = course.stroke.words if course.forces_shown else tr(HIDDEN)
         self._show_stroke(words, course.stroke.details, GRADES.get(course.stroke.grade, ""))
         self.redo.setEnabled(course.redo.enabled)
-        self.redo.setText(f"{course.redo.label}  {course.redo.key}")
+        self.redo.setText(f"{course.redo.label}  {tr(course.redo.key)}")
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
         if session is not None and session.phase == "stroking":
@@ -110,6 +111,6 @@ class Middle(QWidget):
         self.strip.show_inspected(None if shown is None else shown.number)
 
     def _show_stroke(self, words: str, details: str, grade: str) -> None:
-        say(self.stroke, words, "The last stroke:")
+        say(self.stroke, words, tr("The last stroke:"))
         self.stroke.setToolTip(details)
         regrade(self.stroke, grade)

@@ -8,6 +8,7 @@ from daq_app.qt.parts import button
 from daq_app.qt.subject_picture import SubjectPicture
 from daq_app.qt.tokens import Tokens
 from daq_app.window.view_subject import SubjectView
+from daq_app.wording import tr
 
 HEIGHT = 150  # of the picture, before the font's scale [px]
 MIRROR = "panels/mirror"  # under which it is remembered whether it is open
@@ -27,7 +28,7 @@ class Mirror(QWidget):
         self._size = QSize(1000, 640)
         self._open = Openness(MIRROR)
         self.picture: SubjectPicture | None = None  # made when it is first seen
-        self.tab = button("", "the subject's page", self.toggle, "handle")
+        self.tab = button("", tr("the subject's page"), self.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -62,8 +63,8 @@ class Mirror(QWidget):
             self.picture.set_tokens(tokens)
 
     def _place(self) -> None:
-        self.tab.setText(f"The subject sees  V  {'▾' if self.is_open else '▸'}")
-        self.tab.setAccessibleName(f"{'fold' if self.is_open else 'show'} the subject's page")
+        self.tab.setText(tr("The subject sees  V  {word}", word="▾" if self.is_open else "▸"))
+        self.tab.setAccessibleName(tr("{word} the subject's page", word=tr("fold") if self.is_open else tr("show")))
         if self.picture is not None:
             self.picture.setVisible(self.is_open)
         self._draw()

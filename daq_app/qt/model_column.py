@@ -23,6 +23,7 @@ from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
+from daq_app.wording import tr
 from solver.quantities import SED
 
 FINGER, SESSION, COMPARISON = range(3)  # tabs
@@ -52,34 +53,34 @@ class ModelColumn(QWidget):
         self.plot.draw.toggled.connect(self._draw_line)
         self.finger.probed.connect(self.probe.show_whole)
         self.finger.cut.connect(self._cut)
-        self.near = button("Contact", "show the contact alone, with its tractions", self._paint, "small")
-        self.mesh = button("Mesh", "show the mesh", self._paint, "small")
+        self.near = button(tr("Contact"), tr("show the contact alone, with its tractions"), self._paint, "small")
+        self.mesh = button(tr("Mesh"), tr("show the mesh"), self._paint, "small")
         for made in (self.near, self.mesh):
             made.setCheckable(True)
             made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
-        self.history = button("History", "show the finger from first touch on", self._ask_history, "small")
-        self.film = button("Film", "save the history as a film, GIF or MP4", self._ask_film, "small")
+        self.history = button(tr("History"), tr("show the finger from first touch on"), self._ask_history, "small")
+        self.film = button(tr("Film"), tr("save the history as a film, GIF or MP4"), self._ask_film, "small")
         self._filming = False
-        self.save = SaveButtons("the finger", self._save_finger)
-        self.player = TransportBar("the history", tells_time=False)
+        self.save = SaveButtons(tr("the finger"), self._save_finger)
+        self.player = TransportBar(tr("the history"), tells_time=False)
         self.player.moved.connect(self._moved)
         self.why = Wrapped("value", "look")
-        self.which, self.picture = choice("picture of the session"), PictureView("the picture", self._save)
+        self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
         self.which.activated.connect(lambda: self._show_session())
         self.compared = ComparedView(self.other_wanted.emit, self._save)
-        self.scene = TextTable("scene and model", ("of the model", "value", "remark"))
+        self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         self.tabs = QTabWidget()
-        self.tabs.setAccessibleName("pictures")
+        self.tabs.setAccessibleName(tr("pictures"))
         session = QWidget()
         inside = QVBoxLayout(session)
         inside.setContentsMargins(0, 0, 0, 0)
         inside.addWidget(self.which)
         inside.addWidget(self.picture, 1)
         for name, page in (
-            ("Finger", self._finger_page()),
-            ("Session", session),
-            ("Comparison", self.compared),
-            ("Scene", self.scene),
+            (tr("Finger"), self._finger_page()),
+            (tr("Session"), session),
+            (tr("Comparison"), self.compared),
+            (tr("Scene"), self.scene),
         ):
             self.tabs.addTab(page, name)
         self.tabs.currentChanged.connect(lambda: self._show_session())
@@ -137,10 +138,12 @@ class ModelColumn(QWidget):
         name, words = names[self.which.currentIndex()]
         drawn = state.drawn.get(name)
         if drawn is None:
-            self.picture.show_picture("", f"Drawing: {words}", b"")
+            self.picture.show_picture("", tr("Drawing: {words}", words=words), b"")
             self._draw(name, state.version)
         else:
-            self.picture.show_picture(name, drawn.title or f"There are no numbers yet for: {words}", drawn.png)
+            self.picture.show_picture(
+                name, drawn.title or tr("There are no numbers yet for: {words}", words=words), drawn.png
+            )
 
     def _draw(self, name: str, version: int) -> None:
         if self._drawing != (name, version):
@@ -224,13 +227,19 @@ class ModelColumn(QWidget):
         try:
             write_picture(self.finger, self._head(), Path(path))
         except OSError as error:
-            self.said.emit(f"{path} could not be written ({error.strerror}): choose another folder.")
+            self.said.emit(
+                tr(
+                    "{path} could not be written ({strerror}): choose another folder.",
+                    path=path,
+                    strerror=error.strerror,
+                )
+            )
         else:
-            self.said.emit(f"Saved: {path}")
+            self.said.emit(tr("Saved: {path}", path=path))
 
     def _ask_film(self) -> None:
         proposed = f"{self.fields.field.name.replace(' ', '-')}{self._name.replace(' ', '-')}.gif"
-        path, _ = QFileDialog.getSaveFileName(self, "Save the film", proposed, "GIF (*.gif);;MP4 (*.mp4)")
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save the film"), proposed, "GIF (*.gif);;MP4 (*.mp4)")
         if path:
             self.write_film(Path(path if path.lower().endswith(FILM_SUFFIXES) else f"{path}.gif"))
 

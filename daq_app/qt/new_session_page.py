@@ -39,12 +39,17 @@ from daq_app.window.new_session import (
     subject_texts,
 )
 from daq_app.window.subject_texts import SubjectText
+from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
 from sessions.plan.protocols.languages import ENGLISH
 
 TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
-HANDS: tuple[tuple[str, Hand | None], ...] = (("not stated", None), ("right", "right"), ("left", "left"))
+HANDS: tuple[tuple[str, Hand | None], ...] = (
+    (tr_noop("not stated"), None),
+    (tr_noop("right"), "right"),
+    (tr_noop("left"), "left"),
+)
 
 
 class NewSessionPage(QFrame):
@@ -59,36 +64,36 @@ class NewSessionPage(QFrame):
         """
         super().__init__()
         self.setProperty("role", "panel")
-        self.setAccessibleName("new session")
+        self.setAccessibleName(tr("new session"))
         self._send = send
         self._act = act
         self._cards: tuple[Card, ...] = ()
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
-        self.subject = entry("subject code, never a name")
-        self.protocol = choice("protocol")
-        self.protocol.addItems([*protocol_names(), "choose a file …"])
+        self.subject = entry(tr("subject code, never a name"))
+        self.protocol = choice(tr("protocol"))
+        self.protocol.addItems([*protocol_names(), tr("choose a file …")])
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
-        self.study = entry("study, a folder of its own; may be empty")
-        self.folder = entry("folder in which sessions are kept")
+        self.study = entry(tr("study, a folder of its own; may be empty"))
+        self.folder = entry(tr("folder in which sessions are kept"))
         self.folder.setText("recordings")
-        self.seed = entry("seed of the stimulus order; empty for a new one")
-        self.seed.setPlaceholderText("a new one")
-        self.height_above = entry("height of the face above the transducer's origin in millimetres; may be empty")
-        self.height_above.setPlaceholderText("as stated")
-        self.language = choice("language that the subject reads")
-        self.normal = choice("axis of the transducer along which pressing is positive")
-        self.normal.addItems(["as stated", *AXES])
-        self.area = entry("contact area of finger and surface in square millimetres; may be empty")
-        self.area.setPlaceholderText("as stated")
-        self.stroking, self.answering = _hands("stroking hand"), _hands("answering hand")
-        self.pre_evaluation = tick("Pre-evaluation first", "every stimulus judged once before all else")
-        self.practice = tick("Practice first", "practice before the trials that count")
-        self.with_forces = QRadioButton("Forces, with the transducer")
-        self.scores_only = QRadioButton("Scores only")
-        self.people_score = QRadioButton("People")
-        self.simulated = QRadioButton("Rehearse, simulated")
+        self.seed = entry(tr("seed of the stimulus order; empty for a new one"))
+        self.seed.setPlaceholderText(tr("a new one"))
+        self.height_above = entry(tr("height of the face above the transducer's origin in millimetres; may be empty"))
+        self.height_above.setPlaceholderText(tr("as stated"))
+        self.language = choice(tr("language that the subject reads"))
+        self.normal = choice(tr("axis of the transducer along which pressing is positive"))
+        self.normal.addItems([tr("as stated"), *AXES])
+        self.area = entry(tr("contact area of finger and surface in square millimetres; may be empty"))
+        self.area.setPlaceholderText(tr("as stated"))
+        self.stroking, self.answering = _hands(tr("stroking hand")), _hands(tr("answering hand"))
+        self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
+        self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
+        self.with_forces = QRadioButton(tr("Forces, with the transducer"))
+        self.scores_only = QRadioButton(tr("Scores only"))
+        self.people_score = QRadioButton(tr("People"))
+        self.simulated = QRadioButton(tr("Rehearse, simulated"))
         for pair, chosen in (((self.with_forces, self.scores_only), 0), ((self.people_score, self.simulated), 0)):
             group = QButtonGroup(self)
             for made in pair:
@@ -100,18 +105,22 @@ class NewSessionPage(QFrame):
         self._line_words = ""  # how far the length of the subject's line is known
         self._tablet_missing = ""  # why the subject's page is on no tablet, where it should be
         self._screen = ""  # with that, which characters of the texts no font here has
-        self._pilot = button("Pilot  F5", "pilot this protocol with simulated hand and answers", lambda: act("pilot"))
-        self._pilot.setToolTip("Runs by itself, needs no subject, and is kept apart in the folder “pilots”")
-        self._preview = button("Preview  F7", "preview every page that the subject will see", lambda: act("preview"))
+        self._pilot = button(
+            tr("Pilot  F5"), tr("pilot this protocol with simulated hand and answers"), lambda: act("pilot")
+        )
+        self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
+        self._preview = button(
+            tr("Preview  F7"), tr("preview every page that the subject will see"), lambda: act("preview")
+        )
         self._ruler = button(
-            "Check with a ruler  Ctrl+M", "check the subject's line with a ruler", lambda: act("ruler")
+            tr("Check with a ruler  Ctrl+M"), tr("check the subject's line with a ruler"), lambda: act("ruler")
         )
         self.camera = QLabel()
-        self.camera.setAccessibleName("address and code for the tablet's camera")
+        self.camera.setAccessibleName(tr("address and code for the tablet's camera"))
         self.camera.hide()
-        self._new_code = button("New code", "let another tablet in, by a new code", lambda: act("tablet"))
+        self._new_code = button(tr("New code"), tr("let another tablet in, by a new code"), lambda: act("tablet"))
         self._new_code.hide()
-        self._enrol = button("Enrol", "enrol the subject in the study", self._enrolled)
+        self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrolled)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
         self._build(scale)
@@ -156,16 +165,16 @@ class NewSessionPage(QFrame):
         # A simulated bench knows where its face lies.
         self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
         self._area.setVisible(self.with_forces.isChecked())
-        words = "The subject strokes the transducer and scores."
+        words = tr("The subject strokes the transducer and scores.")
         if self.simulated.isChecked():
-            words = (
+            words = tr(
                 "Nobody is needed: strokes and scores are simulated, and marked so. "
                 "A sample of your own has the friction that its protocol plants; without, the nearest of ten stands in."
             )
         elif bench.simulated and self.with_forces.isChecked():
-            words = "A simulated hand strokes when asked; you mount, and you or a subject score."
+            words = tr("A simulated hand strokes when asked; you mount, and you or a subject score.")
         elif self.scores_only.isChecked():
-            words = "The subject strokes and scores; no forces are recorded."
+            words = tr("The subject strokes and scores; no forces are recorded.")
         say(self._people_words, words)
         may = bench.simulated or self.scores_only.isChecked() or not bench.connected
         self.simulated.setEnabled(may)
@@ -174,7 +183,7 @@ class NewSessionPage(QFrame):
 
     def show_line(self, known: Millimetres) -> None:
         """Say how far the length of the subject's line can be trusted."""
-        self._line_words = f"Line of {LENGTH:.0f} mm, {known.words}."
+        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=known.words)
         self._show_screen()
 
     def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
@@ -200,7 +209,9 @@ class NewSessionPage(QFrame):
         words = translator(self.form().language or ENGLISH)
         lost = missing_glyphs([*texts, *map(words, SubjectText)], self.font())
         self._screen = (
-            f"{self._line_words} No font here draws {lost}: install one that does." if lost else self._line_words
+            tr("{words} No font here draws {lost}: install one that does.", words=self._line_words, lost=lost)
+            if lost
+            else self._line_words
         )
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
@@ -244,7 +255,7 @@ class NewSessionPage(QFrame):
         self._show_languages()
         for made in (self.protocol, self.seed):
             made.setEnabled(found is None)
-            made.setToolTip("" if found is None else f"the study's own: {found.protocol}")
+            made.setToolTip("" if found is None else tr("the study's own: {protocol}", protocol=found.protocol))
 
     def _show_languages(self) -> None:
         """Offer the languages of the protocol, keeping the one that was chosen where it is among them."""
@@ -273,7 +284,7 @@ class NewSessionPage(QFrame):
         if at != self.protocol.count() - 1:
             self.changed.emit()
             return
-        name, _ = QFileDialog.getOpenFileName(self, "Protocol", "", "Protocol (*.toml)")
+        name, _ = QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")
         self.add_protocol(name)
 
     def add_protocol(self, path: str) -> None:
@@ -286,7 +297,7 @@ class NewSessionPage(QFrame):
         self.changed.emit()
 
     def _choose_folder(self) -> None:
-        name = QFileDialog.getExistingDirectory(self, "Folder of sessions", self.folder.text() or str(Path.cwd()))
+        name = QFileDialog.getExistingDirectory(self, tr("Folder of sessions"), self.folder.text() or str(Path.cwd()))
         if name:
             self.folder.setText(name)
 
@@ -294,14 +305,14 @@ class NewSessionPage(QFrame):
         """Offer the studies of the folder, and the code after those that were there."""
         folder = Path(self.folder.text().strip() or ".").expanduser()
         self.study.setCompleter(QCompleter(list(studies_in(folder)), self.study))
-        self.subject.setPlaceholderText(f"e.g. {next_code(codes_in(place_of(self.form())))}")
+        self.subject.setPlaceholderText(tr("e.g. {code}", code=next_code(codes_in(place_of(self.form())))))
 
     def _build(self, scale: float) -> None:
         inside = QWidget()
         layout = QVBoxLayout(inside)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.setSpacing(GRID)
-        layout.addWidget(label("New session", "title"))
+        layout.addWidget(label(tr("New session"), "title"))
         layout.addWidget(self.cut_short)
         self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         left, right = QVBoxLayout(), QVBoxLayout()
@@ -335,12 +346,12 @@ class NewSessionPage(QFrame):
 
     def _build_study(self, layout: QVBoxLayout) -> None:
         """Lay out in which study and by which protocol, and whether it is rehearsed."""
-        field(layout, "Study, may be empty", self.study)
-        field(layout, "Protocol", self.protocol)
+        field(layout, tr("Study, may be empty"), self.study)
+        field(layout, tr("Protocol"), self.protocol)
         layout.addWidget(self.pre_evaluation)
         layout.addWidget(self.practice)
-        field(layout, "Seed of the order", self.seed)
-        layout.addWidget(label("Who strokes and scores", "quiet", wrap=True))
+        field(layout, tr("Seed of the order"), self.seed)
+        layout.addWidget(label(tr("Who strokes and scores"), "quiet", wrap=True))
         row = QHBoxLayout()
         row.addWidget(self.people_score)
         row.addWidget(self.simulated)
@@ -352,10 +363,10 @@ class NewSessionPage(QFrame):
 
     def _build_subject(self, layout: QVBoxLayout) -> None:
         """Lay out who takes part."""
-        field(layout, "Subject code", self.subject)
+        field(layout, tr("Subject code"), self.subject)
         layout.addWidget(self._enrol)
-        field(layout, "Stroking hand", self.stroking)
-        field(layout, "Answering hand", self.answering)
+        field(layout, tr("Stroking hand"), self.stroking)
+        field(layout, tr("Answering hand"), self.answering)
 
     def _build_recorded(self, layout: QVBoxLayout) -> None:
         """Lay out what is recorded, and what the analysis must know of the face."""
@@ -363,16 +374,16 @@ class NewSessionPage(QFrame):
         layout.addWidget(self.scores_only)
         of_height = QVBoxLayout(self._height)
         of_height.setContentsMargins(0, 0, 0, 0)
-        field(of_height, "Height of the face above the transducer's origin [mm]", self.height_above)
-        field(of_height, "Axis along which pressing is positive", self.normal)
+        field(of_height, tr("Height of the face above the transducer's origin [mm]"), self.height_above)
+        field(of_height, tr("Axis along which pressing is positive"), self.normal)
         layout.addWidget(self._height)
         of_area = QVBoxLayout(self._area)
         of_area.setContentsMargins(0, 0, 0, 0)
-        field(of_area, "Contact area, for tau_max [mm²]", self.area)
+        field(of_area, tr("Contact area, for tau_max [mm²]"), self.area)
         layout.addWidget(self._area)
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
-        field(layout, "Language that the subject reads", self.language)
+        field(layout, tr("Language that the subject reads"), self.language)
         layout.addWidget(self._ruler)
         layout.addWidget(self.camera)
         layout.addWidget(self._new_code)
@@ -380,12 +391,12 @@ class NewSessionPage(QFrame):
     def _build_disk(self, layout: QVBoxLayout) -> None:
         folder = QHBoxLayout()
         folder.addWidget(self.folder, 1)
-        folder.addWidget(button("…", "choose the folder of sessions", self._choose_folder))
-        layout.addWidget(label("Folder", "quiet"))
+        folder.addWidget(button("…", tr("choose the folder of sessions"), self._choose_folder))
+        layout.addWidget(label(tr("Folder"), "quiet"))
         layout.addLayout(folder)
 
 
 def _hands(name: str) -> QComboBox:
     made = choice(name)
-    made.addItems([words for words, _ in HANDS])
+    made.addItems([tr(words) for words, _ in HANDS])
     return made

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.tokens import GRID, TARGET
+from daq_app.wording import tr
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
@@ -188,7 +189,7 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
     if widget.text() != text:
         widget.setText(text)
     if name:
-        widget.setAccessibleName(f"{name} {text or 'nothing'}")
+        widget.setAccessibleName(f"{name} {text or tr('nothing')}")
 
 
 def field(layout: QVBoxLayout, words: str, widget: QWidget) -> None:

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout
 
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
+from daq_app.wording import tr
 
 KINDS = ("SVG", "PNG", "CSV")
 Save = Callable[[str, str], object]  # name of a picture, and the path to write it to
@@ -25,7 +26,8 @@ class SaveButtons(QWidget):
         layout.setSpacing(GRID // 2)
         layout.addStretch(1)
         self.buttons = [
-            button(kind, f"save {what} as {kind}", lambda kind=kind: self._ask(kind), "small") for kind in KINDS
+            button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
+            for kind in KINDS
         ]
         for made in self.buttons:
             layout.addWidget(made)
@@ -39,7 +41,7 @@ class SaveButtons(QWidget):
 
     def _ask(self, kind: str) -> None:
         proposed = f"{self._name.replace(' ', '-')}.{kind.lower()}"
-        path, _ = QFileDialog.getSaveFileName(self, f"Save as {kind}", proposed)
+        path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=kind), proposed)
         if path:
             ending = f".{kind.lower()}"
             self._save(self._name, path if path.lower().endswith(ending) else path + ending)

@@ -1,19 +1,21 @@
 """The rail at the left of the window: Prepare, Run and Review."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 from PySide6.QtWidgets import QFrame, QVBoxLayout
 
 from daq_app.qt.parts import button
 from daq_app.qt.tokens import GRID
+from daq_app.wording import tr, tr_noop
 
 Room = Literal["prepare", "run", "review"]
 ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
 WHY_NOT = {
-    "prepare": "A session is being recorded: end it before the next is prepared.",
-    "run": "No session is in hand: start one in Prepare.",
+    "prepare": tr_noop("A session is being recorded: end it before the next is prepared."),
+    "run": tr_noop("No session is in hand: start one in Prepare."),
 }
+ROOM_NAMES: Mapping[Room, str] = {"prepare": tr_noop("Prepare"), "run": tr_noop("Run"), "review": tr_noop("Review")}
 KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
 WIDTH = 84  # before the font's scale [px]
 
@@ -24,12 +26,14 @@ class Rail(QFrame):
     def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
         """Show that nothing is open; `go` is called with the room that is wanted."""
         super().__init__()
-        self.setAccessibleName("rooms")
+        self.setAccessibleName(tr("rooms"))
         self.setProperty("role", "strip")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID // 2, GRID, GRID // 2, GRID)
         self.buttons = {
-            room: button(f"{room.capitalize()}\n{KEY[room]}", room, lambda room=room: go(room), "rail")
+            room: button(
+                f"{tr(ROOM_NAMES[room])}\n{KEY[room]}", tr(ROOM_NAMES[room]), lambda room=room: go(room), "rail"
+            )
             for room in ROOMS
         }
         for made in self.buttons.values():
@@ -44,5 +48,5 @@ class Rail(QFrame):
             made.setChecked(name == room)
             closed = (name == "prepare" and in_hand and not over) or (name == "run" and not in_hand)
             made.setEnabled(not closed)
-            made.setToolTip(WHY_NOT[name] if closed else "")
+            made.setToolTip(tr(WHY_NOT[name]) if closed else "")
             made.setAccessibleDescription(made.toolTip())

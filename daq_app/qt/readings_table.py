@@ -10,8 +10,16 @@ from daq_app.analyst.raw import RawReadings
 from daq_app.qt.parts import Wrapped
 from daq_app.qt.text_table import CopiedTable
 from daq_app.qt.tokens import GRID
+from daq_app.wording import tr, tr_noop
 
-HEAD = ("window", "sequence", "counter", "status", "time [s]", "received [ns]")
+HEAD = (
+    tr_noop("window"),
+    tr_noop("sequence"),
+    tr_noop("counter"),
+    tr_noop("status"),
+    tr_noop("time [s]"),
+    tr_noop("received [ns]"),
+)
 Index = QModelIndex | QPersistentModelIndex
 
 
@@ -22,7 +30,7 @@ class ReadingsTable(QWidget):
         """Show nothing yet."""
         super().__init__()
         self.place = Wrapped("quiet")
-        self.table = CopiedTable("raw readings")  # in the order in which they came
+        self.table = CopiedTable(tr("raw readings"))  # in the order in which they came
         self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
@@ -36,11 +44,15 @@ class ReadingsTable(QWidget):
         """Show readings, those of the steady window marked by a word and by bold type."""
         self._model.show_readings(readings, steady)
         if readings is None:
-            self.place.show_text("Not read yet.")
+            self.place.show_text(tr("Not read yet."))
             return
         self.place.show_text(
-            f"{readings.place}. raw 1 to 6 as the device sent them [{readings.unit}]; "
-            f"N and T unfiltered, zero taken off: {readings.zero}."
+            tr(
+                ("{place}. raw 1 to 6 as the device sent them [{unit}]; N and T unfiltered, zero taken off: {zero}."),
+                place=readings.place,
+                unit=readings.unit,
+                zero=readings.zero,
+            )
         )
         self._fit_columns()
 
@@ -89,7 +101,7 @@ class _Model(QAbstractTableModel):
         """Return the name of a column."""
         if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
             return None
-        return (*HEAD, *(f"raw {n}" for n in range(1, 7)), "N [N]", "T [N]")[section]
+        return (*map(tr, HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
         """Return a number as text."""
@@ -106,7 +118,7 @@ class _Model(QAbstractTableModel):
             return None
         match column:
             case 0:
-                return "steady" if inside else ""
+                return tr("steady") if inside else ""
             case 1 | 2 | 3:
                 return str((r.sequence, r.counter, r.status)[column - 1][at])
             case 5:

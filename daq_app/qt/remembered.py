@@ -1,6 +1,7 @@
 """What the window remembers from one start to the next: its place, theme, size of type, and recent sessions."""
 
 import json
+import os
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray
@@ -8,12 +9,14 @@ from PySide6.QtWidgets import QWidget
 
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
+from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr_noop
 
-THEMES = ("system", "light", "dark")
+THEMES = tr_noop(("system", "light", "dark"))
 SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
 RECENT = 12  # sessions that are offered
 DRAWER = "window/drawer open"
 DRAWER_SIZES = "window/drawer sizes"
+_LANGUAGE = "window/language"
 _GEOMETRY, _THEME, _SCALE, _RECENT = "window/geometry", "window/theme", "window/type scale", "window/recent sessions"
 
 
@@ -45,6 +48,17 @@ def type_scale() -> float:
 def choose_type_scale(scale: float | None) -> None:
     """Remember the size of the type; None follows the system again."""
     settings().setValue(_SCALE, "" if scale is None else repr(scale))
+
+
+def language() -> str:
+    """Return the language of the experimenter's windows: as it was chosen, or as the environment says."""
+    said = str(settings().value(_LANGUAGE) or os.environ.get(VARIABLE))
+    return said if said in languages(EXPERIMENTER) else ENGLISH
+
+
+def choose_language(code: str) -> None:
+    """Remember a language; windows that are built from now on speak it."""
+    settings().setValue(_LANGUAGE, code)
 
 
 def recent_sessions() -> tuple[Path, ...]:

@@ -9,6 +9,7 @@ from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.parts import button, label
 from daq_app.qt.remembered import recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, Tokens
+from daq_app.wording import tr
 
 LIST_WIDTH = 200  # before the font's scale [px]
 
@@ -22,17 +23,17 @@ class ReviewRoom(QWidget):
         self._tokens = tokens
         self.analyst: AnalystWindow | None = None
         self.recent = QListWidget()
-        self.recent.setAccessibleName("recent sessions")
+        self.recent.setAccessibleName(tr("recent sessions"))
         self.recent.itemActivated.connect(self._go)
         self.recent.itemClicked.connect(self._go)
-        self._none = label("Choose a session at the left, or open one.", "title", wrap=True)
+        self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
         side = QWidget()
         side.setFixedWidth(round(LIST_WIDTH * scale))
         column = QVBoxLayout(side)
         column.setContentsMargins(0, GRID, 0, GRID)
-        column.addWidget(label("Recent sessions", "section"))
+        column.addWidget(label(tr("Recent sessions"), "section"))
         column.addWidget(self.recent, 1)
-        column.addWidget(button("Open…  Ctrl+O", "open a recorded session", self.choose))
+        column.addWidget(button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose))
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(0, 0, 0, 0)
         self._row.setSpacing(GRID)
@@ -48,7 +49,7 @@ class ReviewRoom(QWidget):
     def choose(self) -> None:
         """Ask for the folder of a session, and open it."""
         listed = recent_sessions()
-        name = QFileDialog.getExistingDirectory(self, "Session folder", str(listed[0].parent) if listed else ".")
+        name = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(listed[0].parent) if listed else ".")
         if name:
             self.open(Path(name))
 

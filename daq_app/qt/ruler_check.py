@@ -8,6 +8,7 @@ from daq_app.qt.painted import Painted
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.screens import LEAST, MOST, checked, millimetres
 from daq_app.qt.tokens import GRID, Tokens
+from daq_app.wording import tr
 
 LENGTH = 100.0  # [mm]
 
@@ -22,17 +23,17 @@ class RulerCheck(QWidget):
         super().__init__()
         self._screen: QScreen | None = None
         self._line = _Line(tokens)
-        self._sentence = label("Hold a ruler to the line. How long is it?", "title", wrap=True)
+        self._sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
         self._measured = QLineEdit()
-        self._measured.setAccessibleName("length of the line in millimetres, as the ruler says")
+        self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
         self._measured.setFixedWidth(round(100 * scale))
         self._measured.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)
         row = QHBoxLayout()
         row.addWidget(self._measured)
         row.addWidget(label("mm"))
-        row.addWidget(button("Keep", "keep the measured length", self._keep))
-        row.addWidget(button("Leave as it is", "leave the line as it is", self.done.emit))
+        row.addWidget(button(tr("Keep"), tr("keep the measured length"), self._keep))
+        row.addWidget(button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit))
         row.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4 * GRID, 4 * GRID, 4 * GRID, 4 * GRID)
@@ -50,7 +51,7 @@ class RulerCheck(QWidget):
         self._measured.setText("100")
         self._measured.selectAll()
         self._measured.setFocus(Qt.FocusReason.OtherFocusReason)
-        say(self._wrong, f"Screen: {screen.name()}, {millimetres(screen).words}.")
+        say(self._wrong, tr("Screen: {name}, {words}.", name=screen.name(), words=millimetres(screen).words))
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
@@ -63,7 +64,15 @@ class RulerCheck(QWidget):
         except ValueError:
             value = float("nan")
         if self._screen is None or checked(self._screen, value) is None:
-            say(self._wrong, f"Give the length in millimetres, from {LEAST:.0f} to {MOST:.0f}: '{text}' is not one.")
+            say(
+                self._wrong,
+                tr(
+                    "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
+                    least=LEAST,
+                    most=MOST,
+                    it=text,
+                ),
+            )
             return
         self.done.emit()
 
@@ -73,7 +82,7 @@ class _Line(Painted):
         super().__init__(tokens)
         self._length = 0.0
         self.setMinimumHeight(60)
-        self.setAccessibleName("line of 100 millimetres to be measured")
+        self.setAccessibleName(tr("line of 100 millimetres to be measured"))
 
     def set_length(self, pixels: float) -> None:
         """Show a line of this length."""

@@ -2,6 +2,7 @@
 
 import argparse
 import gc
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from daq_app.qt.screen_check import missing_library, what_is_missing
+from daq_app.wording import VARIABLE
 
 if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
     from PySide6.QtWidgets import QApplication, QWidget
@@ -150,12 +152,27 @@ def _shown(made: "Callable[[QApplication], QWidget]") -> int:
     from daq_app.tablet.server import NoTabletServer
 
     application = QApplication(sys.argv[:1])
+    _speak(application)
     try:
         window = made(application)
     except NoTabletServer as error:
         return _said(str(error))
     window.show()
     return application.exec()
+
+
+def _speak(application: "QApplication") -> None:
+    """Give this process, those that it starts and Qt's own dialogs the experimenter's language."""
+    from PySide6.QtCore import QLibraryInfo, QTranslator
+
+    from daq_app.qt import remembered
+    from daq_app.qt.languages import direction
+
+    language = os.environ[VARIABLE] = remembered.language()
+    application.setLayoutDirection(direction(language))
+    own = QTranslator(application)
+    if own.load(f"qtbase_{language}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):
+        application.installTranslator(own)
 
 
 def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:

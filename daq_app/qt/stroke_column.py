@@ -15,6 +15,7 @@ from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
+from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
 
 NUMBERS, READINGS = range(2)  # tabs
@@ -35,23 +36,23 @@ class StrokeColumn(QWidget):
         self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
         self.stroke = StrokeView(tokens)
         self.stroke.moved.connect(self._dragged)
-        self.player = TransportBar("the recorded readings")
+        self.player = TransportBar(tr("the recorded readings"))
         self.player.moved.connect(self._moved)
         self.player.ended.connect(self.replayed.emit)
         self.decisions = DecisionsBar()
         self.decisions.asked.connect(self.asked.emit)
-        self.save = SaveButtons("the stroke", self._save)
+        self.save = SaveButtons(tr("the stroke"), self._save)
         self._numbers = QGridLayout()
         self._told: tuple[tuple[str, str], ...] = ()
         self.readings = ReadingsTable()
         self.tabs = QTabWidget()
-        self.tabs.setAccessibleName("numbers and readings")
+        self.tabs.setAccessibleName(tr("numbers and readings"))
         self._scroll = self._scrolled()
-        self.tabs.addTab(self._scroll, "Numbers")
-        self.tabs.addTab(self.readings, "Readings")
-        self.friction = TextTable("friction of every stroke", FRICTION_HEAD)
+        self.tabs.addTab(self._scroll, tr("Numbers"))
+        self.tabs.addTab(self.readings, tr("Readings"))
+        self.friction = TextTable(tr("friction of every stroke"), [tr(words) for words in FRICTION_HEAD])
         self.friction.told.connect(self._choose)
-        self.tabs.addTab(self.friction, "All strokes")
+        self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -168,5 +169,5 @@ class StrokeColumn(QWidget):
         scrolled.setWidgetResizable(True)
         told.setObjectName("inside")
         scrolled.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
-        scrolled.setAccessibleName("numbers of the stroke and its prediction")
+        scrolled.setAccessibleName(tr("numbers of the stroke and its prediction"))
         return scrolled

@@ -15,6 +15,7 @@ from daq_app.analyst.raw import RawReadings
 from daq_app.qt.edge_handle import EdgeHandle
 from daq_app.qt.tokens import GRID, MU, N, T, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
 
 pg: Any = pyqtgraph  # it has no types
@@ -37,7 +38,7 @@ class StrokeView(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(GRID // 2)
-        self._plots = [_plot(tokens, name) for name in ("N and T [N]", "µ = T/N [-]")]
+        self._plots = [_plot(tokens, name) for name in (tr("N and T [N]"), "µ = T/N [-]")]
         for plot in self._plots:
             layout.addWidget(plot, 1)
             plot.reset, plot.read = self.show_all, self._read
@@ -77,7 +78,12 @@ class StrokeView(QWidget):
         other = self._stroke is None or stroke is None or stroke.number != self._stroke.number
         self._stroke = stroke
         self._origin = 0.0 if trace is None else trace.origin
-        self.setAccessibleName(f"forces and friction of {'no stroke' if stroke is None else f'stroke {stroke.number}'}")
+        self.setAccessibleName(
+            tr(
+                "forces and friction of {word}",
+                word=tr("no stroke") if stroke is None else tr("stroke {number}", number=stroke.number),
+            )
+        )
         values = ((), (), ()) if trace is None else (trace.normal, trace.tangential, trace.mu)
         self._time = np.array(() if trace is None else trace.time, np.float64)
         self._columns = [np.array([np.nan if v is None else v for v in column], np.float64) for column in values]
@@ -196,5 +202,5 @@ def _plot(tokens: Tokens, name: str) -> Any:  # noqa: ANN401  pyqtgraph has no t
     item = plot.getPlotItem()
     item.showGrid(x=False, y=True, alpha=0.15)
     item.setLabel("left", name)
-    item.setLabel("bottom", "time since contact [s]")
+    item.setLabel("bottom", tr("time since contact [s]"))
     return plot

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import Tokens
 from daq_app.window.view_subject import SubjectView
+from daq_app.wording import tr
 
 
 class SubjectPicture(QWidget):
@@ -42,7 +43,7 @@ class SubjectPicture(QWidget):
         self._page.next.setVisible(view.asks)
         self._picture = self._page.grab()
         self._page.hide()
-        self.setAccessibleName(f"the subject's page: {view.title} {view.text}".strip())
+        self.setAccessibleName(tr("the subject's page: {title} {it}", title=view.title, it=view.text).strip())
         self.update()
 
     def set_tokens(self, tokens: Tokens) -> None:

@@ -13,6 +13,7 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.window.new_session import Refused, SessionForm
 from daq_app.window.preview import PreviewPage, preview
 from daq_app.window.subject_texts import SubjectText
+from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH
 
 LIST = 250  # width of the list, before the font's scale [px]
@@ -39,25 +40,25 @@ class SubjectPreview(QDialog):
         """Show the first page, as it looks in a subject's window of a size."""
         super().__init__(parent)
         self.setObjectName("window")
-        self.setWindowTitle("daq-app · preview of the subject's pages")
-        self.setAccessibleName("preview of the subject's pages")
+        self.setWindowTitle(tr("daq-app · preview of the subject's pages"))
+        self.setAccessibleName(tr("preview of the subject's pages"))
         self._pages, self._size = tuple(pages), size
         self.picture = SubjectPicture(tokens, scale, size)
         self.list = _Pages()
-        self.list.setAccessibleName("pages that the subject will see")
+        self.list.setAccessibleName(tr("pages that the subject will see"))
         self.list.addItems([page.name for page in self._pages])
         self.list.setFixedWidth(round(LIST * min(scale, 1.5)))
         self.list.setWordWrap(True)
         self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.lost = Wrapped("value", "look")
-        self.back = button("◂ Back", "the page before", lambda: self._turn(-1))
-        self.on = button("On ▸", "the next page", lambda: self._turn(1))
+        self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
+        self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")
         row = QHBoxLayout()
         for made in (self.back, self.on, self._count):
             row.addWidget(made)
         row.addStretch(1)
-        row.addWidget(button("Close  Esc", "close the preview", self.close))
+        row.addWidget(button(tr("Close  Esc"), tr("close the preview"), self.close))
         right = QVBoxLayout()
         right.setSpacing(GRID)
         right.addWidget(self.picture, 1)
@@ -81,10 +82,10 @@ class SubjectPreview(QDialog):
         self.picture.show_page(view, self._size)
         own = [*map(translator(view.language), (SubjectText.NEXT, SubjectText.FIRST, SubjectText.SECOND))]
         lost = missing_glyphs([view.title, view.text, *view.ends, *(own if view.asks else ())], self.font())
-        self.lost.show_text(f"▲ No font here draws {lost}: install one that does." if lost else "")
+        self.lost.show_text(tr("▲ No font here draws {lost}: install one that does.", lost=lost) if lost else "")
         self.back.setEnabled(row > 0)
         self.on.setEnabled(row < len(self._pages) - 1)
-        self._count.setText(f"{row + 1} of {len(self._pages)}")
+        self._count.setText(tr("{row} of {len}", row=row + 1, len=len(self._pages)))
 
 
 class _Pages(QListWidget):

@@ -16,6 +16,7 @@ from daq_app.tablet.server import TabletServer, own_address
 from daq_app.window.course_state import SessionState
 from daq_app.window.live_trace import LiveTrace
 from daq_app.window.view_subject import SubjectView
+from daq_app.wording import tr
 from sessions.recording import Setting
 
 FORCE_EVERY = 0.05  # between two values of the bar [s]
@@ -46,9 +47,13 @@ class TabletScreen(QObject):
     def words(self) -> str:
         """Return what is worth knowing of the tablet, for the experimenter."""
         if not self.server.connected:
-            return f"Open {self.server.url} on the tablet, and type the code {self.server.code}."
-        checked = "checked" if self._pixels else "not checked"
-        return f"The tablet shows the page. Line of {LENGTH:.0f} mm, {checked} with a ruler."
+            return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
+        checked = tr("checked") if self._pixels else tr("not checked")
+        return tr(
+            "The tablet shows the page. Line of {length:.0f} mm, {checked} with a ruler.",
+            length=LENGTH,
+            checked=checked,
+        )
 
     def picture(self) -> bytes:
         """Return the address with the code as a QR code, PNG; nothing while the tablet is there."""

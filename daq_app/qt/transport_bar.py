@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSlider, QWidget
 from daq_app.analyst.transport import SPEEDS, Transport
 from daq_app.qt.parts import button, choice, label, say
 from daq_app.qt.tokens import GRID, TARGET
+from daq_app.wording import tr
 
 TICK = 33  # between two pictures while it plays [ms]
 
@@ -28,17 +29,17 @@ class TransportBar(QWidget):
         self._times: Sequence[float] = ()
         self._transport = Transport(0.0, 0.0, 0.0)
         self._shown = -1
-        self.play = button("▶", f"play {what}", self.toggle, "small")
-        self.back = button("◀|", f"one step back in {what}", lambda: self.step(-1), "small")
-        self.forward = button("|▶", f"one step forward in {what}", lambda: self.step(+1), "small")
+        self.play = button("▶", tr("play {what}", what=what), self.toggle, "small")
+        self.back = button("◀|", tr("one step back in {what}", what=what), lambda: self.step(-1), "small")
+        self.forward = button("|▶", tr("one step forward in {what}", what=what), lambda: self.step(+1), "small")
         for made in (self.play, self.back, self.forward):
             made.setMinimumWidth(TARGET)
         self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setAccessibleName(f"place in {what}")
+        self.slider.setAccessibleName(tr("place in {what}", what=what))
         self.slider.setMinimumHeight(TARGET)
         self.slider.setMinimumWidth(60)
         self.slider.valueChanged.connect(self._move_to)
-        self.speed = choice(f"speed of {what}")
+        self.speed = choice(tr("speed of {what}", what=what))
         self.speed.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.speed.addItems([f"× {value:g}" for value in SPEEDS])
         self.speed.setCurrentIndex(SPEEDS.index(1.0))
@@ -151,4 +152,6 @@ class TransportBar(QWidget):
         for part in (self.play, self.back, self.forward, self.slider, self.speed):
             part.setEnabled(there)
         self.play.setText("❚❚" if self.playing else "▶")
-        self.play.setAccessibleName(f"pause {self._what}" if self.playing else f"play {self._what}")
+        self.play.setAccessibleName(
+            tr("pause {what}", what=self._what) if self.playing else tr("play {what}", what=self._what)
+        )

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QWidget
 from daq_app.qt.parts import button, regrade
 from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.view_trials import MARKS, Tile
+from daq_app.wording import tr
 
 GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}  # of the style sheet
 
@@ -33,7 +34,7 @@ class TrialStrip(QScrollArea):
         self.setWidgetResizable(True)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName("trials of the session")
+        self.setAccessibleName(tr("trials of the session"))
         self.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
         lines = round((2 * SMALL + 2 * GRID) * scale)
         self.setFixedHeight(max(lines, TARGET) + 12 + GRID // 2)  # with the scroll bar
@@ -68,7 +69,7 @@ class TrialStrip(QScrollArea):
 
     def _add(self) -> None:
         at = len(self.tiles)
-        made = button("", "trial", lambda: self._inspect(self._shown[at].number), "tile")
+        made = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile")
         made.setCheckable(True)
         made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.tiles.append(made)

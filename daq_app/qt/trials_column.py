@@ -13,6 +13,7 @@ from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.parts import label
 from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
 
@@ -28,14 +29,14 @@ class TrialsColumn(QWidget):
         self._tokens = tokens
         self._listed: tuple[str, ...] = ()
         self.list = QListWidget()
-        self.list.setAccessibleName("trials")
+        self.list.setAccessibleName(tr("trials"))
         self.list.currentRowChanged.connect(self._chosen)
         self.relation, self.points = self._relation()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(label("Trials", "section"))
+        layout.addWidget(label(tr("Trials"), "section"))
         layout.addWidget(self.list, 3)
-        layout.addWidget(label("Prediction against score", "section"))
+        layout.addWidget(label(tr("Prediction against score"), "section"))
         layout.addWidget(self.relation, 2)
 
     def show_state(self, state: AnalystState) -> None:
@@ -77,9 +78,9 @@ class TrialsColumn(QWidget):
 
     def _relation(self) -> tuple[Any, Any]:
         plot = ZoomedPlot(self._tokens)
-        plot.setAccessibleName("prediction against score: a point chooses its trial")
-        plot.setLabel("bottom", "mean score")
-        plot.setLabel("left", "SED at the plan's depth [kPa]")
+        plot.setAccessibleName(tr("prediction against score: a point chooses its trial"))
+        plot.setLabel("bottom", tr("mean score"))
+        plot.setLabel("left", tr("SED at the plan's depth [kPa]"))
         made = pg.ScatterPlotItem()
         made.sigClicked.connect(self._point_clicked)
         plot.addItem(made)

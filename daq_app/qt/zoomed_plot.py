@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
 
 from daq_app.qt.parts import label
 from daq_app.qt.tokens import GRID, Tokens
+from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
 
@@ -25,7 +26,7 @@ class ZoomedPlot(pg.PlotWidget):
         base.__init__(background=tokens.surface)
         self.setMinimumSize(120, 100)
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
-        self.setToolTip("Wheel: zoom. Drag: move. Home or double-click: show all.")
+        self.setToolTip(tr("Wheel: zoom. Drag: move. Home or double-click: show all."))
         item: Any = self.getPlotItem()
         self.reset = item.enableAutoRange
         self._pointer = pg.InfiniteLine(angle=90, pen=pg.mkPen(tokens.text, width=1))

@@ -9,6 +9,7 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.messages import DevicesFound, LifeKnown, Loaded, Message, Searching
+from daq_app.wording import tr
 from drivers.catalog import Found
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
@@ -91,7 +92,9 @@ def _linked(
         case m.LinkDown(sentence):
             return replace(bench, link="lost", problem=sentence)
         case m.LinkBack(info, same):
-            problem = None if same else f"another transducer answers now, with serial number {info.serial}"
+            problem = (
+                None if same else tr("another transducer answers now, with serial number {serial}", serial=info.serial)
+            )
             return replace(bench, link="open" if same else "lost", problem=problem)
         case m.Failed():
             return _not_done(bench, message)

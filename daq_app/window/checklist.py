@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from daq_app.window.new_session import Bench, SessionForm, enrolment, is_code, place_of, refusals
+from daq_app.wording import tr, tr_noop
 from sessions.plan.study_file import is_study
 
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    "Study and protocol": ("study", "protocol", "seed"),
-    "Subject": ("subject",),
-    "Transducer": ("forces", "simulated", "height", "area"),
-    "Subject's screen": ("tablet",),
-    "Disk": ("folder",),
+    tr_noop("Study and protocol"): ("study", "protocol", "seed"),
+    tr_noop("Subject"): ("subject",),
+    tr_noop("Transducer"): ("forces", "simulated", "height", "area"),
+    tr_noop("Subject's screen"): ("tablet",),
+    tr_noop("Disk"): ("folder",),
 }  # of each card, the worst first
 
 
@@ -33,7 +34,7 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
     notes = {
         "Study and protocol": _study_note(form),
         "Subject": _subject_note(form),
-        "Transducer": "" if not form.forces or not bench.simulated else "The simulated bench.",
+        "Transducer": "" if not form.forces or not bench.simulated else tr("The simulated bench."),
         "Subject's screen": screen,
     }
     made: list[Card] = []
@@ -49,13 +50,13 @@ def headline(cards: tuple[Card, ...], subject: str) -> str:
     first = next((card for card in missing if card.field == "forces"), missing[0] if missing else None)
     match first:
         case None:
-            return f"Press Enter to start the session of {subject.strip()}."
+            return tr("Press Enter to start the session of {subject}.", subject=subject.strip())
         case Card(field="forces"):
-            return "Connect a transducer, or choose scores only."
+            return tr("Connect a transducer, or choose scores only.")
         case Card(field="subject") if not is_code(subject):
-            return "Give the subject's code, then press Enter to start."
+            return tr("Give the subject's code, then press Enter to start.")
         case _:
-            return f"Complete the card “{first.name}”."
+            return tr("Complete the card “{name}”.", name=tr(first.name))
 
 
 def codes_in(folder: Path) -> tuple[str, ...]:
@@ -95,10 +96,14 @@ def _study_note(form: SessionForm) -> str:
     if not name:
         return ""
     if said is not None:
-        return f"A study of protocol {said.protocol}."
+        return tr("A study of protocol {protocol}.", protocol=said.protocol)
     there = ", ".join(studies_in(place_of(form).parent))
-    others = f" Studies there: {there}." if there else ""
-    return f"“{name}” is no study: sessions go to a plain folder, by this page's protocol.{others}"
+    others = tr(" Studies there: {there}.", there=there) if there else ""
+    return tr(
+        "“{name}” is no study: sessions go to a plain folder, by this page's protocol.{others}",
+        name=name,
+        others=others,
+    )
 
 
 def _subject_note(form: SessionForm) -> str:
@@ -106,5 +111,9 @@ def _subject_note(form: SessionForm) -> str:
     if said is not None:
         return said.words
     before = codes_in(place_of(form)).count(form.subject.strip())
-    times = "a session" if before == 1 else f"{before} sessions"
-    return f"{form.subject.strip()} has {times} here already: is it the same person?" if before else ""
+    times = tr("a session") if before == 1 else tr("{before} sessions", before=before)
+    return (
+        tr("{subject} has {times} here already: is it the same person?", subject=form.subject.strip(), times=times)
+        if before
+        else ""
+    )

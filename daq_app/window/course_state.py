@@ -8,6 +8,7 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
 from daq_app.window.messages import Judged, Message
 from daq_app.window.stroke_quality import Quality
+from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.run import steps
@@ -240,11 +241,11 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
     """Return the session after something that became of a trial."""
     match kind:
         case "scored":
-            return session.with_trial(number, answer=_words("score {:.0f}", data["score"]))
+            return session.with_trial(number, answer=_answer(tr_noop("score {answer:.0f}"), data["score"]))
         case "number_given":
-            return session.with_trial(number, answer=_words("number {:g}", data["number"]))
+            return session.with_trial(number, answer=_answer(tr_noop("number {answer:g}"), data["number"]))
         case "chosen":
-            return session.with_trial(number, answer=_words("the {}", data["choice"]))
+            return session.with_trial(number, answer=_answer(CHOICES.get(data["choice"], ""), data["choice"]))
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":
@@ -259,8 +260,11 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
             return session
 
 
-def _words(form: str, answer: float | str | None) -> str:
-    return "no answer" if answer is None else form.format(answer)
+CHOICES = tr_noop({"first": "the first", "second": "the second"})
+
+
+def _answer(form: str, answer: float | str | None) -> str:
+    return tr("no answer") if answer is None else tr(form, answer=answer)
 
 
 def _discarded(data: Mapping[str, Any]) -> Outcome:

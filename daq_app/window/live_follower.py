@@ -13,6 +13,7 @@ from typing import Self
 import numpy as np
 
 from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
+from daq_app.wording import tr
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
 from sessions.strokes import FrictionParameters
@@ -188,7 +189,7 @@ def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, s
     except SolveFailure as failure:
         return _unsettled(asked, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
     if found is None:
-        return _unsettled(asked, kinematics, provisional, seen, "The stroke gives no friction.")
+        return _unsettled(asked, kinematics, provisional, seen, tr("The stroke gives no friction."))
     fields = fields_of(found)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])

@@ -14,6 +14,7 @@ from daq_app.child_process import fresh_processes
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
 from daq_app.window.priority import give_way
+from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 
 Connection = Any  # one end of a pipe; its type is another one on each system
@@ -56,7 +57,7 @@ def run(connection: Connection) -> None:
                     if follower is not None:  # beside the next stroke, which is followed meanwhile
                         threading.Thread(target=solve, args=(follower.settling(asked),), daemon=True).start()
                 case _:
-                    say(Ready("no finger to follow"))
+                    say(Ready(tr("no finger to follow")))
 
 
 class LiveModel:
@@ -150,7 +151,7 @@ class LiveModel:
                 self._send(self._connection)
         except (EOFError, OSError):
             self.close()
-            self.problem = "the live model has stopped; it starts again with the next session"
+            self.problem = tr("the live model has stopped; it starts again with the next session")
         return tuple(self._news)
 
     def _heard(self, message: Ready | Provisional | Settled) -> None:

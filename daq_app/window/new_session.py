@@ -10,6 +10,7 @@ from pathlib import Path
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.bench_state import BenchState
 from daq_app.window.sentences import sentence
+from daq_app.wording import tr
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
@@ -226,16 +227,28 @@ def enrolment(form: SessionForm) -> Enrolment | None:
         return Enrolment("", _told(error))
     subject, name = form.subject.strip(), study.protocol.name
     if not is_code(subject):
-        return Enrolment(name, f"A study of protocol {name}: give the code of one of its subjects.")
+        return Enrolment(name, tr("A study of protocol {name}: give the code of one of its subjects.", name=name))
     if subject not in study.members:
-        return Enrolment(name, f"{subject} is not enrolled in this study ({name}) yet.", may_enrol=True)
+        return Enrolment(
+            name,
+            tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name),
+            may_enrol=True,
+        )
     try:
         member = study.member(subject)
     except StudyError as error:
         return Enrolment(name, _told(error))
-    blinded = "" if study.key_sha256 is None or study.unblinded else "; blinded: codes alone are shown"
+    blinded = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
     return Enrolment(
-        name, f"{subject} is enrolled: protocol {name}, row {study.row(member.slot)}{blinded}.", enrolled=True
+        name,
+        tr(
+            "{subject} is enrolled: protocol {name}, row {row}{blinded}.",
+            subject=subject,
+            name=name,
+            row=study.row(member.slot),
+            blinded=blinded,
+        ),
+        enrolled=True,
     )
 
 
@@ -287,7 +300,12 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
         except (RecordingError, OSError):
             continue
         done = sum(record.outcome != "open" for record in recording.trials)
-        words = f"{recording.plan.subject}: {done} of {len(recording.trials)} trials done"
+        words = tr(
+            "{subject}: {done} of {count} trials done",
+            subject=recording.plan.subject,
+            done=done,
+            count=len(recording.trials),
+        )
         found.append(Unfinished(session, words))
     return tuple(found)
 
@@ -299,28 +317,37 @@ def _age(path: Path) -> float:
 def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     wrong: dict[str, str] = {}
     if not is_code(form.subject):
-        wrong["subject"] = "Give a code of letters, digits, - and _ (at most 32), never a name."
+        wrong["subject"] = tr("Give a code of letters, digits, - and _ (at most 32), never a name.")
     if re.search(r"[/\\]|^\.", form.study.strip()):
-        wrong["study"] = "A study's name has no slash in it and does not begin with a dot."
+        wrong["study"] = tr("A study's name has no slash in it and does not begin with a dot.")
     seed = form.seed.strip()
     if seed and not (seed.isascii() and seed.isdigit() and int(seed) <= LARGEST_SEED):
-        wrong["seed"] = f"A seed is a whole number from 0 to {LARGEST_SEED}; leave it empty for a new one."
+        wrong["seed"] = tr(
+            "A seed is a whole number from 0 to {largest}; leave it empty for a new one.",
+            largest=LARGEST_SEED,
+        )
     height = _number(form.height)
     if form.height.strip() and (height is None or not abs(height) <= HIGHEST):
-        wrong["height"] = f"A height is a number of millimetres from −{HIGHEST:.0f} to {HIGHEST:.0f}, or left empty."
+        wrong["height"] = tr(
+            "A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty.", highest=HIGHEST
+        )
     area = _number(form.area)
     if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):
-        wrong["area"] = f"An area is a number of mm² from {AREAS[0]:.0f} to {AREAS[1]:.0f}, or left empty."
+        wrong["area"] = tr(
+            "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.",
+            least=AREAS[0],
+            most=AREAS[1],
+        )
     place = Path(form.folder.strip() or ".").expanduser()
     existing = next((p for p in (place, *place.parents) if p.exists()), place)
     if not existing.is_dir():
-        wrong["folder"] = f"{existing} is a file: choose a folder."
+        wrong["folder"] = tr("{place} is a file: choose a folder.", place=existing)
     elif not os.access(existing, os.W_OK):
-        wrong["folder"] = f"Nothing can be written in {existing}: choose another folder."
+        wrong["folder"] = tr("Nothing can be written in {place}: choose another folder.", place=existing)
     if form.forces and not bench.connected:
-        wrong["forces"] = "No transducer is connected: connect one, or choose scores only."
+        wrong["forces"] = tr("No transducer is connected: connect one, or choose scores only.")
     if form.simulated and form.forces and bench.connected and not bench.simulated:
-        wrong["simulated"] = "Only the simulated bench can be stroked by a simulated subject."
+        wrong["simulated"] = tr("Only the simulated bench can be stroked by a simulated subject.")
     return wrong
 
 

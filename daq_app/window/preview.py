@@ -8,17 +8,18 @@ from daq_app.window.course_state import SessionState, session_after, session_beg
 from daq_app.window.new_session import PILOT, Bench, Refused, SessionForm, checked
 from daq_app.window.subject_texts import SubjectText, Translate
 from daq_app.window.view_subject import SubjectView, subject_view
+from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.run import machine, states, steps
 
 ANSWERS = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
-OF_A_BLOCK = {"ready": "stroke", "scoring": "answer"}  # phases whose page is the block's own
+OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page is the block's own
 NAMES = {
-    "mounting": "the surface is changed",
-    "settling": "the finger is still on",
-    "resting": "rest",
-    "paused": "pause",
-    "closing": "end",
+    "mounting": tr_noop("the surface is changed"),
+    "settling": tr_noop("the finger is still on"),
+    "resting": tr_noop("rest"),
+    "paused": tr_noop("pause"),
+    "closing": tr_noop("end"),
 }
 
 
@@ -44,10 +45,10 @@ def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage,
     if isinstance(made, Refused):
         return made
     language = made.plan.language
-    first = PreviewPage("before the session", subject_view(None, translate, language))
+    first = PreviewPage(tr("before the session"), subject_view(None, translate, language))
     thanks = SubjectView("read", translate(SubjectText.THANKS), language=language)
     *course, end = _pages(made.plan, translate)
-    return (first, *course, PreviewPage("an answer was given", thanks), end)
+    return (first, *course, PreviewPage(tr("an answer was given"), thanks), end)
 
 
 def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
@@ -65,13 +66,13 @@ def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
         step = machine.advance(state, _next_event(state))
     found[NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
     found[NAMES["closing"]] = found.pop(NAMES["closing"])  # the last one
-    return tuple(PreviewPage(name, view) for name, view in found.items())
+    return tuple(PreviewPage(tr(name), view) for name, view in found.items())
 
 
 def _name(session: SessionState) -> str:
     if session.phase in NAMES or session.block is None:
         return NAMES.get(session.phase, session.phase)
-    return f"{session.block.name}: {OF_A_BLOCK[session.phase]}"
+    return f"{session.block.name}: {tr(OF_A_BLOCK[session.phase])}"
 
 
 def _next_event(state: states.State) -> steps.Event:

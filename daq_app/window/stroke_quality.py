@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.wording import tr, tr_noop
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
@@ -20,46 +21,46 @@ FELL = 0.5  # a normal force that falls by this share along the steady window is
 
 # Few words for what an experimenter can do something about; the others are told by their own sentence.
 WORDS = {
-    FlawName.NO_STROKE: "no stroke was found",
-    FlawName.NO_STEADY_SLIDING: "no steady window",
-    FlawName.ROLLED: "too short a way: the finger may only roll",
-    FlawName.SECOND_STROKE: "second stroke",
-    FlawName.WRONG_DIRECTION: "wrong direction",
-    FlawName.TOO_LITTLE_FORCE: "pressed too lightly",
-    FlawName.NO_UNLOADED_STRETCH: "no unloaded stretch before the stroke",
-    FlawName.BEGINS_IN_CONTACT: "the finger touched before the stroke",
-    FlawName.ENDS_IN_CONTACT: "the finger had not left",
-    FlawName.NOT_LIFTED: "the finger was not lifted between strokes",
-    FlawName.DIRECTION_TURNS: "the direction turned",
-    FlawName.SATURATED: "the transducer was overloaded",
-    FlawName.DEVICE_FAULT: "the transducer told of a fault",
-    FlawName.LOST_READINGS: "readings were lost",
-    FlawName.DRIFT: "the zero drifted",
-    FlawName.FROZEN: "the transducer stood still",
-    FlawName.DEAD: "the transducer is dead",
+    FlawName.NO_STROKE: tr_noop("no stroke was found"),
+    FlawName.NO_STEADY_SLIDING: tr_noop("no steady window"),
+    FlawName.ROLLED: tr_noop("too short a way: the finger may only roll"),
+    FlawName.SECOND_STROKE: tr_noop("second stroke"),
+    FlawName.WRONG_DIRECTION: tr_noop("wrong direction"),
+    FlawName.TOO_LITTLE_FORCE: tr_noop("pressed too lightly"),
+    FlawName.NO_UNLOADED_STRETCH: tr_noop("no unloaded stretch before the stroke"),
+    FlawName.BEGINS_IN_CONTACT: tr_noop("the finger touched before the stroke"),
+    FlawName.ENDS_IN_CONTACT: tr_noop("the finger had not left"),
+    FlawName.NOT_LIFTED: tr_noop("the finger was not lifted between strokes"),
+    FlawName.DIRECTION_TURNS: tr_noop("the direction turned"),
+    FlawName.SATURATED: tr_noop("the transducer was overloaded"),
+    FlawName.DEVICE_FAULT: tr_noop("the transducer told of a fault"),
+    FlawName.LOST_READINGS: tr_noop("readings were lost"),
+    FlawName.DRIFT: tr_noop("the zero drifted"),
+    FlawName.FROZEN: tr_noop("the transducer stood still"),
+    FlawName.DEAD: tr_noop("the transducer is dead"),
 }
 
 # What to do about the worst of them, as a command to whoever runs the session; about the rest, another stroke helps.
 ADVICE: Mapping[FlawName, str] = {
-    FlawName.NO_STROKE: "Stroke once, firmly, and lift.",
-    FlawName.NO_STEADY_SLIDING: "Slide further, at one speed.",
-    FlawName.ROLLED: "Slide further, not roll.",
-    FlawName.SECOND_STROKE: "Stroke once, then lift.",
-    FlawName.WRONG_DIRECTION: "Stroke the way the arrow points.",
-    FlawName.TOO_LITTLE_FORCE: "Press harder.",
-    FlawName.NO_UNLOADED_STRETCH: "Keep the finger off until the stroke.",
-    FlawName.BEGINS_IN_CONTACT: "Keep the finger off until the stroke.",
-    FlawName.ENDS_IN_CONTACT: "Lift the finger at the end.",
-    FlawName.NOT_LIFTED: "Lift the finger between strokes.",
-    FlawName.DIRECTION_TURNS: "Stroke straight, one way.",
-    FlawName.SATURATED: "Press less, and check the transducer.",
-    FlawName.DEVICE_FAULT: "Check the transducer first.",
-    FlawName.FROZEN: "Connect the transducer again first.",
-    FlawName.DEAD: "Connect the transducer again first.",
-    FlawName.DRIFT: "Zero again, hands off.",
+    FlawName.NO_STROKE: tr_noop("Stroke once, firmly, and lift."),
+    FlawName.NO_STEADY_SLIDING: tr_noop("Slide further, at one speed."),
+    FlawName.ROLLED: tr_noop("Slide further, not roll."),
+    FlawName.SECOND_STROKE: tr_noop("Stroke once, then lift."),
+    FlawName.WRONG_DIRECTION: tr_noop("Stroke the way the arrow points."),
+    FlawName.TOO_LITTLE_FORCE: tr_noop("Press harder."),
+    FlawName.NO_UNLOADED_STRETCH: tr_noop("Keep the finger off until the stroke."),
+    FlawName.BEGINS_IN_CONTACT: tr_noop("Keep the finger off until the stroke."),
+    FlawName.ENDS_IN_CONTACT: tr_noop("Lift the finger at the end."),
+    FlawName.NOT_LIFTED: tr_noop("Lift the finger between strokes."),
+    FlawName.DIRECTION_TURNS: tr_noop("Stroke straight, one way."),
+    FlawName.SATURATED: tr_noop("Press less, and check the transducer."),
+    FlawName.DEVICE_FAULT: tr_noop("Check the transducer first."),
+    FlawName.FROZEN: tr_noop("Connect the transducer again first."),
+    FlawName.DEAD: tr_noop("Connect the transducer again first."),
+    FlawName.DRIFT: tr_noop("Zero again, hands off."),
 }
-LEAVING = "pressed less than half as hard at the end"
-PRESS_ON = "Keep pressing until the end."
+LEAVING = tr_noop("pressed less than half as hard at the end")
+PRESS_ON = tr_noop("Keep pressing until the end.")
 PICTURE = ("N", "T", "mu", "speed")  # rows of a stroke's picture
 
 
@@ -108,7 +109,9 @@ def stroke_quality(
     found = [(flaw.grade, _words(flaw), flaw.sentence, ADVICE.get(flaw.name, "")) for flaw in told]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
-        at_length = f"The normal force ended at {100 * (1 - fell):.0f} % of what it was: the finger was leaving."
+        at_length = tr(
+            "The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=100 * (1 - fell)
+        )
         refusals = sum(grade == "refused" for grade, *_ in found)
         found.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
     words = list(dict.fromkeys(short for _, short, _, _ in found))

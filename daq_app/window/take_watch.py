@@ -12,6 +12,7 @@ from daq_app.window.messages import DrawingFailed, Judged
 from daq_app.window.priority import give_way
 from daq_app.window.state import AppState
 from daq_app.window.stroke_quality import Quality, in_newtons, stroke_quality
+from daq_app.wording import tr
 from sessions.recording import LoggedEvent
 from sessions.run import steps
 
@@ -80,7 +81,11 @@ class Judge:
             return
         if error := done.exception():
             self._worker = None  # the next stroke gets another
-            self._say(DrawingFailed(f"the last stroke was not looked at: {type(error).__name__} {error}"))
+            self._say(
+                DrawingFailed(
+                    tr("the last stroke was not looked at: {name} {error}", name=type(error).__name__, error=error)
+                )
+            )
             return
         self._say(Judged(number, take, done.result()))
 

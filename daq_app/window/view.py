@@ -13,6 +13,7 @@ from daq_app.window.subject_texts import Translate
 from daq_app.window.view_bench import BenchView
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_subject import SubjectView
+from daq_app.wording import tr
 
 SILENT = 3.0  # a recorder that was not heard for longer is said to be silent [s]
 UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]
@@ -56,9 +57,11 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
     session = state.session
     simulated = session.simulated if session else None
     if session is None and state.bench.info is not None and state.bench.info.simulated:
-        simulated = "SIMULATED transducer"
+        simulated = tr("SIMULATED transducer")
     return View(
-        heading="new session" if session is None else f"subject {session.plan.subject} · {session.plan.protocol}",
+        heading=tr("new session")
+        if session is None
+        else tr("subject {subject} · {protocol}", subject=session.plan.subject, protocol=session.plan.protocol),
         simulated=simulated,
         lamp=_lamp(state),
         banner=_banner(state),
@@ -72,23 +75,23 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
 def _lamp(state: AppState) -> Lamp:
     session = state.session
     if session is None:
-        return Lamp("off", "not recording", "")
+        return Lamp("off", tr("not recording"), "")
     if session.broken is not None:
-        return Lamp("wrong", "NOT RECORDING", "")
+        return Lamp("wrong", tr("NOT RECORDING"), "")
     if session.end is not None:
         return Lamp("off", _ended_words(session), "")
     running = duration(state.now - session.begun)
     if session.saved is None:
-        return Lamp("off", f"starting {running}", "not saved yet")
+        return Lamp("off", tr("starting {running}", running=running), tr("not saved yet"))
     age = state.now - session.saved
-    saved = f"saved {age:.1f} s ago"
+    saved = tr("saved {age:.1f} s ago", age=age)
     if age > UNSAVED or state.gone is not None:
-        return Lamp("wrong", f"NOT RECORDING {running}", saved)
-    return Lamp("on", f"recording {running}", saved)
+        return Lamp("wrong", tr("NOT RECORDING {running}", running=running), saved)
+    return Lamp("on", tr("recording {running}", running=running), saved)
 
 
 def _ended_words(session: SessionState) -> str:
-    words = {"no": "ended", "running": "ended, being sealed", "sealed": "ended and sealed"}
+    words = {"no": tr("ended"), "running": tr("ended, being sealed"), "sealed": tr("ended and sealed")}
     return words[session.sealing]
 
 
@@ -98,43 +101,46 @@ def _banner(state: AppState) -> Banner | None:
     running = session is not None and not session.over
     if session is not None and (words := _cut_short(state, session)):
         again = m.ResumeSession(session.folder) if session.resumable else None
-        return Banner("wrong", words, "Resume session" if again else "", again)
+        return Banner("wrong", words, tr("Resume session") if again else "", again)
     if state.gone is not None:
         return Banner("wrong", sentence(state.gone))
     if bench.link == "lost":
-        lost = "" if not running else " Readings are being lost; what came before is kept."
-        return Banner("wrong", f"The transducer does not answer: {bench.problem}.{lost}")
+        lost = "" if not running else tr(" Readings are being lost; what came before is kept.")
+        return Banner("wrong", tr("The transducer does not answer: {problem}.{lost}", problem=bench.problem, lost=lost))
     if running and state.heard is not None and state.now - state.heard > SILENT:
-        return Banner("wrong", f"Nothing was heard from the recorder for {state.now - state.heard:.0f} s.")
+        return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
     if over := bench.peak.over:
-        words = f"Overload on {', '.join(over)}: take the load off and check the transducer."
-        return Banner("wrong", words, "Acknowledge", m.AcknowledgeOverloads())
+        words = tr("Overload on {axes}: take the load off and check the transducer.", axes=", ".join(over))
+        return Banner("wrong", words, tr("Acknowledge"), m.AcknowledgeOverloads())
     if state.failed is not None:
-        return Banner("look", sentence(state.failed.sentence), "Dismiss", Dismissed())
+        return Banner("look", sentence(state.failed.sentence), tr("Dismiss"), Dismissed())
     if state.drawing is not None:
         return Banner(
-            "look", f"Something in the window failed ({state.drawing}); the recording goes on.", "Dismiss", Dismissed()
+            "look",
+            tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing),
+            tr("Dismiss"),
+            Dismissed(),
         )
     if bench.link == "none" and bench.problem is not None:
-        return Banner("look", f"No transducer: {bench.problem}")
+        return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
     return None
 
 
 def _cut_short(state: AppState, session: SessionState) -> str:
     """Return why a session ended before its time; empty where it ended as somebody wished, or is being taken up."""
-    end, bench, kept = session.end, state.bench, f"What was saved until then is in {session.folder}."
+    end, bench, kept = session.end, state.bench, tr("What was saved until then is in {folder}.", folder=session.folder)
     if session.phase == "resuming":
         return ""
     if session.resumable and state.failed is not None and state.failed.request == "ResumeSession":
-        return f"The session was not taken up again: {state.failed.sentence.rstrip('.')}. {kept}"
+        return tr("The session was not taken up again: {why}. {kept}", why=state.failed.sentence.rstrip("."), kept=kept)
     if session.broken is not None:
-        return f"The recording has stopped: {session.broken.rstrip('.')}. {kept}"
+        return tr("The recording has stopped: {why}. {kept}", why=session.broken.rstrip("."), kept=kept)
     if end is None or end.cause in ("finished", "aborted", "stopped"):
         return ""
     why = end.reason
     if end.cause == "device":
-        why = "the transducer fell silent; it answers again" if bench.link == "open" else bench.problem or why
-    return f"The session was cut short: {why}. Everything until then is kept."
+        why = tr("the transducer fell silent; it answers again") if bench.link == "open" else bench.problem or why
+    return tr("The session was cut short: {why}. Everything until then is kept.", why=why)
 
 
 def duration(seconds: float) -> str:

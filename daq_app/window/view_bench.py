@@ -9,6 +9,7 @@ from daq_app.window.bench_load import AXES
 from daq_app.window.bench_state import BenchState
 from daq_app.window.messages import Message
 from daq_app.window.view_life import life_rows
+from daq_app.wording import tr
 
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
 COUNTED = (
@@ -100,31 +101,31 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
 
 def _search_words(bench: BenchState) -> str:
     if bench.searching:
-        return "Looking for transducers."
+        return tr("Looking for transducers.")
     if not bench.searched:
         return ""
     if not bench.found:
-        return "No transducer answered. Check power and cable, or type an address, such as net-ft://192.168.1.1."
-    return f"Found {len(bench.found)}: choose from the list."
+        return tr("No transducer answered. Check power and cable, or type an address, such as net-ft://192.168.1.1.")
+    return tr("Found {count}: choose from the list.", count=len(bench.found))
 
 
 def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], str]:
     match bench.link:
         case "none":
-            return "off", "not connected"
+            return "off", tr("not connected")
         case "connecting":
-            return "look", "connecting"
+            return "look", tr("connecting")
         case "lost":
-            return "wrong", "does not answer"
+            return "wrong", tr("does not answer")
         case "open":
             pass
     if bench.peak.over:
-        return "wrong", "overloaded"
+        return "wrong", tr("overloaded")
     if bench.saturated:
         said = ", ".join(bench.health.flagged)
-        return "wrong", f"invalid readings: {said}" if said else "invalid readings"
+        return "wrong", tr("invalid readings: {said}", said=said) if said else tr("invalid readings")
     if near := bench.peak.near:
-        return "look", f"near the rated load: {', '.join(near)}"
+        return "look", tr("near the rated load: {axes}", axes=", ".join(near))
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
     troubles += list(bench.health.flagged)
@@ -132,8 +133,8 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
     if troubles:
         return "look", ", ".join(troubles)
     if bench.health.lag_ms > LAGGING:
-        return "look", f"{bench.health.lag_ms:.0f} ms late"
-    return "well", "nothing lost"
+        return "look", tr("{lag:.0f} ms late", lag=bench.health.lag_ms)
+    return "well", tr("nothing lost")
 
 
 def _rate(bench: BenchState) -> str:
@@ -141,7 +142,7 @@ def _rate(bench: BenchState) -> str:
         return "–"
     asked = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
     measured = f"{bench.rate:.0f}" if isfinite(bench.rate) else "–"
-    return f"{measured} Hz (set {asked})"
+    return tr("{measured} Hz (set {asked})", measured=measured, asked=asked)
 
 
 def _counters(bench: BenchState) -> tuple[tuple[str, str], ...]:
@@ -170,28 +171,34 @@ def _noise(value: float, unit: str) -> str:
     >>> _noise(0.0042, "N"), _noise(0.052, "N mm")
     ('4.2 mN', '0.052 N mm')
     """
-    return f"{1000 * value:.2g} mN" if unit == "N" else f"{value:.2g} {unit}"
+    return tr("{value:.2g} mN", value=1000 * value) if unit == "N" else f"{value:.2g} {unit}"
 
 
 def _tare(bench: BenchState) -> str:
     if bench.taring:
-        return "being measured: hands off"
+        return tr("being measured: hands off")
     if bench.zero is None:
-        return "not measured"
+        return tr("not measured")
     zero = bench.zero
     fx, fy, fz, tx, ty, tz = zero.mean
     forces = f"Fx {_mn(fx)}, Fy {_mn(fy)}, Fz {_mn(fz)} mN"
     torques = f"Tx {_nmm(tx)}, Ty {_nmm(ty)}, Tz {_nmm(tz)} N mm"
-    return f"{forces}\n{torques}\n{zero.readings} readings in {zero.duration:.1f} s"
+    return tr(
+        "{forces}\n{torques}\n{readings} readings in {duration:.1f} s",
+        forces=forces,
+        torques=torques,
+        readings=zero.readings,
+        duration=zero.duration,
+    )
 
 
 def _drift(bench: BenchState) -> str:
     if bench.zero is None or bench.first_zero is None:
         return "–"
     if bench.zero is bench.first_zero:
-        return "first zero"
+        return tr("first zero")
     moved = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
-    return f"{1000 * moved:.0f} mN since the first"
+    return tr("{moved:.0f} mN since the first", moved=1000 * moved)
 
 
 def _mn(newtons: float) -> str:
@@ -203,10 +210,10 @@ def _nmm(torque: float) -> str:
 
 
 def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:
-    rows = [DeviceRow("sim:", "Simulated bench", "always there")]
+    rows = [DeviceRow("sim:", tr("Simulated bench"), tr("always there"))]
     for found in bench.found:
         if found.info is not None:
             info = found.info
-            detail = f"serial {info.serial} · {info.calibration.source}"
+            detail = tr("serial {serial} · {source}", serial=info.serial, source=info.calibration.source)
             rows.append(DeviceRow(found.uri, info.model, detail))
     return tuple(rows)

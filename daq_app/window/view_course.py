@@ -9,10 +9,11 @@ from daq_app.window.course_state import SessionState, TrialState
 from daq_app.window.messages import Message, NewSession
 from daq_app.window.stroke_quality import Quality
 from daq_app.window.view_trials import Tile, tiles
+from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 from sessions.run import steps
 
-WAYS = {1: "away from the subject", -1: "towards the subject"}
+WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 
 
@@ -80,14 +81,14 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else _clock(now - session.since),
-        told=f"It is kept in {session.folder}" if over else session.told or "",
+        told=tr("It is kept in {folder}", folder=session.folder) if over else session.told or "",
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
         redo=_redo(again, stroke.redo),
-        skip=Button("Skip", "S", session.phase in IN_A_TRIAL, question="Why is it left out?"),
+        skip=Button(tr("Skip"), "S", session.phase in IN_A_TRIAL, question=tr("Why is it left out?")),
         pause=_pause(session),
-        note=Button("Note", "N", not over, question="Note, kept with its time:"),
+        note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
         no_answer=_no_answer_button(session),
         end=_end(over=over),
         forces_shown="forces" in session.plan.shown.experimenter,
@@ -112,37 +113,40 @@ def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     """Return the button that names what it discards."""
     if not again:
-        return Button("Redo", "R", enabled=False)
+        return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in again)
-    named = " and ".join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in again)
-    trials = f"trial {named}" if len(again) == 1 else f"trials {named}"
+    named = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in again)
+    trials = tr("trial {named}", named=named) if len(again) == 1 else tr("trials {named}", named=named)
     return Button(
-        f"Redo {numbers}", "R", sends=sends, question=f"Why redo {trials}? What was recorded of it no longer counts."
+        tr("Redo {numbers}", numbers=numbers),
+        "R",
+        sends=sends,
+        question=tr("Why redo {trials}? What was recorded of it no longer counts.", trials=trials),
     )
 
 
 def _end(*, over: bool) -> Button:
     if over:
-        return Button("New", "Ctrl+N", sends=NewSession())
-    return Button("End", "Ctrl+E", question="Why does the session end now?")
+        return Button(tr("New"), "Ctrl+N", sends=NewSession())
+    return Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
 
 
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
     """Return the one sentence, and the one button that does what it says."""
     match session.phase:
         case "idle" if bench.link == "lost":
-            return "Wait: the transducer does not answer.", None
+            return tr("Wait: the transducer does not answer."), None
         case "idle":
-            return "Everything is set up. Press Space to begin.", Button("Begin", "Space", sends=steps.Begin())
+            return tr("Everything is set up. Press Space to begin."), Button(tr("Begin"), "Space", sends=steps.Begin())
         case "paused":
-            return "Paused. Press Space to go on.", Button("Resume", "Space", sends=steps.Resume())
+            return tr("Paused. Press Space to go on."), Button(tr("Resume"), "Space", sends=steps.Resume())
         case "resting":
             return _rest(session)
         case "resuming":
-            return "Wait: the session is being taken up again.", None
+            return tr("Wait: the session is being taken up again."), None
         case "closing":
-            finish = Button("End session", "Space", sends=steps.Finish())
-            return "Every trial is done. Press Space to end the session.", finish
+            finish = Button(tr("End session"), "Space", sends=steps.Finish())
+            return tr("Every trial is done. Press Space to end the session."), finish
         case "ended":
             return _ended(session)
         case _:
@@ -155,19 +159,25 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
     code = trial.stimulus.code
     match session.phase:
         case "mounting":
-            then = "to zero" if session.plan.forces else "to go on"
-            label = "Zero" if session.plan.forces else "Mounted"
+            then = tr("to zero") if session.plan.forces else tr("to go on")
+            label = tr("Zero") if session.plan.forces else tr("Mounted")
             practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
-            words = f"{practice}mount sample {code}, its arrow {WAYS[trial.direction]}. Then press Space {then}."
+            words = tr(
+                "{practice}mount sample {code}, its arrow {way}. Then press Space {then}.",
+                practice=practice,
+                code=code,
+                way=tr(WAYS[trial.direction]),
+                then=then,
+            )
             return words[:1].upper() + words[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
         case "taring":
-            return f"Hands off: zero is being measured with sample {code} on.", None
+            return tr("Hands off: zero is being measured with sample {code} on.", code=code), None
         case "ready":
             return _stroke_sentence(session, trial), _stroke_button(session)
         case "stroking":
-            return f"Stroke on {code} is being recorded.", None
+            return tr("Stroke on {code} is being recorded.", code=code), None
         case "settling":
-            return f"Fingers off: the recording of {code} ends in a moment.", None
+            return tr("Fingers off: the recording of {code} ends in a moment.", code=code), None
         case _:
             return _answer_sentence(session, code), None
 
@@ -175,17 +185,21 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
 def _answer_sentence(session: SessionState, code: str) -> str:
     match session.asked:
         case steps.AskNumber():
-            return f"The subject gives sample {code} a number."
+            return tr("The subject gives sample {code} a number.", code=code)
         case steps.AskChoice(first, second):
-            return f"The subject chooses between {first.stimulus.code} and {second.stimulus.code}."
+            return tr(
+                "The subject chooses between {first} and {second}.",
+                first=first.stimulus.code,
+                second=second.stimulus.code,
+            )
         case _:
-            return f"The subject scores sample {code}."
+            return tr("The subject scores sample {code}.", code=code)
 
 
 def _no_answer_button(session: SessionState) -> Button:
     """Return the button for a subject who cannot say; while a number is due, 0 is a digit of it."""
     key = "" if isinstance(session.asked, steps.AskNumber) else "0"
-    return Button("No answer", key, session.phase == "scoring", _no_answer(session.asked))
+    return Button(tr("No answer"), key, session.phase == "scoring", _no_answer(session.asked))
 
 
 def _no_answer(asked: steps.Command | None) -> steps.Event | None:
@@ -203,45 +217,51 @@ def _no_answer(asked: steps.Command | None) -> steps.Event | None:
 
 def _rest(session: SessionState) -> tuple[str, Button]:
     duration = session.asked.duration if isinstance(session.asked, steps.AskRest) else None
-    by_itself = "" if duration is None else f" It goes on by itself after {duration:g} s."
-    return f"The subject rests.{by_itself}", Button("Go on", "Space", sends=steps.Resume())
+    by_itself = "" if duration is None else tr(" It goes on by itself after {duration:g} s.", duration=duration)
+    return tr("The subject rests.{by_itself}", by_itself=by_itself), Button(tr("Go on"), "Space", sends=steps.Resume())
 
 
 def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     hand = session.plan.stroking_hand
-    finger = f"{hand} index finger" if hand else "index finger"
-    way = "away from the body" if trial.direction == PROXIMAL_TO_DISTAL else "towards the body"
+    finger = tr("{hand} index finger", hand=hand) if hand else tr("index finger")
+    way = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
     allowed = session.plan.strokes_allowed(trial)
-    often = "once" if allowed == 1 else f"up to {allowed} times"
-    sentence = f"Subject strokes {trial.stimulus.code} {often}, {way}, with the {finger}."
-    return sentence if session.plan.forces else f"{sentence} Then press Space."
+    often = tr("once") if allowed == 1 else tr("up to {allowed} times", allowed=allowed)
+    sentence = tr(
+        "Subject strokes {code} {often}, {way}, with the {finger}.",
+        code=trial.stimulus.code,
+        often=often,
+        way=way,
+        finger=finger,
+    )
+    return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
 
 
 def _stroke_button(session: SessionState) -> Button | None:
-    return None if session.plan.forces else Button("Stroke done", "Space", sends=steps.StrokeDone())
+    return None if session.plan.forces else Button(tr("Stroke done"), "Space", sends=steps.StrokeDone())
 
 
 def _ended(session: SessionState) -> tuple[str, Button | None]:
     if not session.over:
-        return "The session is being ended.", None
+        return tr("The session is being ended."), None
     if session.resumable:
-        resume = Button("Resume session", "Space", sends=m.ResumeSession(session.folder))
-        return "The session was cut short and can go on at the same trial.", resume
+        resume = Button(tr("Resume session"), "Space", sends=m.ResumeSession(session.folder))
+        return tr("The session was cut short and can go on at the same trial."), resume
     done = sum(t.outcome == "done" for t in session.trials)
-    sentence = f"Session ended: {done} of {len(session.trials)} trials done."
-    return sentence, Button("New session", "Space", sends=NewSession())
+    sentence = tr("Session ended: {done} of {count} trials done.", done=done, count=len(session.trials))
+    return sentence, Button(tr("New session"), "Space", sends=NewSession())
 
 
 def _pause(session: SessionState) -> Button:
     if session.phase == "paused":
-        return Button("Resume", "P", sends=steps.Resume())
-    return Button("Pause", "P", session.phase in IN_A_TRIAL, steps.Pause())
+        return Button(tr("Resume"), "P", sends=steps.Resume())
+    return Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause())
 
 
 def _rows(session: SessionState) -> tuple[PlanRow, ...]:
     rows: list[PlanRow] = []
     for block in session.plan.blocks:
-        way = "↑ away" if block.direction == PROXIMAL_TO_DISTAL else "↓ towards"
+        way = tr("↑ away") if block.direction == PROXIMAL_TO_DISTAL else tr("↓ towards")
         name = block.name if block.phase == "main" else f"{block.name}, {block.phase}"
         rows.append(PlanRow("block", "", name, way))
         numbers = {trial.number for trial in block.trials}
@@ -252,10 +272,10 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
 def _row(session: SessionState, trial: TrialState) -> PlanRow:
     name = f"{trial.trial.number}  {trial.trial.stimulus.code}"
     if trial.trial.number == session.trial and session.phase != "ended":
-        again = f"take {trial.takes}" if trial.takes > 1 else ""
+        again = tr("take {takes}", takes=trial.takes) if trial.takes > 1 else ""
         return PlanRow("current", "▶", name, again)
     if trial.outcome == "skipped":
-        return PlanRow("skipped", "–", name, "skipped")
+        return PlanRow("skipped", "–", name, tr("skipped"))
     if trial.outcome == "coming":
         return PlanRow("coming", " ", name)
     shown = session.plan.shown.experimenter
@@ -282,18 +302,21 @@ def _mu(quality: Quality) -> str:
 def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
     judged = session.of(session.judged)
     if judged is None or judged.quality is None:
-        return StrokeView("none", "No stroke yet.")
+        return StrokeView("none", tr("No stroke yet."))
     quality, code = judged.quality, judged.trial.stimulus.code
-    parts = [f"Stroke on {code}"]
+    parts = [tr("Stroke on {code}", code=code)]
     if quality.steady is not None:
-        parts.append(f"steady {quality.steady[1] - quality.steady[0]:.1f} s")
+        parts.append(tr("steady {duration:.1f} s", duration=quality.steady[1] - quality.steady[0]))
     if quality.mu is not None:
         parts.append(_mu(quality))
     if quality.speed is not None:
         parts.append(f"{quality.speed:.0f} mm/s")
     if quality.fell is not None:
-        parts.append(f"N {'fell' if quality.fell >= 0 else 'rose'} {100 * abs(quality.fell):.0f} %")
-    parts.append("good" if quality.grade == "good" else "; ".join(quality.words))
+        share = 100 * quality.fell
+        parts.append(
+            tr("N fell {share:.0f} %", share=share) if share >= 0 else tr("N rose {share:.0f} %", share=-share)
+        )
+    parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
     redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
     return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
 

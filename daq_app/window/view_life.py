@@ -1,9 +1,10 @@
 """What a serial number has been through, as the bench shows it: zeros, how far they moved, its noise, its overloads."""
 
 from daq_app.recorder.device_history import Life
+from daq_app.wording import tr, tr_noop
 from drivers.transducer import TransducerInfo
 
-NAMES = ("zeros", "moved", "noise", "overloads")
+NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 
 
 def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str, str], ...]:
@@ -14,20 +15,22 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
     ('41 mN, 1.3 N mm since the first', '2, the last on 2026-10-01')
     """
     if life is None or not life.zeros:
-        why = "none kept of a simulated one" if info is not None and info.simulated else "–"
+        why = tr("none kept of a simulated one") if info is not None and info.simulated else "–"
         overloads = "–" if life is None else _overloads(life)
         return tuple(zip(NAMES, (why, "–", "–", overloads), strict=True))
     told = (
-        f"{life.zeros} since {life.since}",
-        "–" if life.zeros == 1 else f"{_greatest(life.drift)} since the first",
-        f"{_greatest(life.noise)} usually",
+        tr("{count} since {since}", count=life.zeros, since=life.since),
+        "–" if life.zeros == 1 else tr("{drift} since the first", drift=_greatest(life.drift)),
+        tr("{noise} usually", noise=_greatest(life.noise)),
         _overloads(life),
     )
     return tuple(zip(NAMES, told, strict=True))
 
 
 def _overloads(life: Life) -> str:
-    return f"{life.overloads}, the last on {life.last_overload}" if life.overloads else "none"
+    return (
+        tr("{count}, the last on {day}", count=life.overloads, day=life.last_overload) if life.overloads else tr("none")
+    )
 
 
 def _greatest(six: tuple[float, ...]) -> str:

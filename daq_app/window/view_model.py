@@ -7,10 +7,11 @@ import numpy as np
 
 from daq_app.window.live_model import STEP, Provisional, Settled
 from daq_app.window.live_trace import Columns, LiveTrace
+from daq_app.wording import tr, tr_noop
 
 GAP = 0.1  # predictions further apart have a gap between them [s]
 CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
-KINEMATICS = {"small": "small strain", "finite": "finite strain"}
+KINEMATICS = {"small": tr_noop("small strain"), "finite": tr_noop("finite strain")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,36 +25,56 @@ class ModelWords:
 def model_words(said: Provisional | None, settled: Settled | None, problem: str) -> ModelWords:
     """Return what is said of the picture that is shown."""
     if problem:
-        return ModelWords(f"No live model: {problem}.", "none")
+        return ModelWords(tr("No live model: {problem}.", problem=problem), "none")
     if settled is not None:
         return ModelWords(_of_settled(settled), "failed" if settled.sed is None else "settled")
     if said is None:
-        return ModelWords("The live model is starting.", "none")
+        return ModelWords(tr("The live model is starting."), "none")
     if said.beyond:
-        return ModelWords("These forces are beyond the reach of the model.", "beyond")
+        return ModelWords(tr("These forces are beyond the reach of the model."), "beyond")
     if said.sed[-1] <= 0.0:
-        return ModelWords(f"Model at {KINEMATICS[said.kinematics]}: nothing touches.", "none")
-    told = f"PROVISIONAL  SED {_kpa(float(said.sed[-1]))} at the measured force, {said.depth:.1f} mm deep · "
+        return ModelWords(
+            tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics])), "none"
+        )
+    told = tr(
+        "PROVISIONAL  SED {kpa} at the measured force, {depth:.1f} mm deep · ",
+        kpa=_kpa(float(said.sed[-1])),
+        depth=said.depth,
+    )
     if said.instead[-1]:
-        return ModelWords(f"{told}small strain: these forces are beyond the reach of finite strain", "instead")
-    return ModelWords(told + KINEMATICS[said.kinematics], "provisional")
+        return ModelWords(
+            tr("{told}small strain: these forces are beyond the reach of finite strain", told=told), "instead"
+        )
+    return ModelWords(told + tr(KINEMATICS[said.kinematics]), "provisional")
 
 
 def _of_settled(settled: Settled) -> str:
-    shown = "" if settled.provisional is None else f" · shown live {_kpa(settled.provisional)}"
-    how = KINEMATICS[settled.kinematics]
+    shown = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
+    how = tr(KINEMATICS[settled.kinematics])
     if settled.sed is None:
         kept = ""
         if settled.depth is not None:
             lost = settled.picture is not None and settled.picture.lost is not None
-            marked = "; ⊗ marks its most squeezed tissue" if lost else ""
-            kept = f" Shown is the last state that was followed, {settled.depth:.1f} mm deep{marked}."
-        return f"No full solve at {how}{shown}. {settled.reason}{kept}"
+            marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
+            kept = tr(
+                " Shown is the last state that was followed, {depth:.1f} mm deep{marked}.",
+                depth=settled.depth,
+                marked=marked,
+            )
+        return tr(
+            "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
+        )
     error = "" if settled.error is None else f" ± {100 * settled.error:.1f} %"
     by = settled.difference
     if by is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
-    return f"Full solve  SED {_kpa(settled.sed)}{error} at the measured force, {how}{shown}"
+    return tr(
+        "Full solve  SED {kpa}{error} at the measured force, {how}{shown}",
+        kpa=_kpa(settled.sed),
+        error=error,
+        how=how,
+        shown=shown,
+    )
 
 
 def _kpa(sed: float) -> str:

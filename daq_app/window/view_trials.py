@@ -5,6 +5,7 @@ from typing import Literal
 
 from daq_app.window.course_state import SessionState, TrialState
 from daq_app.window.stroke_quality import PICTURE, Quality, StrokePicture
+from daq_app.wording import tr, tr_noop
 
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
 MARKS: dict[TileKind, str] = {
@@ -16,12 +17,12 @@ MARKS: dict[TileKind, str] = {
     "coming": "○",
 }
 STATES: dict[TileKind, str] = {
-    "done": "done",
-    "redone": "done again",
-    "flawed": "done, its stroke has a flaw",
-    "current": "in hand",
-    "skipped": "skipped",
-    "coming": "still to come",
+    "done": tr_noop("done"),
+    "redone": tr_noop("done again"),
+    "flawed": tr_noop("done, its stroke has a flaw"),
+    "current": tr_noop("in hand"),
+    "skipped": tr_noop("skipped"),
+    "coming": tr_noop("still to come"),
 }
 DIGITS: dict[str, int] = dict(zip(PICTURE, (2, 2, 2, 0), strict=True))
 UNITS: dict[str, str] = dict(zip(PICTURE, ("N", "N", "", "mm/s"), strict=True))
@@ -42,7 +43,7 @@ class Tile:
         >>> Tile(3, "D86", "flawed").words
         'trial 3, D86: done, its stroke has a flaw'
         """
-        return f"trial {self.number}, {self.code}: {STATES[self.kind]}"
+        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(STATES[self.kind]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +71,21 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     if trial is None:
         return None
     kind = _kind(session, trial)
-    again = f", take {trial.takes}" if trial.takes > 1 else ""
-    heading = f"Trial {number}, {trial.trial.stimulus.code}{again}: {STATES[kind]}"
+    again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
+    heading = tr(
+        "Trial {number}, {code}{again}: {state}",
+        number=number,
+        code=trial.trial.stimulus.code,
+        again=again,
+        state=tr(STATES[kind]),
+    )
     shown = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in shown:
         heading = f"{heading}, {trial.answer}"
-    details = f"Its take before was discarded: {trial.discarded.rstrip('.')}." if trial.discarded else ""
+    details = tr("Its take before was discarded: {why}.", why=trial.discarded.rstrip(".")) if trial.discarded else ""
     quality = trial.quality
     if "forces" not in shown:
-        return _without(number, heading, "Forces are not shown in this protocol.", details)
+        return _without(number, heading, tr("Forces are not shown in this protocol."), details)
     if quality is None:
         return _without(number, heading, _why_none(session, trial), details)
     picture = quality.picture
@@ -95,9 +102,9 @@ def verdict(quality: Quality) -> str:
     'Redo: pressed too lightly. Press harder.'
     """
     if not quality.words:
-        return "Good"
-    opening = "Redo" if quality.grade == "refused" or quality.redo else "Doubtful"
-    return f"{opening}: {quality.words[0].rstrip('.')}. {quality.advice}".strip()
+        return tr("Good")
+    opening = tr("Redo") if quality.grade == "refused" or quality.redo else tr("Doubtful")
+    return f"{opening}: {tr(quality.words[0]).rstrip('.')}. {tr(quality.advice)}".strip()
 
 
 def _kind(session: SessionState, trial: TrialState) -> TileKind:
@@ -113,12 +120,12 @@ def _kind(session: SessionState, trial: TrialState) -> TileKind:
 def _why_none(session: SessionState, trial: TrialState) -> str:
     """Return why nothing is known of the stroke of a trial."""
     if not session.plan.forces:
-        return "No forces are recorded in this session."
+        return tr("No forces are recorded in this session.")
     if trial.outcome == "coming":
-        return "Its stroke is still to come."
+        return tr("Its stroke is still to come.")
     if trial.outcome == "skipped":
-        return "It was left out: no stroke of it counts."
-    return "Its stroke was recorded, and this window has not looked at it: Review shows it after the session."
+        return tr("It was left out: no stroke of it counts.")
+    return tr("Its stroke was recorded, and this window has not looked at it: Review shows it after the session.")
 
 
 def _without(number: int, heading: str, why: str, details: str) -> Inspection:

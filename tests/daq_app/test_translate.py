@@ -6,6 +6,7 @@ import pytest
 
 from daq_app.cli.main import run
 from daq_app.window.subject_texts import SubjectText
+from daq_app.wording import translations
 from sessions.plan.protocols import plan, protocol
 from sessions.plan.protocols.planning import VisitSetting
 from sessions.plan.protocols.protocol import FOLDER
@@ -38,12 +39,28 @@ def test_the_program_s_own_texts_come_as_a_file_for_linguist(tmp_path, language,
     assert len([one for one in made.iter("translation") if one.get("type") == "unfinished"]) == left
 
 
+def test_the_windows_texts_come_as_a_file_that_keeps_what_was_translated(tmp_path, monkeypatch):
+    monkeypatch.setattr("daq_app.wording.FOLDER", tmp_path)
+    file, again = tmp_path / "experimenter_nl.ts", tmp_path / "again.ts"
+    assert run(["translate", "--window", "--language", "nl", "--out", str(file)]) == 0
+    before = file.read_text()
+    for text in ("Redo {numbers}", "Press harder.", "Normal force", "Everything is set up. Press Space to begin."):
+        assert before.count(f"<source>{text}</source>") == 1
+    place = '<source>Press harder.</source>\n            <translation type="unfinished" />'
+    assert place in before
+    file.write_text(before.replace(place, "<source>Press harder.</source><translation>Druk harder.</translation>"))
+    translations.cache_clear()
+    assert run(["translate", "--window", "--language", "nl", "--out", str(again)]) == 0
+    assert "<translation>Druk harder.</translation>" in again.read_text()
+
+
 def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):
     there = tmp_path / "there.toml"
     there.write_text("kept")
     for wrong in (
         ["--language", "de"],
         ["sensotact-friction", "--program", "--language", "de"],
+        ["--window", "--program", "--language", "de"],
         ["sensotact-friction", "--language", "Dutch"],
         ["sensotact-friction", "--language", "en"],
         ["nowhere", "--language", "de"],

@@ -1,31 +1,35 @@
 """Write the file that a translator fills in: a protocol's texts as TOML tables, or the program's own as a .ts file.
 
 What is translated already is kept; what is not stands there in the language it is translated from. The tables go to the
-end of the protocol's file. A .ts file is edited with Qt Linguist or as text, and lrelease makes of it the .qm file that
-the window reads.
+end of the protocol's file. A .ts file is edited with Qt Linguist or as text, and the window reads it as it is.
 """
 
 import argparse
+import ast
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
 from daq_app.console import Console, WrongValue
 from daq_app.window.subject_texts import SubjectText, usual_question
+from daq_app.wording import EXPERIMENTER, SUBJECT, translations
 from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
 from sessions.plan.protocols.protocol import Protocol
 from sessions.recording import RecordingError
 from sessions.toml_file import NotAllowed, toml_text
+from solver.quantities import FIELDS
 
 EXAMPLE = "daq-app translate sensotact-friction --language nl --out dutch.toml"
-SHIPPED = Path(__file__).parents[2] / "qt" / "translations"
+PROGRAM = Path(__file__).parents[2]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare what is translated, into which language, and where it goes."""
     parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in one, or a TOML file")
     parser.add_argument("--program", action="store_true", help="the texts of the subject's page instead")
+    parser.add_argument("--window", action="store_true", help="the texts of the experimenter's windows instead")
     parser.add_argument(
         "--language", required=True, metavar="XX", help="two or three small letters, as ISO 639 has them"
     )
@@ -34,14 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Write or print the file."""
-    if (options.protocol is None) != options.program:
-        raise WrongValue("give a PROTOCOL, or --program; one of the two")
+    if (options.protocol is not None) + options.program + options.window != 1:
+        raise WrongValue("give a PROTOCOL, --program or --window; one of the three")
     try:
         check_language("--language", options.language)
     except NotAllowed as wrong:
         raise WrongValue(str(wrong)) from wrong
-    if options.program:
-        text, missing = program_texts(options.language)
+    if options.window:
+        text, missing = program_texts(EXPERIMENTER, window_texts(), options.language)
+    elif options.program:
+        text, missing = program_texts(SUBJECT, SubjectText, options.language)
     else:
         text, missing = protocol_texts(protocol(options.protocol), options.language)
     if options.out is None:
@@ -77,24 +83,32 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     return "\n".join(lines), sum(one.block not in held for one in asked)
 
 
-def program_texts(language: str) -> tuple[str, int]:
-    """Return the .ts file of a language, and how many of its texts are not translated."""
-    shipped = SHIPPED / f"subject_{language}.ts"
-    held: dict[str, str] = {}
-    if language != ENGLISH and shipped.exists():
-        for message in ElementTree.parse(shipped).iter("message"):
-            held[message.findtext("source", "")] = message.findtext("translation", "")
+def window_texts() -> list[str]:
+    """Return every text of the experimenter's windows, as it stands in the sources, and the fields of the finger."""
+    texts = dict.fromkeys(field.label for field in FIELDS)
+    for source in sorted(PROGRAM.rglob("*.py")):
+        for node in ast.walk(ast.parse(source.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("tr", "tr_noop"):
+                constants = [one.value for one in ast.walk(node.args[0]) if isinstance(one, ast.Constant)]
+                texts |= dict.fromkeys(text for text in constants if isinstance(text, str))
+    return list(texts)
+
+
+def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[str, int]:
+    """Return the .ts file of a language, and how many of the texts are not translated."""
+    held = translations(context, language)
     root = ElementTree.Element("TS", version="2.1", language=language, sourcelanguage=ENGLISH)
-    context = ElementTree.SubElement(root, "context")
-    ElementTree.SubElement(context, "name").text = "subject"
-    for text in SubjectText:
-        message = ElementTree.SubElement(context, "message")
+    group = ElementTree.SubElement(root, "context")
+    ElementTree.SubElement(group, "name").text = context
+    missing = 0
+    for text in texts:
+        message = ElementTree.SubElement(group, "message")
         ElementTree.SubElement(message, "source").text = text
         made = ElementTree.SubElement(message, "translation")
         made.text = held.get(text, "")
         if not made.text:
             made.set("type", "unfinished")
+            missing += 1
     ElementTree.indent(root, "    ")
     body = ElementTree.tostring(root, encoding="unicode")
-    missing = sum(not held.get(text) for text in SubjectText)
     return f'<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE TS>\n{body}\n', missing

@@ -1,0 +1,52 @@
+"""The program's own texts in other languages, from Qt's translation files (.ts). No Qt: every process reads them."""
+
+import os
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeVar
+from xml.etree import ElementTree
+
+ENGLISH = "en"
+FOLDER = Path(__file__).parent / "translations"
+VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
+SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.ts
+
+T = TypeVar("T")
+
+
+@lru_cache
+def translations(context: str, language: str) -> Mapping[str, str]:
+    """Return the texts of a language by the English ones; none where its file is missing or cannot be read."""
+    try:
+        messages = ElementTree.parse(FOLDER / f"{context}_{language}.ts").iter("message")
+    except (OSError, ElementTree.ParseError):
+        return {}
+    return {one.findtext("source", ""): text for one in messages if (text := one.findtext("translation", ""))}
+
+
+def languages(context: str) -> tuple[str, ...]:
+    """Return the languages that a context is translated into, English first."""
+    return (ENGLISH, *sorted(place.stem.removeprefix(f"{context}_") for place in FOLDER.glob(f"{context}_*.ts")))
+
+
+def tr(text: str, /, **values: object) -> str:
+    """Return a text of the experimenter's side in the language of this process, with `values` put in for its braces.
+
+    A text that is not translated, or whose translation has other braces, is returned in English.
+
+    >>> tr("Trial {number} of {count}", number=3, count=10)
+    'Trial 3 of 10'
+    """
+    found = translations(EXPERIMENTER, os.environ.get(VARIABLE, ENGLISH)).get(text, text)
+    if not values:
+        return found
+    try:
+        return found.format(**values)
+    except (LookupError, ValueError, AttributeError):
+        return text.format(**values)
+
+
+def tr_noop(texts: T) -> T:
+    """Return texts as they are. `daq-app translate` finds them here; whoever shows one calls `tr` (as QT_TR_NOOP)."""
+    return texts

@@ -1,0 +1,170 @@
+"""The experimenter's windows in another language: no text that is seen or read out is left in English."""
+
+import re
+import subprocess
+import sys
+from xml.sax.saxutils import escape
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QMenu,
+    QTableView,
+    QTabWidget,
+    QWidget,
+)
+
+from daq_app import wording
+from daq_app.cli.verbs.translate import window_texts
+from daq_app.qt import remembered
+from daq_app.qt.parts import Shortened
+from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
+
+pytestmark = pytest.mark.qt
+
+# What no translator is given: what was recorded, named or typed, units, formats of files, names of keys.
+DATA = re.compile(
+    r"SIMULATED Net F/T[^:]*|SIM00000|sensotact-friction|constant-stimuli|magnitude-estimation|paired-comparison|three"
+    r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|bids|csv|hdf5|nwb|analyst|dragged by hand"
+    r"|counts per unit read from|Ctrl|P01_\S*|<[^>]*>|&\w+;"
+)
+SESSIONS_OWN = ("SIMULATED: the transducer and",)  # sentences of a recording, which the report has too
+MODELS_OWN = "scene and model"  # a table whose words are the report's
+
+
+def translated(text):
+    return f"⟦{text}⟧"
+
+
+def left_in_english(text):
+    """Return what of a text is neither within the marks of a translation nor data."""
+    while (shorter := re.sub(r"⟦[^⟦⟧]*⟧", " ", text)) != text:
+        text = shorter
+    rest = DATA.sub(" ", text)
+    return rest if re.search("[A-Za-z]{3}", rest) and not rest.startswith(SESSIONS_OWN) else ""
+
+
+def texts_of(widget):
+    """Return every text of a widget that is seen or read out."""
+    yield from (widget.accessibleName(), widget.accessibleDescription(), widget.toolTip())
+    match widget:
+        case Shortened():
+            pass  # its name is the whole of it
+        case QLabel() | QAbstractButton():
+            yield widget.text()
+        case QLineEdit():
+            yield widget.placeholderText()
+        case QComboBox():
+            yield from (widget.itemText(at) for at in range(widget.count()))
+        case QTabWidget():
+            yield from (widget.tabText(at) for at in range(widget.count()))
+        case QMenu():
+            yield from (action.text() for action in widget.actions())
+        case QListWidget():
+            yield from (widget.item(at).text() for at in range(widget.count()))
+        case QTableView() if widget.accessibleName() != translated(MODELS_OWN):
+            model = widget.model()
+            yield from (str(model.headerData(at, Qt.Orientation.Horizontal, 0)) for at in range(model.columnCount()))
+        case _:
+            pass
+
+
+def english_in(window):
+    found = set()
+    for widget in (window, *window.findChildren(QWidget)):
+        if not type(widget).__module__.startswith("PySide6") or not widget.objectName().startswith("qt_"):
+            found.update(text for text in texts_of(widget) if left_in_english(text))
+    return {text for text in found if not text.startswith("Scroll ")}  # Qt's own
+
+
+@pytest.fixture(scope="module", autouse=True)
+def marked_language(tmp_path_factory):
+    """A language that puts marks around each English text."""
+    folder = tmp_path_factory.mktemp("translations")
+    messages = (
+        f"<message><source>{escape(text)}</source><translation>{escape(translated(text))}</translation></message>"
+        for text in window_texts()
+    )
+    (folder / "experimenter_xx.ts").write_text(f"<TS><context>{''.join(messages)}</context></TS>", "utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(wording, "FOLDER", folder)
+        patch.setenv(VARIABLE, "xx")
+        translations.cache_clear()
+        yield
+    translations.cache_clear()
+
+
+def test_nothing_is_left_in_english_before_a_session(application, driver):
+    window = driver.window
+    window.page.subject.setText("P01")
+    window.act("keys")
+    window.act("preview")
+    application.processEvents()
+    preview = next(one for one in application.topLevelWidgets() if one.windowTitle().startswith("⟦daq-app · preview"))
+    assert english_in(window) == set()
+    assert english_in(preview) == set()
+    preview.close()
+    window.act("keys")
+
+
+@pytest.mark.slow
+def test_nothing_is_left_in_english_in_a_session_and_in_its_review(driver):
+    window = driver.window
+    window.page.subject.setText("P01")
+    window.page.simulated.setChecked(True)
+    found = set()
+
+    def looked(condition):
+        found.update(english_in(window))
+        return condition()
+
+    window.act("primary")
+    driver.until(lambda: driver.session is not None, "the session")
+    driver.until(lambda: looked(lambda: driver.session.sealing == "sealed"))
+    window.go_to("review")
+    analyst = window.rooms.analyst
+    driver.until(lambda: looked(lambda: analyst.state.stage == "predicted" and analyst.state.step is None))
+    assert found == set()
+
+
+def test_a_translation_with_other_braces_leaves_its_text_in_english(monkeypatch):
+    for wrong in ("Stich {zahl}", "Stich {0}", "Stich {number:q}", "Stich {number", "Stich {number.nothing}"):
+        monkeypatch.setattr(wording, "translations", lambda _context, _language, wrong=wrong: {"Take {number}": wrong})
+        assert tr("Take {number}", number=3) == "Take 3"
+
+
+def test_a_file_that_cannot_be_read_leaves_the_window_in_english(tmp_path, monkeypatch):
+    monkeypatch.setattr(wording, "FOLDER", tmp_path)
+    (tmp_path / "experimenter_yy.ts").write_text("<TS><context>")
+    assert translations(EXPERIMENTER, "yy") == {}
+
+
+def test_the_language_chosen_in_the_menu_is_that_of_the_next_start(driver):
+    window = driver.window
+    spoken = window.rooms._menus.languages
+    names = [action.text() for action in spoken.actions()]
+    assert names == ["English (en)", "Xx"] or len(names) == len(languages(EXPERIMENTER))
+    assert spoken.checkedAction() is spoken.actions()[-1]
+    spoken.actions()[0].trigger()
+    assert remembered.language() == "en"
+    spoken.actions()[-1].trigger()
+    assert remembered.language() == "xx"
+
+
+def test_a_process_that_is_started_speaks_the_language_of_the_environment(tmp_path):
+    (tmp_path / "experimenter_zz.ts").write_text(
+        "<TS><message><source>predicting</source><translation>voorspellen</translation></message></TS>"
+    )
+    code = (
+        "from pathlib import Path; from daq_app import wording;"
+        f"wording.FOLDER = Path({str(tmp_path)!r}); print(wording.tr('predicting'))"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code], env={VARIABLE: "zz"}, capture_output=True, text=True, check=True
+    )
+    assert said.stdout.strip() == "voorspellen"
