@@ -1,14 +1,16 @@
 """What the analyst's window asks of the work, and what the work says."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from daq_app.analyst.frame import Film, Finger
 from daq_app.analyst.raw import RawReadings
+from daq_app.wording import tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
 Edge = Literal["onset", "lift", "steady begin", "steady end"]
-EDGES: tuple[Edge, ...] = ("onset", "steady begin", "steady end", "lift")
+EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
 Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a predicted row
 
 
@@ -67,12 +69,13 @@ class Read:
     readings: RawReadings
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Compared:
     """Another session, analysed and predicted alike."""
 
     folder: str
     report: Report
+    fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])  # the settled ones
 
 
 @dataclass(frozen=True, slots=True)

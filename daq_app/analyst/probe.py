@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Frame, Parts
-from daq_app.wording import tr
+from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
-TISSUES = ("epidermis", "dermis", "fat", "bone")  # by the number of their region in the mesh
+TISSUES = tr_noop(("epidermis", "dermis", "fat", "bone"))  # by the number of their region in the mesh
 POINTS = 201  # along a line: finer than any element it crosses
 OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both triangles, whatever round-off says [-]
 
@@ -55,7 +55,7 @@ def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: flo
     triangle = int(triangles[0])
     if triangle < 0:
         return tr("{where} · no tissue", where=where)
-    return f"{field.words(float(values[0]))} · {where} · {TISSUES[int(parts.region[triangle])]}"
+    return f"{field.words(float(values[0]))} · {where} · {tr(TISSUES[int(parts.region[triangle])])}"
 
 
 def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:

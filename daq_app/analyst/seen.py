@@ -2,11 +2,11 @@
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
-from daq_app.analyst.frame import Frame
+from daq_app.analyst.frame import Finger, Frame
 from daq_app.analyst.shown import condition
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import tr, tr_noop
-from sessions.report.contents import PredictionFinding
+from sessions.report.contents import PredictionFinding, Report
 
 PHASES = {
     "pressing": tr_noop("pressing down"),
@@ -17,8 +17,11 @@ PHASES = {
 
 
 def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
-    """Return where the colours of all trials of a session begin and end."""
-    return automatic_range(field, () if state is None else (finger.frame for finger in state.fingers.values()))
+    """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
+    known = [] if state is None else [state.fingers]
+    if state is not None and state.compared is not None:
+        known.append(state.compared.fingers)
+    return automatic_range(field, (finger.frame for fingers in known for finger in fingers.values()))
 
 
 def shown_film(state: AnalystState) -> m.Filmed | None:
@@ -38,13 +41,13 @@ def finger_words(state: AnalystState | None) -> str:
     if state is None or row is None:
         return ""
     said = row.prediction
-    name = "stroke" if row.trial is None else tr("trial {trial}", trial=row.trial)
+    name = tr("stroke") if row.trial is None else tr("trial {trial}", trial=row.trial)
     if said is None:
         if state.halted:
             return tr("The finger of {name} was not solved: the work was stopped. 'Go on' solves it.", name=name)
         return tr("The finger of {name} is being solved.", name=name)
     if said.sed is None:
-        why = said.reasons.get("sed", "no reason is known")
+        why = said.reasons.get("sed", tr("no reason is known"))
         return tr("No settled finger. {why}", why=why)
     finger = state.fingers.get(row.key)
     parts = [
@@ -54,6 +57,30 @@ def finger_words(state: AnalystState | None) -> str:
     if finger is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)
+
+
+def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
+    """Return the other session's settled finger of the stimulus that is chosen, and what is said of it.
+
+    Of repetitions it is the one that came as early among its own; "" is said where no session is compared.
+    """
+    other, row = (None, None) if state is None else (state.compared, chosen(state))
+    if state is None or other is None or state.report is None or row is None or row.prediction is None:
+        return None, ""
+    mine, theirs = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
+    place = [said.stroke for said in mine].index(row.prediction.stroke)
+    found = theirs[place] if place < len(theirs) else None
+    finger = None if found is None else other.fingers.get((found.trial, found.stroke))
+    if found is None or found.sed is None or finger is None:
+        return None, tr("{session} has no answer to this stimulus.", session=other.report.session)
+    sed = f"SED {condition(other.report, found)} {1000.0 * found.sed:.3f} kPa"
+    return finger, " · ".join((other.report.session, sed, _contact_words(finger.frame)))
+
+
+def _of_stimulus(report: Report, of: PredictionFinding) -> list[PredictionFinding]:
+    """Return the predictions of one stimulus in the order of their strokes."""
+    alike = [p for p in report.predictions if (p.experiment, p.index) == (of.experiment, of.index)]
+    return sorted(alike, key=lambda said: said.stroke or 0)
 
 
 def film_words(film: m.Filmed | None, at: int | None = None) -> str:

@@ -60,7 +60,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
         ]
     if (said := row.prediction) is not None:
-        error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.1f} %"
+        error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.2g} %"
         told += [
             (
                 tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
+from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
 from daq_app.batch.derived import analysis_document, settings_kept
@@ -255,8 +256,15 @@ class Work:
         recording = _opened(folder)
         analysis = analyse(recording, settings_kept(recording))
         told = self.timed(tr("predicting {name}", name=folder.name))
-        self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told))
-        self._say(m.Compared(str(folder), self._other))
+        fingers: dict[m.Key, Finger] = {}
+
+        def answered(_number: int, row: TrialPrediction, way: Way | None) -> None:
+            if way is not None and row.prediction is not None:
+                finding = finding_of(row)
+                fingers[finding.trial, finding.stroke] = finger_of(row.prediction, self._sketch(way))
+
+        self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told, watch=answered))
+        self._say(m.Compared(str(folder), self._other, fingers))
 
     def _write(self, asked: m.Write) -> str:
         """Write the report, a picture or an export, and return where it is."""

@@ -27,8 +27,9 @@ from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import Shortened, button, choice, label, panel
+from daq_app.qt.remembered import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
-from daq_app.qt.tokens import GRID, Tokens, font_scale
+from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trials_column import TrialsColumn
 from daq_app.wording import tr
 from sessions.exchange import FORMATS
@@ -70,7 +71,7 @@ class AnalystWindow(QMainWindow):
         self.trials = TrialsColumn(tokens)
         self.stroke = StrokeColumn(tokens)
         self.stroke.replayed.connect(self._replay_next)
-        self.model = ModelColumn(tokens, font_scale())
+        self.model = ModelColumn(tokens, type_scale())
         self.model.other_wanted.connect(self._choose_other)
         self.model.said.connect(self._say)
         for column in (self.trials, self.stroke, self.model):
@@ -148,7 +149,7 @@ class AnalystWindow(QMainWindow):
         super().resizeEvent(event)
         self._place_columns()
         if self.keys is not None:
-            self.keys.fit(self.size(), font_scale())
+            self.keys.fit(self.size(), type_scale())
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
@@ -159,7 +160,7 @@ class AnalystWindow(QMainWindow):
     def _show_keys(self) -> None:
         if self.keys is None:
             self.keys = KeysPage(self, ANALYST_KEYS)
-        self.keys.fit(self.size(), font_scale())
+        self.keys.fit(self.size(), type_scale())
         self.keys.setVisible(not self.keys.isVisible())
         self.keys.raise_()
 
@@ -236,6 +237,7 @@ class AnalystWindow(QMainWindow):
         self.way.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
+        self._place_columns()
 
     def _named(self) -> tuple[tuple[str, QWidget], ...]:
         return (tr("Trials"), self.trials), (tr("Stroke"), self.stroke), (tr("Model"), self.model)
@@ -273,9 +275,9 @@ class AnalystWindow(QMainWindow):
     def _placed(self) -> QWidget:
         foot = QHBoxLayout()
         foot.addWidget(self._words, 1)
-        self.progress.setFixedWidth(140)
+        self.progress.setFixedWidth(round(140 * type_scale()))
         self.format.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.format.setFixedWidth(90)
+        self.format.setFixedWidth(round(90 * type_scale()))
         for part in (self.progress, self.stop, self.go_on, self.report, self.format, self.export):
             foot.addWidget(part)
         top = QHBoxLayout()

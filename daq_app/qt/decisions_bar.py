@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.qt.parts import Wrapped, button, label
+from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr
 
@@ -24,7 +25,7 @@ class DecisionsBar(QWidget):
         self.by = QLineEdit(str(QSettings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)
         self.by.setAccessibleName(tr("code of who decides; never a name"))
-        self.by.setMaximumWidth(110)
+        self.by.setMaximumWidth(round(110 * type_scale()))
         self.by.editingFinished.connect(lambda: QSettings().setValue(BY, self.by.text()))
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)

@@ -25,7 +25,7 @@ class EdgeHandle(QPushButton):
         self._time, self._origin = 0.0, 0.0
         self.setAutoDefault(False)
         self.setProperty("role", "handle")
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.show_edge(None, 0.0)
 
     def show_edge(self, placed: Placed | None, origin: float) -> None:

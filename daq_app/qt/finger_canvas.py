@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import (
     QBrush,
     QColor,
@@ -48,29 +48,42 @@ ARROWS = {
 }
 
 
+class Sight(QObject):
+    """Which part of the finger is looked at, and the line over it; canvases of one size share it."""
+
+    changed = Signal()
+    cut = Signal()  # a line was drawn or taken away
+    pointed = Signal(object)  # place under the pointer (x, y) [mm]; None where it left
+
+    def __init__(self) -> None:
+        """Look at all of it."""
+        super().__init__()
+        self.view: View | None = None  # None: all of it
+        self.line: Line | None = None
+        self.draws_line = False  # the mouse draws a line in place of moving the picture
+        self.lines = 2.2  # of words over each finger
+
+
 class FingerCanvas(QWidget):
     """A picture of one frame."""
 
-    probed = Signal(str)  # what is under the pointer; "" where it left
-    cut = Signal()  # a line was drawn or taken away
-
-    def __init__(self, tokens: Tokens, scale: float) -> None:
-        """Show nothing yet."""
+    def __init__(self, tokens: Tokens, scale: float, sight: Sight | None = None) -> None:
+        """Show nothing yet; canvases with the same `sight` move together."""
         super().__init__()
+        self.sight = sight or Sight()
+        self.sight.changed.connect(self._renew)
         self._tokens, self._scale = tokens, scale
         self._frame: Frame | None = None
         self._parts = NO_PARTS
         self._look = Look(FIELD_CHOICES[0], (0.0, 1.0))
         self._words = ""
         self._kept: QPixmap | None = None
-        self._view: View | None = None  # None: all of it
+        self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
         self._pointer: QPointF | None = None
         self._held: QPointF | None = None  # where a button was pressed, or moved to since
         self._drawing = False  # what is held is the end of a line
-        self.draws_line = False  # the mouse draws a line in place of moving the picture
-        self.line: Line | None = None
         self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
-        self.setMinimumSize(160, 160)
+        self.setMinimumSize(80, round(160 * scale))  # two stand beside each other
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
@@ -82,28 +95,33 @@ class FingerCanvas(QWidget):
         )
         self.setAccessibleName(tr("finger of the model: none"))
 
-    def show_frame(self, frame: Frame | None, parts: Parts, words: str, look: Look) -> None:
-        """Show a state, and how; what was moved or zoomed stays so."""
-        if frame is self._frame and (words, look) == (self._words, self._look):
+    def show_frame(
+        self, frame: Frame | None, parts: Parts, words: str, look: Look, linked: tuple[Frame, ...] = ()
+    ) -> None:
+        """Show a state, and how; what was moved or zoomed stays so. Frames that are `linked` with it fit in too."""
+        fits = linked or (() if frame is None else (frame,))
+        if frame is self._frame and fits == self._fits and (words, look) == (self._words, self._look):
             return
         if look.near != self._look.near:
-            self._view = None
-        self._frame, self._parts, self._words, self._look = frame, parts, words, look
+            self.sight.view = None
+        self._frame, self._parts, self._words, self._look, self._fits = frame, parts, words, look, fits
         self.setAccessibleName(words or tr("finger of the model: none"))
         self._renew()
         self._probe()
 
     def view(self) -> View | None:
         """Return what is shown, or None without a finger."""
-        if self._view is not None or self._frame is None:
-            return self._view
-        box = self._box()
-        return View.fitted(whole_box(self._frame, self._look), box.left(), box.top(), box.width(), box.height())
+        if self.sight.view is not None or not self._fits:
+            return self.sight.view
+        box, boxes = self._box(), np.array([whole_box(frame, self._look) for frame in self._fits])
+        left, below = boxes.min(axis=0)[[0, 2]].tolist()
+        right, above = boxes.max(axis=0)[[1, 3]].tolist()
+        return View.fitted((left, right, below, above), box.left(), box.top(), box.width(), box.height())
 
     def show_view(self, view: View | None) -> None:
         """Show a part of the finger; None shows all of it."""
-        self._view = view
-        self._renew()
+        self.sight.view = view
+        self.sight.changed.emit()
 
     def zoom(self, factor: float, at: QPointF | None = None) -> None:
         """Show the finger `factor` times as large; what is at a pixel stays there, at first the middle."""
@@ -113,9 +131,13 @@ class FingerCanvas(QWidget):
 
     def set_line(self, line: Line | None) -> None:
         """Draw a line [mm], or none."""
-        self.line = line
-        self._renew()
-        self.cut.emit()
+        self.sight.line = line
+        self.sight.changed.emit()
+        self.sight.cut.emit()
+
+    def words_at(self, place: tuple[float, float]) -> str:
+        """Return what is at a place [mm]; "" without a finger."""
+        return "" if self._frame is None else probe_words(self._frame, self._parts, self._look.field, *place)
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
         """Zoom about the pointer."""
@@ -129,7 +151,7 @@ class FingerCanvas(QWidget):
             event.ignore()
             return
         self._held = event.position()
-        self._drawing = self.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        self._drawing = self.sight.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
         if self._drawing:
             place = view.place(self._held.x(), self._held.y())
             self.set_line((place, place))
@@ -139,8 +161,8 @@ class FingerCanvas(QWidget):
         view, at = self.view(), event.position()
         if view is None or self._frame is None:
             return
-        if self._held is not None and self._drawing and self.line is not None:
-            self.set_line((self.line[0], view.place(at.x(), at.y())))
+        if self._held is not None and self._drawing and self.sight.line is not None:
+            self.set_line((self.sight.line[0], view.place(at.x(), at.y())))
         elif self._held is not None:
             self.show_view(view.moved(at.x() - self._held.x(), at.y() - self._held.y()))
             self._held = at
@@ -151,7 +173,7 @@ class FingerCanvas(QWidget):
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Let go; a line without a length is taken away."""
         self._held = None
-        if self.line is not None and self.line[0] == self.line[1]:
+        if self.sight.line is not None and self.sight.line[0] == self.sight.line[1]:
             self.set_line(None)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
@@ -174,7 +196,7 @@ class FingerCanvas(QWidget):
             self.zoom(1.0 / ZOOM)
         elif key == Qt.Key.Key_Home:
             self.show_view(None)
-        elif key == Qt.Key.Key_Delete and self.line is not None:
+        elif key == Qt.Key.Key_Delete and self.sight.line is not None:
             self.set_line(None)
         elif key in ARROWS and view is not None and event.modifiers() & LINE_KEYS:
             self._move_end(view, key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
@@ -187,7 +209,7 @@ class FingerCanvas(QWidget):
     def _move_end(self, view: View, key: int, *, begins: bool) -> None:
         """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
         middle = self._box().center()
-        line = self.line or (view.place(middle.x(), middle.y()),) * 2
+        line = self.sight.line or (view.place(middle.x(), middle.y()),) * 2
         across, down = ARROWS[Qt.Key(key)]
         along = END_STEP * self.width() / view.per_mm
         x, y = line[0 if begins else 1]
@@ -238,20 +260,20 @@ class FingerCanvas(QWidget):
         self._paint(painter)
 
     def _probe(self) -> None:
-        """Say what is under the pointer."""
-        view, at, words = self.view(), self._pointer, ""
-        if self._frame is not None and view is not None and at is not None and self._box().contains(at):
-            words = probe_words(self._frame, self._parts, self._look.field, *view.place(at.x(), at.y()))
-        self.probed.emit(words)
+        """Say which place is under the pointer."""
+        view, at = self.view(), self._pointer
+        inside = view is not None and at is not None and self._box().contains(at)
+        self.sight.pointed.emit(view.place(at.x(), at.y()) if inside and view is not None and at is not None else None)
 
     def _renew(self) -> None:
         self._kept = None
         self.update()
 
     def _box(self) -> QRectF:
-        """Return where the finger is: under two lines of words, over the colours and their ticks."""
+        """Return where the finger is: under its lines of words, over the colours and their ticks."""
         line = self._line_height()
-        return QRectF(0, 2.2 * line, self.width(), max(self.height() - 4.7 * line, 1.0))
+        above = self.sight.lines * line
+        return QRectF(0, above, self.width(), max(self.height() - above - 2.5 * line, 1.0))
 
     def _line_height(self) -> float:
         metrics = QFontMetricsF(font(SMALL, self._scale))
@@ -260,13 +282,13 @@ class FingerCanvas(QWidget):
     def _paint(self, painter: QPainter) -> None:
         line = self._line_height()
         painter.setPen(QColor(self._tokens.quiet))
-        words = QRectF(4, 0, self.width() - 8, 2.2 * line)
+        words = QRectF(4, 0, self.width() - 8, self.sight.lines * line)
         painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
         view = self.view()
         if self._frame is None or view is None:
             return
         picture = FingerPainter(painter, self._tokens, view, self._box(), self._frame, self._parts)
-        picture.paint(self._look, self._shades[self._look.field.signed], self.line)
+        picture.paint(self._look, self._shades[self._look.field.signed], self.sight.line)
         self._paint_bar(painter, QRectF(8, self._box().bottom() + 4, self.width() - 16, 2.4 * line))
 
     def _paint_bar(self, painter: QPainter, box: QRectF) -> None:

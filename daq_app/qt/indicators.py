@@ -65,7 +65,7 @@ class LoadBar(Painted):
         super().__init__(tokens)
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
-        self.setAccessibleName(tr("load on {name}", name=name))
+        self.setAccessibleName(tr("load on {name}", name=tr(name)))
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(round(2.75 * GRID * scale))
 
@@ -85,7 +85,14 @@ class LoadBar(Painted):
         state = tr(", OVERLOAD") if bar.over else ""
         noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""
         self.setAccessibleName(
-            tr("load on {name}: {now}{peak}{state}{noise}", name=bar.name, now=now, peak=peak, state=state, noise=noise)
+            tr(
+                "load on {name}: {now}{peak}{state}{noise}",
+                name=tr(bar.name),
+                now=now,
+                peak=peak,
+                state=state,
+                noise=noise,
+            )
         )
         self.setToolTip(self.accessibleName())
         self.update()
@@ -100,7 +107,7 @@ class LoadBar(Painted):
         colour = QColor(t.wrong if bar.over else t.text)
         painter.setPen(colour)
         name = QRectF(0, 0, left - 4, self.height())
-        painter.drawText(name, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, bar.name)
+        painter.drawText(name, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, tr(bar.name))
         track = QRectF(left, self.height() / 2 - 5, max(self.width() - left - right - 4, 8), 10)
         painter.setPen(QPen(QColor(t.line), 1))
         painter.setBrush(QColor(t.raised))

@@ -168,7 +168,7 @@ class LivePlot(PaintedWidget):
         named = [curve for curve in self._curves if curve.named]
         several = len(named) > 1
         unit = self._name[self._name.index("[") :] if several else self._name
-        words = sum(4 + metrics.horizontalAdvance(f"{curve.channel}  ") for curve in named)
+        words = sum(4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ") for curve in named)
         room = (inside.width() - 6 - words - metrics.horizontalAdvance(unit)) / max(len(named), 1)
         sample = max(min(SAMPLE * self._type_scale, room), 0.0)
         for curve in named if several else ():
@@ -180,8 +180,8 @@ class LivePlot(PaintedWidget):
             middle = baseline - metrics.xHeight() / 2.0
             painter.drawLine(QPointF(x, middle), QPointF(end, middle))
             painter.setPen(QColor(self.tokens.quiet))
-            painter.drawText(QPointF(end + 4, baseline), curve.channel)
-            x = end + 4 + metrics.horizontalAdvance(f"{curve.channel}  ")
+            painter.drawText(QPointF(end + 4, baseline), tr(curve.channel))
+            x = end + 4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ")
         painter.setPen(QColor(self.tokens.quiet))
         painter.drawText(QPointF(x, baseline), unit)
 

@@ -5,9 +5,9 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 
-from PySide6.QtCore import QUrl, qVersion
+from PySide6.QtCore import Qt, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
-from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QToolButton
+from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QToolButton, QWidget
 
 from daq_app.qt import remembered
 from daq_app.qt.keys import KEYS
@@ -126,7 +126,14 @@ class Menus:
             self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
 
     def _about(self) -> None:
-        QMessageBox.about(self._window, tr("About daq-app"), about_words())
+        about_box(self._window).show()
+
+
+def about_box(parent: QWidget) -> QMessageBox:
+    """Return a box with the versions, which goes when it is closed."""
+    box = QMessageBox(QMessageBox.Icon.NoIcon, tr("About daq-app"), about_words(), parent=parent)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    return box
 
 
 def about_words() -> str:

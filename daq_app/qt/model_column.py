@@ -1,15 +1,16 @@
 """What the model says of the chosen trial: its finger, its history, the pictures of the session, another session."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.field_list import automatic_range
-from daq_app.analyst.seen import common_range, film_words, finger_words, shown_film, was_tried
+from daq_app.analyst.frame import Finger
+from daq_app.analyst.seen import common_range, film_words, finger_words, other_finger, shown_film, was_tried
 from daq_app.analyst.shown import scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
@@ -21,7 +22,7 @@ from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
 from daq_app.qt.parts import Shortened, Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import Tokens
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr
 from solver.quantities import SED
@@ -47,17 +48,22 @@ class ModelColumn(QWidget):
         self._followed: tuple[m.Key, int] | None = None  # solve without an answer that was asked after, and version
         self._at: int | None = None  # of the film; None: the settled state
         self.finger = FingerCanvas(tokens, scale)
+        self.other = FingerCanvas(tokens, scale, self.finger.sight)  # of the session that is compared
+        self.other.hide()
         self.fields, self.plot, self.probe = FieldBar(), FieldPlot(tokens), Shortened("quiet")
         self.fields.changed.connect(self._paint)
         self.plot.changed.connect(self._paint)
         self.plot.draw.toggled.connect(self._draw_line)
-        self.finger.probed.connect(self.probe.show_whole)
-        self.finger.cut.connect(self._cut)
+        self.finger.sight.pointed.connect(self._probe)
+        self.finger.sight.cut.connect(self._cut)
         self.near = button(tr("Contact"), tr("show the contact alone, with its tractions"), self._paint, "small")
         self.mesh = button(tr("Mesh"), tr("show the mesh"), self._paint, "small")
-        for made in (self.near, self.mesh):
+        self.both = button(
+            tr("Both"), tr("show the finger of the compared session beside this one"), self._paint, "small"
+        )
+        self.both.hide()
+        for made in (self.near, self.mesh, self.both):
             made.setCheckable(True)
-            made.setMinimumWidth(made.sizeHint().width() + 2 * GRID)  # bold while it is on
         self.history = button(tr("History"), tr("show the finger from first touch on"), self._ask_history, "small")
         self.film = button(tr("Film"), tr("save the history as a film, GIF or MP4"), self._ask_film, "small")
         self._filming = False
@@ -105,6 +111,7 @@ class ModelColumn(QWidget):
         self._ask_where(state, film)
         drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
+        self.both.setVisible(state.compared is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
@@ -119,6 +126,8 @@ class ModelColumn(QWidget):
     def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
         assert state.report is not None  # nothing is compared before this session is open
         self.compared.show_rows(compared(state.report, other.report), (state.report.session, other.report.session))
+        self.both.setChecked(True)
+        self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
         self.asked.emit(m.Draw(PICTURE))
 
@@ -155,34 +164,45 @@ class ModelColumn(QWidget):
         row = None if state is None else chosen(state)
         film, at = self._film, self._at
         if film is not None and at is not None:
-            frame, parts, arcs, words = film.film.frames[at], film.film.parts, film.film.arcs, film_words(film, at)
+            finger, words = Finger(film.film.parts, film.film.frames[at], film.film.arcs), film_words(film, at)
         else:
             finger = None if state is None or row is None else state.fingers.get(row.key)
             words = finger_words(state)
-            frame = None if finger is None else finger.frame
-            parts, arcs = (NO_PARTS, np.empty(0)) if finger is None else (finger.parts, finger.arcs)
+        other, other_words = other_finger(state) if self.both.isChecked() else (None, "")
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
         field = self.fields.field
-        frames = tuple(film.film.frames) if film is not None and self._filming else () if frame is None else (frame,)
+        shown = tuple(one.frame for one in (finger, other) if one is not None)
+        frames = tuple(film.film.frames) if film is not None and self._filming else shown
         own = automatic_range(field, frames)  # of a film that is written: the same for all of it
         common = common_range(state, field)
         ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
         look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
-        self.finger.show_frame(frame, parts, words, look)
-        self.plot.show_field(frame, parts, arcs, field, self.finger.line)
+        pair = ((self.finger, finger, f"A  {words}"), (self.other, other, f"B  {other_words}"))
+        for canvas, one, said in pair if other_words else ((self.finger, finger, words),):
+            frame, parts = (None, NO_PARTS) if one is None else (one.frame, one.parts)
+            canvas.show_frame(frame, parts, said, look if canvas is self.finger else replace(look, lost=None), shown)
+        self.finger.sight.lines = 3.2 if other_words else 2.2
+        self.other.setVisible(bool(other_words))
+        self.plot.show_field((finger, other) if other_words else (finger,), field, self.finger.sight.line)
         self._name_saves()
 
     def _draw_line(self) -> None:
         """Let the mouse draw a line, and plot along it."""
-        self.finger.draws_line = self.plot.draw.isChecked()
-        if self.finger.draws_line:
+        self.finger.sight.draws_line = self.plot.draw.isChecked()
+        if self.finger.sight.draws_line:
             self.plot.source.setCurrentIndex(LINE)
 
     def _cut(self) -> None:
         """Plot along the line that was just drawn."""
-        if self.finger.line is not None:
+        if self.finger.sight.line is not None:
             self.plot.source.setCurrentIndex(LINE)
         self._paint()
+
+    def _probe(self, place: tuple[float, float] | None) -> None:
+        """Say what both fingers have at a place [mm]."""
+        canvases = [self.finger, *([self.other] if self.other.isVisible() else [])]
+        said = [] if place is None else [canvas.words_at(place) for canvas in canvases]
+        self.probe.show_whole("  |  ".join(filter(None, said)))
 
     def _moved(self, at: int) -> None:
         self._at = at
@@ -261,7 +281,7 @@ class ModelColumn(QWidget):
     def _finger_page(self) -> QWidget:
         page = QWidget()
         bar = QHBoxLayout()
-        for part in (self.near, self.mesh, self.history):
+        for part in (self.near, self.mesh, self.both, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
         course = QHBoxLayout()
@@ -270,7 +290,10 @@ class ModelColumn(QWidget):
         layout = QVBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.fields)
-        layout.addWidget(self.finger, 3)
+        fingers = QHBoxLayout()
+        fingers.addWidget(self.finger, 1)
+        fingers.addWidget(self.other, 1)
+        layout.addLayout(fingers, 3)
         layout.addWidget(self.probe)
         layout.addWidget(self.plot, 1)
         layout.addWidget(self.why)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtGui import QFont
+from PySide6.QtGui import QFont, QShowEvent
 from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from daq_app.analyst.raw import RawReadings
@@ -45,6 +45,7 @@ class ReadingsTable(QWidget):
         self._model.show_readings(readings, steady)
         if readings is None:
             self.place.show_text(tr("Not read yet."))
+            self._fit_columns()
             return
         self.place.show_text(
             tr(
@@ -59,12 +60,17 @@ class ReadingsTable(QWidget):
     def _fit_columns(self) -> None:
         """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
         model, count = self._model, self._model.rowCount()
-        metrics = self.table.fontMetrics()
+        metrics, heads = self.table.fontMetrics(), self.table.horizontalHeader().fontMetrics()
         for column in range(model.columnCount()):
-            texts = [model.headerData(column, Qt.Orientation.Horizontal)]
-            texts += [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
-            widest = max(metrics.horizontalAdvance(str(text)) for text in texts)
+            head = heads.horizontalAdvance(str(model.headerData(column, Qt.Orientation.Horizontal)))
+            texts = [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
+            widest = max(head, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
             self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+        """Fit the columns to the type, which is known by now."""
+        super().showEvent(event)
+        self._fit_columns()
 
     def go_to(self, row: int) -> None:
         """Show one reading."""

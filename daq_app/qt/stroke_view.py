@@ -13,7 +13,8 @@ from daq_app.analyst.messages import EDGES, Edge
 from daq_app.analyst.probe import read_out
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.edge_handle import EdgeHandle
-from daq_app.qt.tokens import GRID, MU, N, T, Tokens
+from daq_app.qt.remembered import type_scale
+from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
@@ -188,9 +189,11 @@ class StrokeView(QWidget):
             angle=90,
             movable=True,
             hoverPen=pg.mkPen(self._tokens.text, width=3),
-            label=edge if first else None,
+            label=tr(edge) if first else None,
             labelOpts=options if first else None,
         )
+        if first:
+            line.label.setFont(font(SMALL, type_scale()))
         line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
         line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))
         plot.addItem(line, ignoreBounds=True)

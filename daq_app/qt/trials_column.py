@@ -36,7 +36,7 @@ class TrialsColumn(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(label(tr("Trials"), "section"))
         layout.addWidget(self.list, 3)
-        layout.addWidget(label(tr("Prediction against score"), "section"))
+        layout.addWidget(label(tr("SED at the plan's depth [kPa]"), "section"))
         layout.addWidget(self.relation, 2)
 
     def show_state(self, state: AnalystState) -> None:
@@ -80,7 +80,6 @@ class TrialsColumn(QWidget):
         plot = ZoomedPlot(self._tokens)
         plot.setAccessibleName(tr("prediction against score: a point chooses its trial"))
         plot.setLabel("bottom", tr("mean score"))
-        plot.setLabel("left", tr("SED at the plan's depth [kPa]"))
         made = pg.ScatterPlotItem()
         made.sigClicked.connect(self._point_clicked)
         plot.addItem(made)

@@ -8,7 +8,8 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
 
 from daq_app.qt.parts import label
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.remembered import type_scale
+from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
@@ -24,7 +25,8 @@ class ZoomedPlot(pg.PlotWidget):
         """Show nothing yet."""
         base: Any = super()
         base.__init__(background=tokens.surface)
-        self.setMinimumSize(120, 100)
+        scale = type_scale()
+        self.setMinimumSize(120, round(100 + 160 * (scale - 1)))  # the axes take what the type needs
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setToolTip(tr("Wheel: zoom. Drag: move. Home or double-click: show all."))
         item: Any = self.getPlotItem()
@@ -38,7 +40,10 @@ class ZoomedPlot(pg.PlotWidget):
         self._hide_words()
         item.setMenuEnabled(False)
         item.hideButtons()
+        small = font(SMALL, scale)
         for side in ("left", "bottom"):
+            item.getAxis(side).setTickFont(small)
+            item.getAxis(side).setLabel(**{"font-size": f"{small.pixelSize()}px"})
             item.getAxis(side).setPen(QColor(tokens.line))
             item.getAxis(side).setTextPen(QColor(tokens.quiet))
             item.getAxis(side).enableAutoSIPrefix(False)

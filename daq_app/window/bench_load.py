@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from daq_app.wording import tr_noop
 from drivers.loads import ALARM, ALARM_COMBINED, WARNING, loads
 
 Array = NDArray[np.float64]
@@ -32,7 +33,7 @@ class Load:
     def over(self) -> tuple[str, ...]:
         """Return the names of what is beyond its rated load."""
         over = tuple(name for name, share in zip(AXES, self.axes, strict=True) if share > ALARM)
-        return (*over, "combined") if self.combined > ALARM_COMBINED else over
+        return (*over, tr_noop("combined")) if self.combined > ALARM_COMBINED else over
 
     @property
     def near(self) -> tuple[str, ...]:

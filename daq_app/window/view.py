@@ -110,7 +110,9 @@ def _banner(state: AppState) -> Banner | None:
     if running and state.heard is not None and state.now - state.heard > SILENT:
         return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
     if over := bench.peak.over:
-        words = tr("Overload on {axes}: take the load off and check the transducer.", axes=", ".join(over))
+        words = tr(
+            "Overload on {axes}: take the load off and check the transducer.", axes=", ".join(tr(axis) for axis in over)
+        )
         return Banner("wrong", words, tr("Acknowledge"), m.AcknowledgeOverloads())
     if state.failed is not None:
         return Banner("look", sentence(state.failed.sentence), tr("Dismiss"), Dismissed())

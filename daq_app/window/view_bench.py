@@ -125,7 +125,7 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
         said = ", ".join(bench.health.flagged)
         return "wrong", tr("invalid readings: {said}", said=said) if said else tr("invalid readings")
     if near := bench.peak.near:
-        return "look", tr("near the rated load: {axes}", axes=", ".join(near))
+        return "look", tr("near the rated load: {axes}", axes=", ".join(tr(axis) for axis in near))
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
     troubles += list(bench.health.flagged)

@@ -264,6 +264,16 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
     assert len(read(tmp_path / "session").lines) == 3
 
 
+def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
+    work, said = at_work
+    work.do(m.Compare(str(SESSION)))
+    other = said[-1].compared
+    answered = {(p.trial, p.stroke): p for p in other.report.predictions if p.sed is not None}
+    assert set(other.fingers) == set(answered) != set()
+    for key, finger in other.fingers.items():
+        np.testing.assert_allclose(finger.frame.row, [sed for _, sed in answered[key].row])
+
+
 def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
     work, said = at_work
     work.do(m.ShowReadings(1))

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, Q
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.field_list import FIELD_CHOICES
-from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
+from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
 from daq_app.analyst.seen import finger_words
@@ -343,7 +343,7 @@ def test_a_drag_moves_the_finger_and_the_next_step_of_its_history_leaves_it_ther
     assert (before.y - after.y) * before.per_mm == pytest.approx(20.0)
     QTest.keyClick(window.model.player, Qt.Key.Key_Left)
     assert canvas.view() == after
-    assert canvas.line is None
+    assert canvas.sight.line is None
 
 
 def test_a_line_is_drawn_moved_and_taken_away_by_keys(application, window):
@@ -353,11 +353,11 @@ def test_a_line_is_drawn_moved_and_taken_away_by_keys(application, window):
         press(Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
     press(Qt.Key.Key_Up, Qt.KeyboardModifier.ControlModifier)
     assert canvas.view() == view  # the picture stays where it is
-    (x, y), (to_x, to_y) = canvas.line
+    (x, y), (to_x, to_y) = canvas.sight.line
     assert (to_x - x) * view.per_mm == pytest.approx(5 * 0.02 * canvas.width())
     assert (y - to_y) * view.per_mm == pytest.approx(0.02 * canvas.width())
     QTest.keyClick(canvas, Qt.Key.Key_Delete)
-    assert canvas.line is None
+    assert canvas.sight.line is None
 
 
 def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_pointer(application, window):
@@ -378,7 +378,7 @@ def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_po
 def test_a_line_that_is_drawn_with_shift_plots_the_field_along_it(application, window):
     canvas, pixel = small_finger(application, window)
     drag(application, canvas, pixel(0.1, 0.3), pixel(0.6, 0.3), Qt.KeyboardModifier.ShiftModifier)
-    place, values = window.model.plot.values
+    ((place, values),) = window.model.plot.values
     assert place[-1] == pytest.approx(0.5, abs=2.0 / canvas.view().per_mm)
     np.testing.assert_allclose(values, 3.0)
     assert window.model.plot.plot.accessibleName() == "SED [kPa]: from A to B [mm]"
@@ -564,6 +564,63 @@ def test_a_second_session_is_shown_beside_the_first(window):
     assert len(table.texts()) == len({(p.experiment, p.index) for p in window.state.report.predictions})
     assert {line[3] for line in table.texts()} == {"+0.000"}
     assert m.Draw("compared") in window._work.asked
+
+
+def two_fingers(application, window, factor=1.5):
+    """Show the settled finger of the chosen trial beside one of another session with `factor` times its SED."""
+    row = chosen(window.state)
+    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    other = Finger(PARTS, frame(0.002 * factor), ARCS)
+    window.take(m.Compared("other", replace(example(), session="later"), {row.key: other}))
+    window.model.tabs.setCurrentIndex(0)
+    application.processEvents()
+    return window.model.finger, window.model.other
+
+
+def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(application, window):
+    first, second = two_fingers(application, window)
+    assert first.isVisible()
+    assert second.isVisible()
+    assert abs(first.width() - second.width()) <= 1
+    assert second.accessibleName().startswith("B  later")
+    wheel(application, second, QPoint(60, 90), 2)
+    assert first.view() == second.view()
+    assert first._look.range == second._look.range
+    drag(application, first, QPoint(60, 90), QPoint(90, 90), Qt.KeyboardModifier.ShiftModifier)
+    assert second.sight.line == first.sight.line is not None
+    window.model.both.click()
+    assert not second.isVisible()
+    first.set_line(None)
+    first.show_view(None)
+
+
+def test_the_pointer_over_one_finger_reads_both(application, window):
+    first, _ = two_fingers(application, window)
+    inside = QPointF(*first.view().placed(np.array([[0.2, 0.2]]))[0]).toPoint()
+    QTest.mouseMove(first, inside)
+    application.processEvents()
+    said = window.model.probe.accessibleName().split("  |  ")
+    assert [words.split(" · ")[0] for words in said] == ["SED 2 kPa", "SED 3 kPa"]
+
+
+def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
+    two_fingers(application, window)
+    plot = window.model.plot
+    plot.source.setCurrentIndex(0)
+    (_, own), (_, others) = plot.values
+    np.testing.assert_allclose(others, 1.5 * own)
+    assert plot._read(1.0) == "1.000 mm · A 2 kPa   1.000 mm · B 3 kPa"
+
+
+def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
+    row = chosen(window.state)
+    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    gone = row.prediction.experiment, row.prediction.index
+    rest = tuple(p for p in example().predictions if (p.experiment, p.index) != gone)
+    window.take(m.Compared("other", replace(example(), session="later", predictions=rest)))
+    window.model.tabs.setCurrentIndex(0)
+    application.processEvents()
+    assert window.model.other.accessibleName() == "B  later has no answer to this stimulus."
 
 
 def test_every_control_has_a_name_and_tab_reaches_it(window):

@@ -34,6 +34,7 @@ DATA = re.compile(
     r"|counts per unit read from|Ctrl|P01_\S*|<[^>]*>|&\w+;"
 )
 SESSIONS_OWN = ("SIMULATED: the transducer and",)  # sentences of a recording, which the report has too
+FOLDERS = "recent sessions"  # a list of names of folders
 MODELS_OWN = "scene and model"  # a table whose words are the report's
 
 
@@ -65,7 +66,7 @@ def texts_of(widget):
             yield from (widget.tabText(at) for at in range(widget.count()))
         case QMenu():
             yield from (action.text() for action in widget.actions())
-        case QListWidget():
+        case QListWidget() if widget.accessibleName() != translated(FOLDERS):
             yield from (widget.item(at).text() for at in range(widget.count()))
         case QTableView() if widget.accessibleName() != translated(MODELS_OWN):
             model = widget.model()

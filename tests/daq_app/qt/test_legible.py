@@ -21,17 +21,23 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt import tokens
+from daq_app.analyst import messages as m
+from daq_app.analyst.state import chosen
+from daq_app.qt import remembered, tokens
+from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.languages import translator
 from daq_app.qt.main_window import MainWindow
+from daq_app.qt.menus import about_box
 from daq_app.qt.parts import Shortened
 from daq_app.qt.subject_preview import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
+from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.window.messages import Judged
 from daq_app.window.new_session import SessionForm
 from daq_app.window.preview import preview
 from daq_app.window.view import derive_view
 from sessions.plan.protocols import protocol, protocol_names
+from tests.daq_app.qt.test_analyst_window import SESSION, Nobody, example, film
 from tests.daq_app.qt.test_window_for_everybody import contrast
 from tests.daq_app.session_messages import BAD, CLOSING, MOUNT, PAUSED, SCORE, after
 
@@ -40,6 +46,7 @@ PACE = 1.0  # no test here waits for a session
 SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
 SCALES = [1.0, 1.5, 2.0]
 ROUNDING = 2  # by which Qt's own size of a button may fall short of its text; its padding is wider [px]
+QUICK_SIZES = [(SCREENS[0], SCALES[0]), (SCREENS[0], SCALES[-1])]
 QUICK = [(SCREENS[0], SCALES[0], False), (SCREENS[0], SCALES[-1], True)]  # where a text has least room
 
 
@@ -223,6 +230,58 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
         settle(driver.application)
         assert cut_off(window) == []
         assert (window.width(), window.height()) == size
+
+
+@pytest.fixture
+def type_size():
+    """Return what chooses a size of type; the usual one comes back."""
+    yield remembered.choose_type_scale
+    remembered.choose_type_scale(None)
+
+
+@pytest.mark.parametrize(
+    ("size", "scale"),
+    [
+        pytest.param(size, scale, marks=[] if (size, scale) in QUICK_SIZES else pytest.mark.slow)
+        for size in SCREENS
+        for scale in SCALES
+    ],
+)
+def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, scale):
+    type_size(scale)
+    window = AnalystWindow(SESSION, tokens.LIGHT, Nobody())
+    window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
+    window.resize(*size)
+    window.show()
+    window.take(m.Found("predicted", example()))
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.take(m.Compared("other", example()))
+    about = about_box(window)
+    about.show()
+    for column in range(3):
+        window._go_to(column)
+        for at in range(4 if column == 2 else 3 if column == 1 else 1):
+            tabs = {1: window.stroke.tabs, 2: window.model.tabs}.get(column)
+            if tabs is not None:
+                tabs.setCurrentIndex(at)
+            settle(application)
+            assert cut_off(window) == []
+            assert cut_axes(window) == []
+    assert cut_off(about) == []
+    about.close()
+    window.close()
+
+
+def cut_axes(window):
+    """Return every name of an axis that is longer than its axis."""
+    found = []
+    for plot in window.findChildren(ZoomedPlot):
+        for side in ("left", "bottom") if plot.isVisible() else ():
+            axis = plot.getPlotItem().getAxis(side)
+            room = axis.size().height() if side == "left" else axis.size().width()
+            if axis.label.isVisible() and axis.label.boundingRect().width() > room + ROUNDING:
+                found.append((axis.labelText, axis.label.boundingRect().width(), room))
+    return found
 
 
 @pytest.mark.parametrize("language", ["en", "de", "fr", "ja", "ar"])
