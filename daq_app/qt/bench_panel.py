@@ -60,7 +60,7 @@ class BenchPanel(QFrame):
         self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
         self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
         self.search = button(tr("Search"), tr("search for transducers"), search)
-        self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self._connect)
+        self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_chosen)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
         self.acknowledge = button(
             tr("Acknowledge A"), tr("acknowledge overloads: begin to watch anew"), lambda: send(AcknowledgeOverloads())
@@ -115,7 +115,8 @@ class BenchPanel(QFrame):
         for bar in self._bars.values():
             bar.set_tokens(tokens)
 
-    def _connect(self) -> None:
+    def connect_chosen(self) -> None:
+        """Connect what is chosen or typed, or disconnect what is connected."""
         view = self._view
         if view is not None and view.connect is not None:
             self._send(view.connect)
@@ -123,7 +124,7 @@ class BenchPanel(QFrame):
             self._send(Connect(uri))
 
     def _typed(self) -> None:
-        self._connect()
+        self.connect_chosen()
         self._leave()
 
     def _leave(self) -> None:

@@ -7,6 +7,7 @@ from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
+from daq_app.qt.languages import name_of
 from daq_app.qt.parts import Shortened, button, label, regrade, say
 from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.window.messages import Message
@@ -16,10 +17,10 @@ from daq_app.wording import tr
 
 
 class Header(QWidget):
-    """Whose session it is, whether anything is simulated, and whether it is being recorded."""
+    """Whose session it is, by which device and in which language, and whether it is simulated and being recorded."""
 
-    def __init__(self, tokens: Tokens, scale: float, subject: Callable[[], None], keys: Callable[[], None]) -> None:
-        """Show no session; `subject` and `keys` show the subject's window and the keys."""
+    def __init__(self, tokens: Tokens, scale: float) -> None:
+        """Show no session."""
         super().__init__()
         self._heading = Shortened("title")
         self._simulated = label(tr("SIMULATED"), "simulated")
@@ -37,16 +38,16 @@ class Header(QWidget):
         layout.addWidget(self._lamp)
         layout.addWidget(self._words)
         layout.addWidget(self._saved)
-        layout.addWidget(button(tr("Subject  F6"), tr("show the subject's window"), subject))
-        layout.addWidget(button(tr("Keys  F1"), tr("show the keys of this window"), keys))
-        self._device = Shortened("quiet")
+        self._device, self._language = Shortened("quiet"), label("", "quiet")
         layout.insertWidget(1, self._device, 2)
+        layout.insertWidget(2, self._language)
         self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
 
     def show_view(self, view: View) -> None:
         """Show the top line."""
         self._heading.show_whole(view.heading)
         self._device.show_whole(f"{view.bench.name}: {view.bench.lamp_words}")
+        say(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
         self._simulated.setAccessibleName(view.simulated or tr("nothing is simulated"))

@@ -35,7 +35,7 @@ from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tablet_screen import TabletScreen
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
-from daq_app.window.checklist import headline
+from daq_app.window.checklist import first_missing, headline
 from daq_app.window.messages import Message, NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
@@ -68,7 +68,7 @@ class MainWindow(QMainWindow):
         self._tokens = tokens
         self._close_asked = -LEAVING
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
-        self.header = Header(tokens, scale, self.show_subject, self._show_keys)
+        self.header = Header(tokens, scale)
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
@@ -183,6 +183,7 @@ class MainWindow(QMainWindow):
             "pause": lambda: self.course.isVisible() and self.course.pause.click(),
             "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
+            "connect": self.bench.connect_chosen,
             "acknowledge": lambda: self.bridge.view.bench.can_acknowledge and self.bridge.send(AcknowledgeOverloads()),
             "hold": self.live.toggle_hold,
             "model": self.live.toggle_finite,
@@ -265,8 +266,11 @@ class MainWindow(QMainWindow):
             return
         bench = bench_of(self.bridge.state.bench)
         cards = self.page.check(bench, anew=True)
-        if all(card.ready for card in cards):
+        missing = first_missing(cards)
+        if missing is None:
             self._begin(self.page.form(), bench)
+        elif missing.field == "forces" and self.bridge.view.bench.lamp == "off":
+            self.bench.connect_chosen()
         else:
             self._form_changed()
             self.page.go_to_missing()
@@ -300,7 +304,11 @@ class MainWindow(QMainWindow):
         self.page.show_bench(bench)
         cards = self.page.check(bench)
         ready = all(card.ready for card in cards)
-        self.to_do.show_what(headline(cards, self.page.subject.text()), Button(tr("Start"), "Enter", ready), 0)
+        view, missing = self.bridge.view.bench, first_missing(cards)
+        self.page.transducer.show_view(view)
+        connects = missing is not None and missing.field == "forces" and view.lamp == "off"
+        primary = Button(tr("Connect"), "Enter") if connects else Button(tr("Start"), "Enter", ready)
+        self.to_do.show_what(headline(cards, self.page.subject.text()), primary, 0)
 
     def _turn(self, page: int) -> None:
         """Show the page of a new session (0) or the course (1); keys go where they are of use there."""

@@ -1,4 +1,4 @@
-"""The menu of the window. Every entry is an act that a key or button does too; none is found here alone."""
+"""The menu of the window. Every entry but looks and help is an act that a key or button does too."""
 
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version

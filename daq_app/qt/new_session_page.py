@@ -26,6 +26,7 @@ from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled,
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
+from daq_app.qt.transducer_row import TransducerRow
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import LanguageChosen, Message
 from daq_app.window.new_session import (
@@ -101,6 +102,7 @@ class NewSessionPage(QFrame):
                 made.setAccessibleName(made.text())
                 made.setMinimumHeight(TARGET - GRID)
             pair[chosen].setChecked(True)
+        self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
         self._line_words = ""  # how far the length of the subject's line is known
         self._tablet_missing = ""  # why the subject's page is on no tablet, where it should be
@@ -369,7 +371,8 @@ class NewSessionPage(QFrame):
         field(layout, tr("Answering hand"), self.answering)
 
     def _build_recorded(self, layout: QVBoxLayout) -> None:
-        """Lay out what is recorded, and what the analysis must know of the face."""
+        """Lay out the transducer, what is recorded, and what the analysis must know of the face."""
+        layout.addWidget(self.transducer)
         layout.addWidget(self.with_forces)
         layout.addWidget(self.scores_only)
         of_height = QVBoxLayout(self._height)

@@ -44,10 +44,15 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
     return tuple(made)
 
 
+def first_missing(cards: tuple[Card, ...]) -> Card | None:
+    """Return the card that comes next: without a transducer that one, else the first that is not ready."""
+    missing = [card for card in cards if not card.ready]
+    return next((card for card in missing if card.field == "forces"), missing[0] if missing else None)
+
+
 def headline(cards: tuple[Card, ...], subject: str) -> str:
     """Return the one sentence that says what to do next."""
-    missing = [card for card in cards if not card.ready]
-    first = next((card for card in missing if card.field == "forces"), missing[0] if missing else None)
+    first = first_missing(cards)
     match first:
         case None:
             return tr("Press Enter to start the session of {subject}.", subject=subject.strip())

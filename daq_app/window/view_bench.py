@@ -8,7 +8,7 @@ from daq_app.recorder import messages as m
 from daq_app.window.bench_load import AXES
 from daq_app.window.bench_state import BenchState
 from daq_app.window.messages import Message
-from daq_app.window.view_life import life_rows
+from daq_app.window.view_life import greatest, life_rows
 from daq_app.wording import tr
 
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
@@ -61,6 +61,7 @@ class BenchView:
     bars: tuple[Bar, ...]
     tare: str  # its figures
     drift: str
+    noise: str  # of the zero: that of the loudest force and torque
     life: tuple[tuple[str, str], ...]  # of its serial number
     devices: tuple[DeviceRow, ...]
     searching: bool
@@ -69,6 +70,25 @@ class BenchView:
     connect: Message | None  # what Disconnect or Connect would send; None while neither is possible
     can_tare: bool
     can_acknowledge: bool
+
+
+def bench_summary(view: BenchView) -> str:
+    """Return what the card of the transducer says: which it is, its zero, noise and life.
+
+    One that is not connected has its name alone.
+    """
+    if view.lamp == "off":
+        return f"{view.name}: {view.lamp_words}."
+    zero = view.tare.rsplit("\n", 1)[-1]
+    life = ", ".join(f"{tr(name)} {text}" for name, text in view.life if text != "–") or "–"
+    return "\n".join(
+        (
+            f"{view.name}: {view.lamp_words}.",
+            tr("Zero: {zero}.", zero=zero),
+            tr("Noise: {noise}.", noise=view.noise),
+            tr("Life: {life}.", life=life),
+        )
+    )
 
 
 def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
@@ -80,7 +100,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
     return BenchView(
         lamp=lamp,
         lamp_words=words,
-        name="no transducer" if info is None else info.model,
+        name=tr("no transducer") if info is None else info.model,
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
@@ -88,6 +108,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench) if noted else "–",
+        noise=greatest(bench.zero.noise) if bench.zero is not None else "–",
         life=life_rows(info, bench.life),
         devices=_devices(bench),
         searching=bench.searching,

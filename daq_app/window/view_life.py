@@ -20,8 +20,8 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
         return tuple(zip(NAMES, (why, "–", "–", overloads), strict=True))
     told = (
         tr("{count} since {since}", count=life.zeros, since=life.since),
-        "–" if life.zeros == 1 else tr("{drift} since the first", drift=_greatest(life.drift)),
-        tr("{noise} usually", noise=_greatest(life.noise)),
+        "–" if life.zeros == 1 else tr("{drift} since the first", drift=greatest(life.drift)),
+        tr("{noise} usually", noise=greatest(life.noise)),
         _overloads(life),
     )
     return tuple(zip(NAMES, told, strict=True))
@@ -33,7 +33,7 @@ def _overloads(life: Life) -> str:
     )
 
 
-def _greatest(six: tuple[float, ...]) -> str:
+def greatest(six: tuple[float, ...]) -> str:
     """Return the greatest force and the greatest torque of six."""
     force, torque = max(map(abs, six[:3])), max(map(abs, six[3:]))
     return f"{1000 * force:.2g} mN, {torque:.2g} N mm"

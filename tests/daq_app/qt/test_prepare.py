@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QLabel
 
 from daq_app.qt.free_answers import NumberField
 from daq_app.recorder.messages import Connect, Disconnect
@@ -43,6 +44,33 @@ def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
     finally:
         window.bridge.send(Connect("sim:?rate=200"))
         driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+
+
+def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_connects_it(driver):
+    window, row = driver.window, driver.window.page.transducer
+    window.act("tare")
+    driver.until(lambda: driver.state.bench.zero is not None and not driver.state.bench.taring, "a zero")
+    zero = driver.state.bench.zero
+    said = row.words.text().split("\n")
+    assert said[0] == "SIMULATED Net F/T SI-36-0.5: nothing lost."
+    assert said[1] == f"Zero: {zero.readings} readings in {zero.duration:.1f} s."
+    assert said[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
+    assert said[3].startswith("Life: ")
+    row.connect_button.click()
+    driver.until(lambda: driver.state.bench.link == "none", "the end of the link")
+    assert row.words.text() == "no transducer: not connected."
+    assert window.to_do.primary.text().startswith("Connect")
+    QTest.keyClick(window.page.subject, Qt.Key.Key_Return)
+    driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+    assert row.connect_button.accessibleName() == "Disconnect the transducer"
+
+
+def test_the_strip_at_the_top_says_lamp_subject_device_and_language_and_has_no_button(driver):
+    header = driver.window.header
+    names = {shown.accessibleName() or shown.text() for shown in header.findChildren(QLabel)}
+    assert {"new session", "not recording", "language that the subject reads English (en)"} <= names
+    assert any(name.startswith("SIMULATED Net F/T") for name in names)
+    assert header.findChildren(QAbstractButton) == []
 
 
 def test_start_lights_when_every_card_is_ready_and_a_card_that_is_mended_says_so_at_once(driver):
