@@ -1,6 +1,8 @@
 """What the analyst's window shows of its state: words, numbers, points, names of pictures."""
 
+import re
 from dataclasses import dataclass
+from operator import itemgetter
 
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
@@ -60,12 +62,14 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
         ]
     if (said := row.prediction) is not None:
-        error = "" if said.error_estimate is None else f" ± {100 * said.error_estimate:.2g} %"
+        mesh = said.error_estimate
+        error = "" if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh)
         told += [
             (
                 tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
                 _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed"),
             ),
+            (tr("by what the model leaves out, all trials"), _left_out(state.report)),
             (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
             (tr("model: indentation"), _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
             (tr("model: normal force"), _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
@@ -73,6 +77,14 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     elif state.stage == "analysed":
         told.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
     return tuple(told)
+
+
+def _left_out(report: Report | None) -> str:
+    """Return which thing that the model leaves out may have changed the SED most, and by how much."""
+    facts = () if report is None else report.left_out
+    numbers = [(max(map(float, PLAIN.findall(fact.value)), default=0.0), fact) for fact in facts]
+    most = max((pair for pair in numbers if pair[1].name != "warning"), key=itemgetter(0), default=None)
+    return "–" if most is None else tr("{effect} {change}; more in Scene", effect=most[1].name, change=most[1].value)
 
 
 def condition(report: Report | None, said: PredictionFinding) -> str:
@@ -85,6 +97,7 @@ def condition(report: Report | None, said: PredictionFinding) -> str:
     return ", ".join(part for part in (depth, strain) if part)
 
 
+PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
 RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
 FRICTION_HEAD = (
     tr_noop("trial"),

@@ -47,9 +47,12 @@ class FieldPlot(QWidget):
         self.plot.read = self._read
         self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
         self.values, self._unit = [NOTHING], ""
+        self._named = False  # two curves are
         self._curves = [
-            pg.PlotDataItem(pen=pg.mkPen(MODEL, width=2, style=style), connect="finite", symbolSize=4, symbolPen=None)
-            for style in (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine)
+            pg.PlotDataItem(
+                pen=pg.mkPen(MODEL, width=2, style=style), connect="finite", symbolSize=4, symbolPen=None, name=name
+            )
+            for name, style in zip(NAMES, (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine), strict=True)
         ]
         self._here = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
         for curve in self._curves:
@@ -78,6 +81,9 @@ class FieldPlot(QWidget):
         for at, curve in enumerate(self._curves):
             known = self.values[at] if at < len(self.values) else NOTHING
             curve.setData(*known, symbol="o" if source == RECEPTORS else None, symbolBrush=MODEL)
+        if (len(fingers) > 1) != self._named:
+            self._named = len(fingers) > 1
+            self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
         self._here.setVisible(source != LINE)
         self.plot.getPlotItem().setLabel("bottom", f"{axis}<br>{words}" if len(place) else words)
         self.plot.setAccessibleName(f"{axis}: {words}")

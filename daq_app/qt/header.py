@@ -153,7 +153,7 @@ class ToDo(QFrame):
             text = f"{primary.label}   {tr(primary.key)}"
             if self.primary.text() != text:
                 self.primary.setText(text)
-                self.primary.setAccessibleName(f"{primary.label}: {sentence}")
+            self.primary.setAccessibleName(f"{primary.label}: {sentence}")
             self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)
 

@@ -72,6 +72,7 @@ class NewSessionPage(QFrame):
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
         self.subject = entry(tr("subject code, never a name"))
+        self._proposal = button("", tr("take the proposed code"), self._take_proposal, "small")
         self.protocol = choice(tr("protocol"))
         self.protocol.addItems([*protocol_names(), tr("choose a file …")])
         self.protocol.setCurrentText(SessionForm().protocol)
@@ -307,7 +308,12 @@ class NewSessionPage(QFrame):
         """Offer the studies of the folder, and the code after those that were there."""
         folder = Path(self.folder.text().strip() or ".").expanduser()
         self.study.setCompleter(QCompleter(list(studies_in(folder)), self.study))
-        self.subject.setPlaceholderText(tr("e.g. {code}", code=next_code(codes_in(place_of(self.form())))))
+        code = next_code(codes_in(place_of(self.form())))
+        self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
+        self._proposal.setText(code)
+
+    def _take_proposal(self) -> None:
+        self.subject.setText(self._proposal.text())
 
     def _build(self, scale: float) -> None:
         inside = QWidget()
@@ -365,7 +371,7 @@ class NewSessionPage(QFrame):
 
     def _build_subject(self, layout: QVBoxLayout) -> None:
         """Lay out who takes part."""
-        field(layout, tr("Subject code"), self.subject)
+        field(layout, tr("Subject code"), self.subject, self._proposal)
         layout.addWidget(self._enrol)
         field(layout, tr("Stroking hand"), self.stroking)
         field(layout, tr("Answering hand"), self.answering)
@@ -392,11 +398,8 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._new_code)
 
     def _build_disk(self, layout: QVBoxLayout) -> None:
-        folder = QHBoxLayout()
-        folder.addWidget(self.folder, 1)
-        folder.addWidget(button("…", tr("choose the folder of sessions"), self._choose_folder))
-        layout.addWidget(label(tr("Folder"), "quiet"))
-        layout.addLayout(folder)
+        other = button("…", tr("choose the folder of sessions"), self._choose_folder)
+        field(layout, tr("Folder"), self.folder, other)
 
 
 def _hands(name: str) -> QComboBox:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QComboBox,
     QFrame,
+    QHBoxLayout,
     QLabel,
     QLineEdit,
     QPlainTextEdit,
@@ -192,12 +193,16 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
 
 
-def field(layout: QVBoxLayout, words: str, widget: QWidget) -> None:
-    """Put words and the field that they ask for below each other."""
+def field(layout: QVBoxLayout, words: str, widget: QWidget, *beside: QWidget) -> None:
+    """Put words over the field that they ask for, and what stands beside it."""
     caption = label(words, "quiet", wrap=True)
     caption.setBuddy(widget)
     layout.addWidget(caption)
-    layout.addWidget(widget)
+    row = QHBoxLayout()
+    row.addWidget(widget, 1)
+    for other in beside:
+        row.addWidget(other)
+    layout.addLayout(row)
 
 
 def tick(words: str, name: str) -> QCheckBox:

@@ -53,7 +53,11 @@ class StrokeView(QWidget):
         quiet = QColor(tokens.quiet)
         quiet.setAlpha(110)
         self._recorded = [pg.PlotCurveItem(pen=pg.mkPen(quiet, width=1), connect="finite") for _ in range(2)]
-        self._curves = [pg.PlotCurveItem(pen=pg.mkPen(c, width=2), connect="finite") for c in (N, T, MU)]
+        self._curves = [
+            pg.PlotCurveItem(pen=pg.mkPen(colour, width=2), connect="finite", name=name)
+            for colour, name in ((N, "N"), (T, "T"), (MU, "µ"))
+        ]
+        self._plots[0].name_curves(self._curves[:2])
         for item in (*self._recorded, *self._curves[:2], self._windows[0]):
             self._plots[0].addItem(item)
         for item in (self._curves[2], self._windows[1]):

@@ -1,6 +1,6 @@
 """A plot that the wheel zooms and the mouse moves, and that says what is under the pointer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
@@ -26,6 +26,8 @@ class ZoomedPlot(pg.PlotWidget):
         base: Any = super()
         base.__init__(background=tokens.surface)
         scale = type_scale()
+        self._names: Any = None
+        self._text = tokens.text
         self.setMinimumSize(120, round(100 + 160 * (scale - 1)))  # the axes take what the type needs
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.setToolTip(tr("Wheel: zoom. Drag: move. Home or double-click: show all."))
@@ -47,6 +49,20 @@ class ZoomedPlot(pg.PlotWidget):
             item.getAxis(side).setPen(QColor(tokens.line))
             item.getAxis(side).setTextPen(QColor(tokens.quiet))
             item.getAxis(side).enableAutoSIPrefix(False)
+
+    def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
+        """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""
+        if self._names is not None:
+            self._names.scene().removeItem(self._names)
+            self._names = None
+        if curves:
+            size = f"{font(SMALL, type_scale()).pixelSize()}px"
+            self._names = pg.LegendItem(offset=None, colCount=len(curves), labelTextSize=size, pen=None, brush=None)
+            self._names.setParentItem(self.getPlotItem().getViewBox())
+            self._names.anchor(corner, corner)
+            self._names.setLabelTextColor(self._text)
+            for curve in curves:
+                self._names.addItem(curve, curve.name())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Show all with Home; leave every other key to the window."""

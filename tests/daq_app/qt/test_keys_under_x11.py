@@ -74,10 +74,12 @@ def begin(desk, folder):
 
 def answer_by_keys(desk, folder, number):
     """Answer with the keyboard as it is: nobody touches the mouse."""
+    count(folder, "score_asked", number)
     until(lambda: desk.active() == SUBJECT, "the subject's window")
     desk.press("Right", "Return")
     count(folder, "scored", number)
     count(folder, "mount_asked", number + 1)
+    time.sleep(0.5)  # nobody presses a key before the sentence that names it is seen
 
 
 @pytest.mark.parametrize("screens", [(1600,), (DESK, TABLET)])

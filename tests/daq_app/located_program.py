@@ -1,0 +1,41 @@
+"""The program as it is started, which tells a test where on the screen something is: a name in, "x y" or "" out."""
+
+import sys
+
+from daq_app.qt import start
+
+
+def where(name):
+    """Return the middle of a part that can be seen and used, by how its name for screen readers begins [pixels]."""
+    from PySide6.QtWidgets import QApplication, QWidget
+
+    for window in QApplication.topLevelWidgets():
+        for part in window.findChildren(QWidget):
+            if part.isVisible() and part.isEnabled() and part.accessibleName().startswith(name):
+                middle = part.mapToGlobal(part.rect().center())
+                return f"{middle.x()} {middle.y()}"
+    return ""
+
+
+def answer():
+    sys.stdout.write(f"{where(sys.stdin.readline().strip())}\n")
+    sys.stdout.flush()
+
+
+def main():
+    from PySide6.QtCore import QSocketNotifier
+
+    built = start.opened
+
+    def opened(*given, **named):
+        window = built(*given, **named)
+        window.asked = QSocketNotifier(sys.stdin.fileno(), QSocketNotifier.Type.Read, window)
+        window.asked.activated.connect(answer)
+        return window
+
+    start.opened = opened
+    sys.exit(start.window([]))
+
+
+if __name__ == "__main__":
+    main()
