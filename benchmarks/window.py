@@ -98,7 +98,7 @@ def _session(options: argparse.Namespace) -> None:
         used = {name: taken - before.get(name, 0.0) for name, taken in _processor().items()}
         heart.stop()
         print(f"{options.rate} readings a second, {options.shown} s shown, {options.size}, {options.seconds:g} s long:")
-        watched.tell(options.seconds, used)
+        watched.report(options.seconds, used)
         print(f"  readings lost: {window.bridge.state.bench.health.lost}")
         window.bridge.end()
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -159,7 +159,7 @@ class _Watched:
             self._said = bridge.model.said
             self.model_age.append(now - (1e-9 * self._said.received_ns - bridge.session_offset))
 
-    def report_progress(self, seconds: float, used: dict[str, float]) -> None:
+    def report(self, seconds: float, used: dict[str, float]) -> None:
         """Print what was noted in so many seconds; `used` is processor time by process [s]."""
         said = self.window.bridge.model.predictions - self.predictions
         print(f"  frames: {len(self.painted) / seconds:.0f} a second, {_parts(np.diff(self.painted))} ms apart")
