@@ -160,6 +160,8 @@ class MainWindow(QMainWindow):
         if others and not self.subject.isVisible():
             self.subject.setGeometry(others[0].availableGeometry())
             self.subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
+        elif not others and activating and self.subject.scoring:
+            self.subject.setGeometry(self.geometry())
         if others or activating:
             self.subject.show()
 
@@ -356,6 +358,7 @@ class MainWindow(QMainWindow):
     def _come_back(self) -> None:
         """Let the keyboard come back to this window, which comes to the front where it shares a screen."""
         if len(QGuiApplication.screens()) == 1:
+            self.subject.hide()
             self.raise_()
         self.activateWindow()
 

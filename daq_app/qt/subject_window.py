@@ -40,6 +40,7 @@ class SubjectWindow(QWidget):
         self.setWindowTitle("daq-app · subject")
         self.setAccessibleName("subject's window")
         self._view: SubjectView | None = None
+        self._answered: SubjectView | None = None  # until the recorder has the answer, views still ask for it
         self.given_with: int | None = None  # key by which the last answer was given; None: by a click or a touch
         self._stated_hand: Hand | None = None
         self._language = ENGLISH
@@ -95,7 +96,10 @@ class SubjectWindow(QWidget):
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
         """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
+        if view == self._answered:
+            return
         before, self._view, self._stated_hand = self._view, view, hand
+        self._answered = None
         if before == view:
             return
         if view.language != self._language:
@@ -283,7 +287,7 @@ class SubjectWindow(QWidget):
         self.given_with = key
         given = self._way.given(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
-        self._view = None
+        self._view, self._answered = None, self._view
         say(self._title, translator(self._language)(Text.THANKS))
         say(self._text, "")
         self._fit_type()

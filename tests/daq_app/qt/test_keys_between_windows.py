@@ -66,6 +66,23 @@ def test_an_answer_can_be_given_with_keys_that_reach_the_experimenters_window(dr
     assert driver.session.trials[0].answer == "score 60"
 
 
+def test_a_report_that_comes_between_the_answer_and_its_record_asks_for_no_second_answer(driver):
+    begin(driver)
+    until_scoring(driver)
+    subject, asked = driver.window.subject, driver.view.subject
+    QTest.keyClick(subject.line, Qt.Key.Key_Right)
+    subject.show_view(asked, None)
+    assert subject.line.answer.score == 50.0
+    with_answer = driver.window.bridge.view
+    QTest.keyClick(subject.line, ENTER)
+    driver.window.show_view(with_answer)
+    assert not subject.scoring
+    moved_on(driver, 1)
+    until_scoring(driver)
+    assert subject.scoring
+    assert subject.line.answer.score is None
+
+
 def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver):
     window = driver.window
     begin(driver)

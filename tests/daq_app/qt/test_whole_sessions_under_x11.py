@@ -50,6 +50,12 @@ class Mouse:
         self.program.communicate(timeout=PATIENCE)
 
 
+def covers(desk, screens):
+    """Check that on one screen the subject's page takes the whole frame while an answer is due."""
+    if len(screens) == 1:
+        until(lambda: desk.box(desk.window("subject$")) == desk.box(desk.window("^daq-app$")), "the subject's page")
+
+
 def whole(folder):
     """Check that the one session below a folder is whole, and return its answers."""
     until(lambda: "ended" in kinds(folder), "the end")
@@ -72,6 +78,7 @@ def test_ten_trials_by_keyboard_alone(tmp_path, screens):
         desk.press("space")
         count(folder, "score_asked", TRIALS)
         until(lambda: desk.active() == "daq-app · subject", "the subject's window")
+        covers(desk, screens)
         desk.press("Right", "Return")
         count(folder, "scored", TRIALS)
         time.sleep(2.0)  # the finger is away
@@ -93,6 +100,7 @@ def test_ten_trials_by_mouse_alone(tmp_path, screens):
             for number in range(1, TRIALS + 1):
                 mouse.click("Zero: Mount")
                 count(folder, "score_asked", number)
+                covers(desk, screens)
                 mouse.click("Line from")
                 mouse.click("Next")
                 count(folder, "scored", number)
