@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, Signal
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -78,6 +78,9 @@ class NewSessionPage(QFrame):
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = entry(tr("study, a folder of its own; may be empty"))
+        self.studies = choice(tr("study, a folder of its own; may be empty"))
+        self.studies.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
+        self.studies.setLineEdit(self.study)
         self.folder = entry(tr("folder in which sessions are kept"))
         self.folder.setText("recordings")
         self.seed = entry(tr("seed of the stimulus order; empty for a new one"))
@@ -307,7 +310,14 @@ class NewSessionPage(QFrame):
     def _place_changed(self) -> None:
         """Offer the studies of the folder, and the code after those that were there."""
         folder = Path(self.folder.text().strip() or ".").expanduser()
-        self.study.setCompleter(QCompleter(list(studies_in(folder)), self.study))
+        there = ["", *studies_in(folder)]
+        if there != [self.studies.itemText(at) for at in range(self.studies.count())]:
+            with QSignalBlocker(self.study):  # what stands in the field stays
+                typed = self.study.text()
+                self.studies.clear()
+                self.studies.addItems(there)
+                self.studies.setEditText(typed)
+            self.studies.completer().setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
         code = next_code(codes_in(place_of(self.form())))
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
         self._proposal.setText(code)
@@ -352,9 +362,15 @@ class NewSessionPage(QFrame):
         wide = self.width() >= self._two
         self._columns.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
 
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Look for studies anew where the window is turned to: another program may have made one."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ActivationChange:
+            self._place_changed()
+
     def _build_study(self, layout: QVBoxLayout) -> None:
         """Lay out in which study and by which protocol, and whether it is rehearsed."""
-        field(layout, tr("Study, may be empty"), self.study)
+        field(layout, tr("Study, may be empty"), self.studies)
         field(layout, tr("Protocol"), self.protocol)
         layout.addWidget(self.pre_evaluation)
         layout.addWidget(self.practice)

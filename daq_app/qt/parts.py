@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
     QCheckBox,
@@ -109,12 +109,20 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "") -> 
     return made
 
 
+class _Choice(QComboBox):
+    """A list that the wheel passes over: turned to scroll the page, it would choose another entry unseen."""
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
+        """Leave the wheel to the page."""
+        event.ignore()
+
+
 def choice(name: str) -> QComboBox:
     """Return a list to choose from that says `name` to screen readers, and takes the room it is given.
 
     On Linux Qt gives what is chosen for the name of such a list, and `name` is read as its description.
     """
-    made = QComboBox()
+    made = _Choice()
     made.setAccessibleName(name)
     made.setAccessibleDescription(name)
     made.setMinimumHeight(TARGET)

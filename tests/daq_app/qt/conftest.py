@@ -11,6 +11,7 @@ from examples import short_protocol
 from PySide6.QtCore import QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 
+from daq_app.qt.screens import settings
 from daq_app.qt.start import opened
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
@@ -70,6 +71,7 @@ def one_window(application, request):
 
     Its live model does not start by itself, for with time running so fast it would keep a core busy all along.
     """
+    settings().clear()  # what the window of another file remembers
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(LiveModel, "prepare", lambda _: None)
         patch.setattr("daq_app.qt.start.SIMULATED_BENCH", "sim:?rate=100")  # half the readings to take and draw

@@ -13,9 +13,10 @@ import pyqtgraph
 import pytest
 from PIL import Image
 from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
-from PySide6.QtGui import QGuiApplication, QWheelEvent
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
+from qt_events import wheel
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.field_list import FIELD_CHOICES
@@ -299,21 +300,6 @@ def drag(application, widget, begin, end, held=Qt.KeyboardModifier.NoModifier):
     QTest.mouseMove(widget, end)
     application.processEvents()
     QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, held, end)
-
-
-def wheel(application, widget, at, notches):
-    turned, still = QPoint(0, 120 * notches), QPoint()
-    event = QWheelEvent(
-        QPointF(at),
-        QPointF(widget.mapToGlobal(at)),
-        still,
-        turned,
-        Qt.MouseButton.NoButton,
-        Qt.KeyboardModifier.NoModifier,
-        Qt.ScrollPhase.NoScrollPhase,
-        False,
-    )
-    application.sendEvent(widget, event)
 
 
 def test_the_wheel_zooms_the_finger_about_the_pointer_and_home_or_a_double_click_shows_all(application, window):

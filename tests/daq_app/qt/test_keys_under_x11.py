@@ -69,7 +69,13 @@ def begin(desk, folder):
 
     until(begun, "the session")
     desk.press("space")
-    count(folder, "mount_asked", 1)
+    mount_asked(folder, 1)
+
+
+def mount_asked(folder, number):
+    """Wait until a stimulus is asked for, and until the sentence that says so can have been read."""
+    count(folder, "mount_asked", number)
+    time.sleep(0.5)
 
 
 def answer_by_keys(desk, folder, number):
@@ -78,8 +84,7 @@ def answer_by_keys(desk, folder, number):
     until(lambda: desk.active() == SUBJECT, "the subject's window")
     desk.press("Right", "Return")
     count(folder, "scored", number)
-    count(folder, "mount_asked", number + 1)
-    time.sleep(0.5)  # nobody presses a key before the sentence that names it is seen
+    mount_asked(folder, number + 1)
 
 
 @pytest.mark.parametrize("screens", [(1600,), (DESK, TABLET)])

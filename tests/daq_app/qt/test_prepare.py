@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLabel
+from qt_events import wheel
 
 from daq_app.qt.free_answers import NumberField
 from daq_app.recorder.messages import Connect, Disconnect
@@ -44,6 +45,14 @@ def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):
     finally:
         window.bridge.send(Connect("sim:?rate=200"))
         driver.until(lambda: driver.state.bench.link == "open", "the simulated bench")
+
+
+def test_the_wheel_over_a_list_scrolls_the_page_and_chooses_nothing(driver):
+    page = driver.window.page
+    for chosen in (page.protocol, page.stroking, page.studies):
+        before = chosen.currentText()
+        assert not wheel(driver.application, chosen, chosen.rect().center(), -2)
+        assert chosen.currentText() == before
 
 
 def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_connects_it(driver):

@@ -5,8 +5,9 @@ import signal
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
 
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study_file import create_study
@@ -111,7 +112,10 @@ def test_a_subject_is_enrolled_by_key_and_a_session_of_its_study_runs_by_itself_
     create_study(study, text, 11, blinded=True)
     page.simulated.setChecked(True)
     QTest.keyClicks(page.subject, "S01")
-    QTest.keyClicks(page.study, "pilot")
+    QApplication.sendEvent(page, QEvent(QEvent.Type.ActivationChange))  # back from where the study was made
+    assert [page.studies.itemText(at) for at in range(page.studies.count())] == ["", "pilot"]
+    QTest.keyClick(page.studies, Qt.Key.Key_Down)
+    assert page.form().study == "pilot"
     assert "not enrolled" in page.frames["Subject"].words.text()
     assert not driver.window.to_do.primary.isEnabled()
     assert not page.protocol.isEnabled()

@@ -52,7 +52,7 @@ def test_the_tab_key_goes_through_the_page_from_top_to_bottom_and_reaches_every_
         order.append(focused)
         QTest.keyClick(focused, Qt.Key.Key_Tab)
     asked = [page.subject, page.stroking, page.answering, page.with_forces, page.area]
-    asked += [page.study, page.protocol, page.seed, page.people_score, page.folder]
+    asked += [page.studies, page.protocol, page.seed, page.people_score, page.folder]
     places = [order.index(widget) for widget in asked]
     assert places == sorted(places)
     visible = [
