@@ -15,7 +15,7 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
     ('41 mN, 1.3 N mm since the first', '2, the last on 2026-10-01')
     """
     if life is None or not life.zeros:
-        why = tr("none kept of a simulated one") if info is not None and info.simulated else "–"
+        why = tr("not kept while simulated") if info is not None and info.simulated else "–"
         overloads = "–" if life is None else _overloads(life)
         return tuple(zip(NAMES, (why, "–", "–", overloads), strict=True))
     told = (

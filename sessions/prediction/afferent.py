@@ -1,36 +1,50 @@
-"""From the predicted SED to the firing of an SA-II afferent: an illustration with declared parameters, no finding.
+"""From a quantity at the receptor to the firing of an SA-II afferent: an illustration with declared parameters.
 
-No fitted map from SED to the rate of a human SA-II afferent was found in the literature. This one is the simplest that
-has what such units show: firing at rest, a static and a dynamic part, slow adaptation, regular intervals. Its order of
-surfaces in the settled state is that of the SED, as long as none lies at a bound: what it adds is the course in time.
+No fitted map from the SED, or any other quantity, to the rate of a human SA-II afferent was found in the literature.
+This one is the simplest that has what such units show: firing at rest, a static and a dynamic part, slow adaptation,
+regular intervals. Its order of surfaces in the settled state is that of the quantity's size, as long as none lies at a
+bound: what it adds is the course in time.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import SessionPrediction
+from sessions.prediction import QUANTITIES, SED, Quantity, SessionPrediction, TrialPrediction
 from sessions.prediction.sed_interval import Ends
+from solver.quantities import NAMES, energy
 
 Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
-ABOUT = "an illustration with assumed numbers: no fitted map from SED to the rate of an SA-II afferent is known"
+ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
 SHOWN = 10  # every so many steps the rate is told
+
+
+_EDIN = "that units fire from below 1 %: Edin 2004, J. Neurophysiol. 92:3233"
+# The threshold of each family of quantities, in its unit: what 1 % strain makes in the published dermis, E = 0.08 MPa.
+_ENERGY = 4e-6, "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa"
+_STRAIN = 0.01, "1 % strain"
+_STRESS = 8e-4, "stress of 1 % strain in the published dermis, E e with E = 0.08 MPa"
+_THRESHOLDS = {
+    quantity.name: _ENERGY if quantity in energy.QUANTITIES else _STRAIN if quantity.unit == "-" else _STRESS
+    for quantity in QUANTITIES
+}
 
 
 @dataclass(frozen=True, slots=True)
 class AfferentSettings:
     """Rate r = background + static x + dynamic max(0, dx/dt) - adaptation a, in 0 to the greatest rate.
 
-    Drive x = (max(0, SED - threshold) / (reference - threshold))^exponent; a follows x with the time constant:
-    da/dt = (x - a) / adaptation_time.
+    Drive x = (max(0, |q| - threshold) / (reference - threshold))^exponent, q being the quantity at the ending; a
+    follows x with the time constant: da/dt = (x - a) / adaptation_time.
     """
 
-    threshold: float = 4e-6
+    quantity: str = SED.name
+    threshold: float = _ENERGY[0]
     exponent: float = 1.0
     background: float = 5.0
     static_gain: float = 20.0
@@ -43,17 +57,12 @@ class AfferentSettings:
     seed: int = 0
 
 
-# Unit, standing, and what it rests on. "assumed": no authority is claimed for the number.
+# Unit ("": the quantity's own), standing, and what it rests on. "assumed": no authority is claimed for the number.
 TOLD: Mapping[str, tuple[str, str, str]] = {
-    "threshold": (
-        "MPa",
-        "assumed",
-        "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa; that units fire from below 1 %: "
-        "Edin 2004, J. Neurophysiol. 92:3233",
-    ),
-    "exponent": ("-", "assumed", "1: rate follows SED, the hypothesis under test; 0.5: rate follows strain"),
+    "threshold": ("", "assumed", _EDIN),
+    "exponent": ("-", "assumed", "1: rate follows the quantity; 0.5 with an energy: rate follows strain"),
     "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
-    "static_gain": ("imp/s", "assumed", "at the reference SED; sweep 5 to 40"),
+    "static_gain": ("imp/s", "assumed", "at the reference; sweep 5 to 40"),
     "dynamic_gain": (
         "imp/s per 1/s",
         "assumed",
@@ -77,7 +86,7 @@ class Firing:
     rate: Array  # (m,) [imp/s]
     settled_rate: float  # long after: background + (static - adaptation) x, within its bounds [imp/s]
     spikes: Array  # (k,) [s]
-    peak_interval: Ends | None = None  # of the greatest rate, that the interval of the SED makes; None without that
+    peak_interval: Ends | None = None  # of the greatest rate, that the SED's interval makes; None without it
     settled_interval: Ends | None = None  # likewise of the settled rate [imp/s]
 
     def to_dict(self) -> dict[str, Any]:
@@ -94,13 +103,13 @@ class Firing:
         }
 
 
-def firing_rate(time: Array, sed: Array, reference: float, settings: AfferentSettings) -> tuple[Array, Array]:
-    """Return instants (k,) [s] every millisecond and the rate (k,) [imp/s] there, from SED (m,) [MPa] at `time` (m,).
+def firing_rate(time: Array, size: Array, reference: float, settings: AfferentSettings) -> tuple[Array, Array]:
+    """Return instants (k,) [s] every millisecond and the rate (k,) [imp/s] there, from sizes (m,) at `time` (m,).
 
-    SED goes straight between its instants; before the first nothing is adapted. `reference` [MPa] is where x is 1.
+    The quantity's size goes straight between its instants; before the first nothing is adapted. At `reference` x is 1.
     """
     grid = np.arange(float(time[0]), float(time[-1]) + STEP / 2, STEP)
-    x = _drive(np.interp(grid, time, sed), reference, settings)
+    x = _drive(np.interp(grid, time, size), reference, settings)
     rise = np.diff(x, prepend=x[0]) / STEP
     kept = float(np.exp(-STEP / settings.adaptation_time))
     adapted = np.zeros_like(x)
@@ -110,10 +119,10 @@ def firing_rate(time: Array, sed: Array, reference: float, settings: AfferentSet
     return grid, np.clip(rate - settings.adaptation_gain * adapted, 0.0, settings.greatest_rate)
 
 
-def _drive(sed: Array, reference: float, settings: AfferentSettings) -> Array:
-    """Return the drive (n,) [-] of SED (n,) [MPa]: 0 up to the threshold, 1 at the reference."""
+def _drive(size: Array, reference: float, settings: AfferentSettings) -> Array:
+    """Return the drive (n,) [-] of sizes (n,): 0 up to the threshold, 1 at the reference."""
     beyond = max(reference - settings.threshold, np.finfo(np.float64).tiny)
-    return (np.maximum(sed - settings.threshold, 0.0) / beyond) ** settings.exponent
+    return (np.maximum(size - settings.threshold, 0.0) / beyond) ** settings.exponent
 
 
 def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: AfferentSettings) -> Array:
@@ -135,35 +144,52 @@ def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: A
 def session_firing(
     prediction: SessionPrediction, settings: AfferentSettings | None = None
 ) -> tuple[float | None, tuple[Firing, ...]]:
-    """Return the reference SED [MPa], the median of all trials, and the firing in each trial that has a course."""
+    """Return the reference, the median size over all trials, and the firing in each trial whose course is known.
+
+    Where tissues relax, courses are known of the SED alone: another quantity makes no firing there.
+    """
     chosen = settings or AfferentSettings()
-    seds = [row.sed for row in prediction.trials if row.sed is not None]
-    if not seds:
+    sizes = [abs(value) for row in prediction.trials if (value := _settled(row, chosen.quantity)) is not None]
+    if not sizes:
         return None, ()
-    reference = float(np.median(seds))
+    reference = float(np.median(sizes))
     found: list[Firing] = []
     for number, row in enumerate(prediction.trials):
-        if row.history is None or row.sed is None:
+        value = _settled(row, chosen.quantity)
+        if row.history is None or value is None:
             continue
-        time, rate = firing_rate(row.history.time, row.history.sed_ending, reference, chosen)
+        course = np.abs(row.history.responses[:, NAMES.index(chosen.quantity)])
+        if not np.isfinite(course).all():
+            continue
+        time, rate = firing_rate(row.history.time, course, reference, chosen)
         spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
         peak = settled = None
-        if row.interval is not None and row.interval.low is not None and row.interval.high is not None:
+        ends = _ends(row, chosen.quantity)
+        if ends is not None:
             # The whole course moves with its end: friction is what is uncertain, and presses nothing.
-            low, high = row.interval.low / row.sed, row.interval.high / row.sed
-            course = row.history.sed_ending
-            peaks = [firing_rate(row.history.time, share * course, reference, chosen)[1] for share in (low, high)]
+            peaks = [firing_rate(row.history.time, end / value * course, reference, chosen)[1] for end in ends]
             peak = float(peaks[0].max()), float(peaks[1].max())
-            settled = (
-                _settled_rate(row.interval.low, reference, chosen),
-                _settled_rate(row.interval.high, reference, chosen),
-            )
-        found.append(Firing(row.trial, time, rate, _settled_rate(row.sed, reference, chosen), spikes, peak, settled))
+            settled = _settled_rate(ends[0], reference, chosen), _settled_rate(ends[1], reference, chosen)
+        found.append(Firing(row.trial, time, rate, _settled_rate(value, reference, chosen), spikes, peak, settled))
     return reference, tuple(found)
 
 
-def _settled_rate(sed: float, reference: float, settings: AfferentSettings) -> float:
-    x = float(_drive(np.array(sed), reference, settings))
+def _settled(row: TrialPrediction, quantity: str) -> float | None:
+    """Return a quantity at the ending in the settled state; None where there is none."""
+    if quantity == SED.name:
+        return row.sed
+    return row.responses[quantity][0] if quantity in row.responses else None
+
+
+def _ends(row: TrialPrediction, quantity: str) -> Ends | None:
+    """Return the ends of the interval that friction makes, which the SED alone has; None without one."""
+    if quantity != SED.name or row.interval is None or row.interval.low is None or row.interval.high is None:
+        return None
+    return row.interval.low, row.interval.high
+
+
+def _settled_rate(value: float, reference: float, settings: AfferentSettings) -> float:
+    x = float(_drive(np.array(abs(value)), reference, settings))
     settled = settings.background + (settings.static_gain - settings.adaptation_gain) * x
     return float(np.clip(settled, 0.0, settings.greatest_rate))
 
@@ -172,8 +198,10 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
     """Return the firing in each trial as plain data, with what it is and every parameter."""
     reference, found = session_firing(prediction, settings)
     return {
-        "about": ABOUT,
-        "reference_sed": reference,
+        "about": ABOUT.format(label=_named(settings).label),
+        "quantity": settings.quantity,
+        "reference": reference,
+        "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
         "settings": asdict(settings),
         "parameters": parameters(settings, reference),
         "trials": [one.to_dict() for one in found],
@@ -183,21 +211,29 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
 def parameters(settings: AfferentSettings, reference: float | None = None) -> list[dict[str, Any]]:
     """Return every parameter with its value, unit, standing ("assumed", or "set" by somebody) and what it rests on.
 
-    `reference` [MPa] is told with them where it is given.
+    `reference` is told with them where it is given, in the unit of the quantity.
     """
     told: list[dict[str, Any]] = []
+    quantity, usual = _named(settings), usual_settings(settings.quantity)
     if reference is not None:
-        basis = "where x is 1: the median SED of the trials; another reference scales every gain"
-        told.append({"name": "reference", "value": reference, "unit": "MPa", "standing": "assumed", "basis": basis})
-    for one in fields(settings):
-        value: float = getattr(settings, one.name)
-        unit, standing, basis = TOLD[one.name]
-        chosen = standing if value == one.default else "set"
-        told.append({"name": one.name, "value": value, "unit": unit, "standing": chosen, "basis": basis})
+        basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
+        told.append(
+            {"name": "reference", "value": reference, "unit": quantity.unit, "standing": "assumed", "basis": basis}
+        )
+    for name, (unit, standing, basis) in TOLD.items():
+        value: float = getattr(settings, name)
+        chosen = standing if value == getattr(usual, name) else "set"
+        rests = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
+        told.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": chosen, "basis": rests})
     return told
 
 
-def settings_with(changes: Mapping[str, float], seed: int = 0) -> AfferentSettings:
+def usual_settings(quantity: str = SED.name) -> AfferentSettings:
+    """Return what is assumed of an afferent that answers to a quantity of `QUANTITIES`, by its name."""
+    return AfferentSettings(quantity=quantity, threshold=_THRESHOLDS[quantity][0])
+
+
+def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = SED.name) -> AfferentSettings:
     """Return settings with some parameters set by somebody.
 
     Raises ValueError, with a sentence, for a name that is none and a value that means nothing.
@@ -205,7 +241,7 @@ def settings_with(changes: Mapping[str, float], seed: int = 0) -> AfferentSettin
     >>> settings_with({"static_gain": 30.0}).static_gain
     30.0
     """
-    names = [one.name for one in fields(AfferentSettings) if one.name != "seed"]
+    names = [name for name in TOLD if name != "seed"]
     for name, value in changes.items():
         if name not in names:
             raise ValueError(f"{name} is no parameter of the afferent: give one of {', '.join(names)}")
@@ -213,4 +249,8 @@ def settings_with(changes: Mapping[str, float], seed: int = 0) -> AfferentSettin
         most = 1.0 if name == "variation" else 1e4
         if not least <= value <= most:
             raise ValueError(f"{name} = {value:g} is not allowed: {least:g} to {most:g}")
-    return replace(AfferentSettings(seed=seed), **changes)
+    return replace(usual_settings(quantity), seed=seed, **changes)
+
+
+def _named(settings: AfferentSettings) -> Quantity:
+    return QUANTITIES[NAMES.index(settings.quantity)]

@@ -127,6 +127,7 @@ def findings(
         interval_kind=drawn_from(analysis.settings, analysis.tilt).kind,
         interval_kinds=dict(drawn_from(analysis.settings, analysis.tilt).kinds),
         afferent=more.afferent,
+        afferent_quantity=SED.name if more.firing_settings is None else more.firing_settings.quantity,
     )
 
 

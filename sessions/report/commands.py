@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
-from sessions.prediction.afferent import AfferentSettings
+from sessions.prediction.afferent import AfferentSettings, usual_settings
 from sessions.recording.reader import Recording
 from sessions.report.contents import TextFile
 from sessions.statistics.multiverse import PATHS, Seds
@@ -97,10 +97,12 @@ def calibration_words(gain_error: float | None) -> list[str]:
 def _afferent_words(settings: AfferentSettings | None) -> list[str]:
     if settings is None:
         return []
-    words, usual = ["--afferent"], AfferentSettings()
+    words, usual = ["--afferent"], usual_settings(settings.quantity)
     for field in fields(settings):
         value = getattr(settings, field.name)
-        if value != getattr(usual, field.name):
+        if field.name == "quantity":
+            words += ["--quantity", value] if value != SED.name else []
+        elif value != getattr(usual, field.name):
             seed = field.name == "seed"
             words += ["--afferent-seed", str(value)] if seed else ["--afferent-set", f"{field.name}={value!r}"]
     return words

@@ -243,6 +243,7 @@ class Report:
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name
     scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
+    afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`
 
     def to_dict(self) -> dict[str, object]:
         """Return the report as JSON can hold it."""

@@ -15,8 +15,10 @@ from sessions.prediction.afferent import (
     session_firing,
     settings_with,
     spike_times,
+    usual_settings,
 )
 from sessions.report.predictions import afferent_facts
+from solver.quantities import NAMES
 
 USUAL = AfferentSettings()
 PLAIN = replace(USUAL, threshold=0.0)  # whose closed forms are short
@@ -53,10 +55,18 @@ def test_a_steady_rate_gives_its_count_and_the_declared_regularity():
 
 def rows(seds, interval=None):
     time = np.array([0.0, 1.0, 3.0])
-    made = [SimpleNamespace(time=time, sed_ending=np.array([0.0, sed, sed])) for sed in seds]
+    ramp = np.array([0.0, 1.0, 1.0])[:, None]
+    # The SED, and every other quantity a hundred times as large and below zero.
+    values = [np.array([sed if name == "sed" else -100.0 * sed for name in NAMES]) for sed in seds]
     return tuple(
-        SimpleNamespace(trial=i, sed=sed, history=history, interval=interval)
-        for i, (sed, history) in enumerate(zip(seds, made, strict=True), 1)
+        SimpleNamespace(
+            trial=i,
+            sed=value[0],
+            history=SimpleNamespace(time=time, responses=ramp * value),
+            interval=interval,
+            responses={name: (one, 0.0) for name, one in zip(NAMES, value.tolist(), strict=True)},
+        )
+        for i, value in enumerate(values, 1)
     )
 
 
@@ -78,6 +88,32 @@ def test_the_order_of_surfaces_is_that_of_the_sed_whatever_the_exponent():
         assert stats.spearmanr(seds, [one.settled_rate for one in found]).statistic == pytest.approx(1.0)
 
 
+def test_an_afferent_answers_to_the_size_of_any_quantity_by_the_threshold_of_one_per_cent_strain():
+    interval = SimpleNamespace(low=0.008, high=0.012)
+    for name, threshold in (("stretch_along_skin", 0.01), ("pressure", 0.08 * 0.01), ("sed_deviatoric", 4e-6)):
+        usual = usual_settings(name)
+        assert usual.threshold == pytest.approx(threshold)
+        trials = rows([0.004, 0.01, 0.02], interval)
+        reference, found = session_firing(SimpleNamespace(trials=trials), usual)
+        assert reference == pytest.approx(1.0)
+        # A line from the rate at rest at the threshold to 14 imp/s more at the reference.
+        expected = [5.0 + 14.0 * (size - threshold) / (1.0 - threshold) for size in (0.4, 1.0, 2.0)]
+        assert [one.settled_rate for one in found] == pytest.approx(expected)
+        assert {one.settled_interval for one in found} == {None}
+        told = {one["name"]: one for one in parameters(usual, reference)}
+        assert (
+            told["threshold"]["unit"] == told["reference"]["unit"] == ("-" if name == "stretch_along_skin" else "MPa")
+        )
+        assert told["threshold"]["standing"] == "assumed"
+
+
+def test_a_course_that_is_known_of_the_sed_alone_makes_no_firing_of_another_quantity():
+    trials = rows([0.01])
+    trials[0].history.responses[:, 1:] = np.nan
+    assert session_firing(SimpleNamespace(trials=trials), usual_settings("pressure"))[1] == ()
+    assert len(session_firing(SimpleNamespace(trials=trials))[1]) == 1
+
+
 def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
     (_, once), (_, again) = (session_firing(SimpleNamespace(trials=rows([0.008, 0.008]))) for _ in range(2))
     assert once[0].spikes.tolist() == again[0].spikes.tolist()
@@ -85,7 +121,7 @@ def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
 
 
 def test_every_parameter_is_told_with_its_standing():
-    assert set(TOLD) == {field.name for field in fields(AfferentSettings)}
+    assert {*TOLD, "quantity"} == {field.name for field in fields(AfferentSettings)}
     assert {one["standing"] for one in parameters(USUAL) if one["name"] != "seed"} == {"assumed"}
 
 

@@ -74,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--afferent",
         action="store_true",
-        help="also firing rates and spike times of an SA-II afferent: an illustration",
+        help="also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration",
     )
     parser.add_argument(
         "--afferent-set",
@@ -272,7 +272,7 @@ def _afferent(options: argparse.Namespace) -> AfferentSettings:
         except ValueError:
             raise WrongValue(f"--afferent-set {given} is not allowed: NAME=VALUE, such as static_gain=30") from None
     try:
-        return settings_with(changes, options.afferent_seed)
+        return settings_with(changes, options.afferent_seed, options.quantity)
     except ValueError as wrong:
         raise WrongValue(f"--afferent-set: {wrong}") from None
 

@@ -15,7 +15,7 @@ from daq_app.console import Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
 from sessions.prediction import QUANTITIES, SED, PredictionOptions, Progress, SessionPrediction
-from sessions.prediction.afferent import AfferentSettings, session_firing
+from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
 from sessions.recording.unblinding import revealed
@@ -49,7 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--afferent",
         action="store_true",
-        help="also firing rates of an SA-II afferent: an illustration (or where it was kept before)",
+        help="also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept "
+        "before)",
     )
     parser.add_argument(
         "--quantity",
@@ -78,7 +79,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.out is not None:
         html.leave_others_alone(options.out)
     analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
-    afferent = afferent_before(recording) or (AfferentSettings() if options.afferent else None)
+    afferent = afferent_before(recording)
+    if options.afferent and (afferent is None or afferent.quantity != options.quantity):
+        afferent = usual_settings(options.quantity)
     prediction = predicted(recording, analysis, console, _asked(recording, options), afferent)
     from sessions.report import findings, score_table
 

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
+from sessions.prediction import SED
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.prediction.variants import Alternative
 from sessions.report import PredictionFinding, Report
+from sessions.report.responses import ShownResponse, shown_response
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, grouped, table
 from sessions.report.tables.strokes import model_mu
 from sessions.report.wording import direction, places, sed, significant, tau, with_error
@@ -52,6 +54,7 @@ def prediction_table(report: Report) -> Table | None:
 
 
 _HOW = "by derivatives (the solver's converged tangent), or where marked * by solving draws"
+_SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 _SHORT = "the stroke has too few readings"
 
 
@@ -103,24 +106,34 @@ def afferent_table(report: Report) -> Table | None:
     """Return the firing rates of an afferent, where they were asked for."""
     if all(p.settled_rate is None for p in report.predictions):
         return None
-    notes = Notes()
-    columns = "SED [kPa] | peak rate [imp/s] | settled rate [imp/s]"
+    notes, shown = Notes(), shown_response(report.afferent_quantity)
+    published = shown.name == SED.name
+    columns = f"{shown.label} [{shown.unit}] | peak rate [imp/s] | settled rate [imp/s]"
 
     def row(p: PredictionFinding) -> Row:
         told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
-        why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
+        why, without = p.reasons.get("sed"), p.reasons.get("sed_interval") if published else _SED_ALONE
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
-        return (_stroked_sed(p, notes), *rates)
+        return (_stroked_sed(p, notes) if published else _responding(p, shown, notes), *rates)
 
+    below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
     caption = (
-        "Firing of an SA-II afferent: an illustration. No fitted map from SED to the rate of a human SA-II afferent is "
-        "known; every parameter is told below, assumed unless it says that somebody set it. The order of the settled "
-        "rates is that of the SED as long as no rate lies at a bound, every SED is beyond the threshold and the "
-        "adaptation gain stays below the static gain. Under each number: the 95 % interval that the uncertainty of "
-        "friction makes of it, parameters and reference as given; ±: the SED's error from the mesh. Model of the SED: "
-        f"{report.model}."
+        f"Firing of an SA-II afferent: an illustration. No fitted map from {shown.label} to the rate of a human SA-II "
+        "afferent is known; every parameter is told below, assumed unless it says that somebody set it. The order of "
+        f"the settled rates is that of the size of the {shown.label} as long as no rate lies at a bound, every size "
+        "is beyond the threshold and the adaptation gain stays below the static gain. "
+        f"{below if published else ''}±: the error from the mesh. Model: {report.model}."
     )
     return _table(report, "table-afferent", caption, columns, _rows(report, row), notes)
+
+
+def _responding(p: PredictionFinding, shown: ShownResponse, notes: Notes) -> Cell:
+    """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
+    found = shown.of(p)
+    if not found:
+        return notes.number(None, str, p.reasons.get("sed"))
+    value, error = (shown.factor * number for number in (*found, 0.0)[:2])
+    return Cell(with_error(value, error, shown.places))
 
 
 def beside_table(report: Report) -> Table | None:
