@@ -139,6 +139,13 @@ class Undo:
 
 
 @dataclass(frozen=True, slots=True)
+class Respond:
+    """Another quantity at the ending is held against the scores."""
+
+    response: str  # one of `solver.quantities`
+
+
+@dataclass(frozen=True, slots=True)
 class Draw:
     """Asks for a picture of the session."""
 
@@ -186,4 +193,4 @@ class Stop:
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
 Said = Step | Found | Answered | Drawn | Filmed | Read | Compared | Written | Decided | Problem | Cancelled | Idle
-Message = Ask | Said
+Message = Ask | Said | Respond

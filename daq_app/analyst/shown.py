@@ -7,7 +7,10 @@ from operator import itemgetter
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
 from daq_app.wording import tr, tr_noop
+from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
+from sessions.report.responses import shown_response
+from sessions.report.wording import with_error
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +20,7 @@ class Point:
     experiment: str
     index: int
     score: float
-    sed_kpa: float
+    response: float  # the quantity that is held against the scores, in the unit shown
     row: int  # that is chosen by it
 
 
@@ -69,6 +72,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
                 tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
                 _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed"),
             ),
+            *_other_response(state, said),
             (tr("by what the model leaves out, all trials"), _left_out(state.report)),
             (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
             (tr("model: indentation"), _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
@@ -77,6 +81,17 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     elif state.stage == "analysed":
         told.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
     return tuple(told)
+
+
+def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[str, str]]:
+    """Return the chosen quantity with its error from the mesh; nothing where it is the SED, which always stands."""
+    shown = shown_response(state.response)
+    found = shown.of(said)
+    if shown.name == SED.name or not found:
+        return []
+    value, error = (shown.factor * number for number in (*found, 0.0)[:2])
+    told = with_error(value, error, shown.places) + ("" if shown.unit == "1" else f" {shown.unit}")
+    return [(tr("{response}, averaged over the ending", response=shown.label), told)]
 
 
 def _left_out(report: Report | None) -> str:
@@ -170,15 +185,16 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     report = state.report
     if report is None:
         return ()
-    listed = rows(state)
+    listed, shown = rows(state), shown_response(state.response)
     made: list[Point] = []
     for experiment in report.experiments:
         scores = {score.index: score.mean for score in experiment.scores}
         for number, row in enumerate(listed):
             said = row.prediction
-            if said is None or said.sed is None or said.experiment != experiment.name or said.index not in scores:
+            found = None if said is None else shown.of(said)
+            if said is None or not found or said.experiment != experiment.name or said.index not in scores:
                 continue
-            made.append(Point(experiment.name, said.index, scores[said.index], 1000.0 * said.sed, number))
+            made.append(Point(experiment.name, said.index, scores[said.index], shown.factor * found[0], number))
     return tuple(made)
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import Finger
 from daq_app.wording import tr, tr_noop
+from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 
 Stage = Literal["opening", "analysed", "predicted"]
@@ -31,6 +32,7 @@ class AnalystState:
     told: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
     row: int = 0  # that is chosen
+    response: str = SED.name  # the quantity at the ending that is held against the scores
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +62,8 @@ def fold(state: AnalystState, message: m.Message) -> AnalystState:
             return replace(state, film=message, told="")
         case m.Read():
             return replace(state, read=message)
+        case m.Respond(response):
+            return replace(state, response=response)
         case m.Compared():
             return replace(state, compared=message, told="")
         case m.Step() | m.Idle() | m.Written() | m.Decided() | m.Problem() | m.Cancelled():

@@ -76,6 +76,7 @@ class AnalystWindow(QMainWindow):
         self.model.said.connect(self._say)
         for column in (self.trials, self.stroke, self.model):
             column.asked.connect(self.ask)
+        self.trials.responded.connect(self.take)  # no work: the model answers with every quantity
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
         self._words = Shortened("quiet")

@@ -10,18 +10,21 @@ from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
 from daq_app.analyst import messages as m
 from daq_app.analyst.shown import marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
-from daq_app.qt.parts import label
+from daq_app.qt.parts import choice, label
 from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
+from sessions.prediction import QUANTITIES
+from sessions.report.responses import shown_response
 
 pg: Any = pyqtgraph  # it has no types
 
 
 class TrialsColumn(QWidget):
-    """`asked` tells which row was chosen."""
+    """`asked` tells which row was chosen, `responded` which quantity is held against the score."""
 
     asked = Signal(object)
+    responded = Signal(object)
 
     def __init__(self, tokens: Tokens) -> None:
         """Show nothing yet."""
@@ -31,12 +34,17 @@ class TrialsColumn(QWidget):
         self.list = QListWidget()
         self.list.setAccessibleName(tr("trials"))
         self.list.currentRowChanged.connect(self._chosen)
+        self.responses = choice(tr("quantity that is held against the score"))
+        for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
+            self.responses.addItem(f"{shown.label} [{shown.unit}]", shown.name)
+        self.responses.activated.connect(self._respond)
         self.relation, self.points = self._relation()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(label(tr("Trials"), "section"))
         layout.addWidget(self.list, 3)
-        layout.addWidget(label(tr("SED at the plan's depth [kPa]"), "section"))
+        layout.addWidget(label(tr("At the plan's depth, against the score"), "section"))
+        layout.addWidget(self.responses)
         layout.addWidget(self.relation, 2)
 
     def show_state(self, state: AnalystState) -> None:
@@ -61,7 +69,7 @@ class TrialsColumn(QWidget):
         self.points.setData(
             [
                 {
-                    "pos": (p.score, p.sed_kpa),
+                    "pos": (p.score, p.response),
                     "data": p.row,
                     "size": 18 if p.row == state.row else 11,
                     "symbol": "s" if p.row == state.row else "o",
@@ -75,6 +83,9 @@ class TrialsColumn(QWidget):
     def _chosen(self, row: int) -> None:
         if row >= 0:
             self.asked.emit(m.Choose(row))
+
+    def _respond(self) -> None:
+        self.responded.emit(m.Respond(self.responses.currentData()))
 
     def _relation(self) -> tuple[Any, Any]:
         plot = ZoomedPlot(self._tokens)

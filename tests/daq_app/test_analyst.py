@@ -62,7 +62,7 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_everywhere(state)
         after = fold(state, m.Choose(point.row))
         said = chosen(after).prediction
         assert (said.experiment, said.index) == (point.experiment, point.index)
-        assert 1000.0 * said.sed == pytest.approx(point.sed_kpa)
+        assert 1000.0 * said.sed == pytest.approx(point.response)
 
 
 def test_a_choice_beyond_the_list_is_its_end(state):

@@ -112,6 +112,30 @@ def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(w
     assert m.Choose(point.row) in window._work.asked
 
 
+def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_among_the_numbers(window):
+    report = example()
+    pressures = {said.stroke: -0.001 * at for at, said in enumerate(report.predictions, 1)}  # [MPa]
+    told = (replace(said, responses={"pressure": (pressures[said.stroke], 2e-7)}) for said in report.predictions)
+    window.take(m.Found("predicted", replace(report, predictions=tuple(told))))
+    responses = window.trials.responses
+    responses.setCurrentText("pressure [kPa]")
+    responses.activated.emit(responses.currentIndex())
+    listed = rows(window.state)
+    assert [point.response for point in points(window.state)] == pytest.approx(
+        [1e3 * pressures[listed[point.row].stroke.number] for point in points(window.state)]
+    )
+    assert sorted(spot.pos().y() for spot in window.trials.points.points()) == sorted(
+        point.response for point in points(window.state)
+    )
+    row = next(at for at, line in enumerate(listed) if line.stroke is not None and line.stroke.number in pressures)
+    window.take(m.Choose(row))
+    shown = f"{abs(1e3 * pressures[listed[row].stroke.number]):.4f}"
+    assert dict(numbers(window.state))["pressure, averaged over the ending"] == f"−{shown} ± 0.0002 kPa"
+    responses.setCurrentIndex(0)
+    responses.activated.emit(0)
+    assert "pressure, averaged over the ending" not in dict(numbers(window.state))
+
+
 def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_model_was_given(window):
     table = window.stroke.friction
     assert len(table.texts()) == len(window.state.report.strokes)
