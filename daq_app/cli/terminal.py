@@ -9,7 +9,8 @@ from sessions.plan.plan import Trial
 from sessions.run import steps
 
 HELP = (
-    "Enter does what is asked. At any time: redo REASON, skip REASON, pause, resume, note TEXT, abort REASON. "
+    "Enter does what is asked. At any time: redo REASON, skip REASON, pause, resume, note TEXT, abort REASON; "
+    "undo, of a redo, until the next stroke. "
     "An answer is a number, or 1 or 2 for the first or second of two, or - for no answer."
 )
 KEYBOARD = "keyboard"
@@ -85,6 +86,7 @@ class Terminal:
         word, _, rest = line.partition(" ")
         orders: dict[str, steps.Event] = {
             "redo": steps.Redo(rest),
+            "undo": steps.UndoRedo(),
             "skip": steps.Skip(rest),
             "abort": steps.Abort(rest),
             "note": steps.Note(rest),

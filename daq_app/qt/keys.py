@@ -31,6 +31,7 @@ KEYS = (
             "redo the trial that the button names; the reason is asked for, or taken from what was found of the stroke"
         ),
     ),
+    Key("Ctrl+Z", "undo", tr_noop("undo the last redo, until the next stroke: what it discarded counts again")),
     Key("S", "skip", tr_noop("skip the trial, with a reason")),
     Key("P", "pause", tr_noop("pause, and go on")),
     Key("N", "note", tr_noop("write a note, kept with its time")),

@@ -41,6 +41,7 @@ from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, ch
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
+from sessions.run import steps
 
 COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "end"})  # of the session in hand
 # Before the scale of the fonts [px]:
@@ -183,6 +184,7 @@ class MainWindow(QMainWindow):
         return {
             "primary": self._primary,
             "pause": lambda: self.course.isVisible() and self.course.pause.click(),
+            "undo": self._undo,
             "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
             "connect": self.bench.connect_chosen,
@@ -262,6 +264,11 @@ class MainWindow(QMainWindow):
             self._start_session()
         elif course.primary is not None and course.primary.sends is not None:
             self.bridge.send(course.primary.sends)
+
+    def _undo(self) -> None:
+        course = self.bridge.view.course
+        if course is not None and course.undo.enabled and self.rooms.room == "run":
+            self.bridge.send(steps.UndoRedo())
 
     def _start_session(self) -> None:
         if self.bridge.view.course is not None:

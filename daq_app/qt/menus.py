@@ -18,6 +18,7 @@ from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 SESSION = (
     ("redo", tr_noop("Redo…")),
+    ("undo", tr_noop("Undo the last redo")),
     ("skip", tr_noop("Skip…")),
     ("pause", tr_noop("Pause or go on")),
     ("note", tr_noop("Note…")),

@@ -31,6 +31,8 @@ class Middle(QWidget):
         self.trial = InspectedTrial(tokens, scale, self.leave)
         self.stroke = label("", wrap=True)
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
+        self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
+        self.undo.hide()
         self._pages = QStackedWidget()
         frame, inside = panel(tr("inspected trial"))
         inside.addWidget(scrolled(self.trial))
@@ -38,6 +40,7 @@ class Middle(QWidget):
             self._pages.addWidget(page)
         row = QHBoxLayout()
         row.addWidget(self.stroke, 1)
+        row.addWidget(self.undo)
         row.addWidget(self.redo)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -58,6 +61,7 @@ class Middle(QWidget):
         if course is None:
             self._show_stroke(tr("No stroke yet."), "", "")
             self.redo.setEnabled(False)
+            self.undo.hide()
             self.leave()
             return
         self.live.map.show_direction(course.direction)
@@ -65,6 +69,8 @@ class Middle(QWidget):
         self._show_stroke(words, course.stroke.details, GRADES.get(course.stroke.grade, ""))
         self.redo.setEnabled(course.redo.enabled)
         self.redo.setText(f"{course.redo.label}  {tr(course.redo.key)}")
+        self.undo.setText(f"{course.undo.label}  {tr(course.undo.key)}")
+        self.undo.setVisible(course.undo.enabled)
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
         if session is not None and session.phase == "stroking":

@@ -29,6 +29,7 @@ Phase = Literal[
     "resuming",
 ]
 TOLD: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
+IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
 AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
 MARKS = 40  # that are kept for the plots: more than a minute can hold
@@ -44,6 +45,7 @@ class TrialState:
     answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
     discarded: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
+    earlier: tuple["TrialState", ...] = ()  # as it was when each of its takes was discarded
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,7 @@ class SessionState:
     block: Block | None = None
     asked: steps.Command | None = None  # what is waited for
     told: str | None = None  # the last sentence that needs no answer, or that refuses one
+    redone: tuple[int, ...] = ()  # numbers of the trials whose redo can still be undone
     judged: int | None = None  # number of the trial whose stroke was looked at last
     time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
     marks: tuple[Mark, ...] = ()  # the last ones, in the time of the session's stream; none once it is over
@@ -177,7 +180,22 @@ def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | 
 
 def _over(session: SessionState) -> SessionState:
     """Return the session once nothing is recorded any more; its marks go with the clock of its stream."""
-    return replace(session, phase="ended", asked=None, marks=())
+    return replace(session, phase="ended", asked=None, marks=(), redone=())
+
+
+def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
+    """Return the trials that a redo would discard now: one, two that are compared, or none."""
+    if session.phase in IN_A_TRIAL - {"mounting"}:
+        trial = session.of(session.trial)
+    elif session.phase == "closing":
+        trial = session.trials[-1]
+    else:  # before the first take of a trial it is the one before
+        mounted = session.of(session.trial) if session.phase == "mounting" else None
+        trial = session.of(mounted.trial.number - 1) if mounted is not None and not mounted.takes else None
+    if trial is None:
+        return ()
+    first = session.of(trial.trial.compared_with)
+    return (trial,) if first is None else (first, trial)
 
 
 def _shown(session: SessionState, message: Message) -> SessionState:
@@ -222,7 +240,7 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
     match event.kind:
         case "contact_onset":
             phase = "stroking" if session.phase == "ready" else session.phase
-            return _marked(replace(session, phase=phase), _instant(session, "onset", data))
+            return _marked(replace(session, phase=phase, redone=()), _instant(session, "onset", data))
         case "finger_lifted":
             return _marked(session, _instant(session, "lift", data))
         case "readings_joined":
@@ -233,6 +251,11 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
             return replace(session, phase=session.before_pause)
         case "note":
             return replace(session, notes=(*session.notes, str(data["text"])))
+        case "redo" if session.phase not in ("taring", "ready"):
+            again = redo_targets(session) if session.phase != "stroking" else ()
+            return replace(session, redone=tuple(one.trial.number for one in again))
+        case "undo_redo" | "stroke_done":
+            return replace(session, redone=())
         case _:
             return _of_trial(session, number, event.kind, data)
 
@@ -253,9 +276,11 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":
-            return session.with_trial(number, outcome=_discarded(data), answer=None, discarded=str(data["reason"]))
+            return _discarded(session, number, str(data["reason"]))
+        case "take_restored":
+            return _restored(session, number, data["take"])
         case "skip":
-            return session.with_trial(number, outcome="skipped")
+            return replace(session.with_trial(number, outcome="skipped"), redone=())
         case _:
             return session
 
@@ -267,8 +292,21 @@ def _answer(form: str, answer: float | str | None) -> str:
     return tr("no answer") if answer is None else tr(form, answer=answer)
 
 
-def _discarded(data: Mapping[str, Any]) -> Outcome:
-    return "skipped" if str(data["reason"]).startswith("skipped: ") else "coming"
+def _discarded(session: SessionState, number: int | None, reason: str) -> SessionState:
+    of = session.of(number)
+    earlier = () if of is None else (*of.earlier, replace(of, earlier=()))
+    outcome = "skipped" if reason.startswith("skipped: ") else "coming"
+    return session.with_trial(number, outcome=outcome, answer=None, discarded=reason, earlier=earlier)
+
+
+def _restored(session: SessionState, number: int | None, take: int) -> SessionState:
+    """Return the session with a discarded take in hand again, and what was known of it."""
+    of = session.of(number)
+    was = next((one for one in (() if of is None else of.earlier) if one.takes == take), None)
+    if was is None:
+        return session
+    known = {name: getattr(was, name) for name in ("takes", "answer", "quality", "discarded")}
+    return session.with_trial(number, outcome="coming", **known)
 
 
 def _judged(session: SessionState, trial: int, take: int, quality: Quality) -> SessionState:

@@ -5,7 +5,7 @@ from typing import Literal
 
 from daq_app.recorder import messages as m
 from daq_app.window.bench_state import BenchState
-from daq_app.window.course_state import SessionState, TrialState
+from daq_app.window.course_state import IN_A_TRIAL, SessionState, TrialState, redo_targets
 from daq_app.window.messages import Message, NewSession
 from daq_app.window.stroke_quality import Quality
 from daq_app.window.view_trials import Tile, tiles
@@ -14,7 +14,6 @@ from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 from sessions.run import steps
 
 WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
-IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +60,7 @@ class CourseView:
     tiles: tuple[Tile, ...]
     stroke: StrokeView
     redo: Button
+    undo: Button  # of the last redo
     skip: Button
     pause: Button
     note: Button
@@ -81,11 +81,12 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else _clock(now - session.since),
-        told=tr("It is kept in {folder}", folder=session.folder) if over else session.told or "",
+        told=tr("It is kept in {folder}", folder=session.folder) if over else session.told or _undo_words(session),
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
         redo=_redo(again, stroke.redo),
+        undo=_undo(session),
         skip=Button(tr("Skip"), "S", session.phase in IN_A_TRIAL, question=tr("Why is it left out?")),
         pause=_pause(session),
         note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
@@ -95,34 +96,36 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
     )
 
 
-def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
-    """Return the trials that a redo would discard now: one, two that are compared, or none."""
-    if session.phase in IN_A_TRIAL - {"mounting"}:
-        trial = session.of(session.trial)
-    elif session.phase == "closing":
-        trial = session.trials[-1]
-    else:  # before the first take of a trial it is the one before
-        mounted = session.of(session.trial) if session.phase == "mounting" else None
-        trial = session.of(mounted.trial.number - 1) if mounted is not None and not mounted.takes else None
-    if trial is None:
-        return ()
-    first = session.of(trial.trial.compared_with)
-    return (trial,) if first is None else (first, trial)
-
-
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     """Return the button that names what it discards."""
     if not again:
         return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in again)
-    named = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in again)
-    trials = tr("trial {named}", named=named) if len(again) == 1 else tr("trials {named}", named=named)
     return Button(
         tr("Redo {numbers}", numbers=numbers),
         "R",
         sends=sends,
-        question=tr("Why redo {trials}? What was recorded of it no longer counts.", trials=trials),
+        question=tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_named(again)),
     )
+
+
+def _undo(session: SessionState) -> Button:
+    """Return the button that undoes the last redo, until the next stroke."""
+    numbers = "–".join(map(str, session.redone))
+    label = tr("Undo redo {numbers}", numbers=numbers)
+    return Button(label, "Ctrl+Z", bool(numbers) and session.phase in ("mounting", "taring", "ready"), steps.UndoRedo())
+
+
+def _undo_words(session: SessionState) -> str:
+    trials = tuple(trial for trial in session.trials if trial.trial.number in session.redone)
+    if not trials:
+        return ""
+    return tr("Done again: {trials}. Ctrl+Z undoes that until the next stroke.", trials=_named(trials))
+
+
+def _named(trials: tuple[TrialState, ...]) -> str:
+    named = tr(" and ").join(f"{trial.trial.number} ({trial.trial.stimulus.code})" for trial in trials)
+    return tr("trial {named}", named=named) if len(trials) == 1 else tr("trials {named}", named=named)
 
 
 def _end(*, over: bool) -> Button:

@@ -72,6 +72,7 @@ class _Resumed(msgspec.Struct):
 SHAPES: Mapping[str, type[msgspec.Struct]] = {
     "take_started": _Take,
     "take_kept": _Take,
+    "take_restored": _Take,
     "take_discarded": _Discarded,
     "scored": _Scored,
     "number_given": _Number,

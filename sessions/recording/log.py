@@ -70,35 +70,37 @@ def trial_records(plan: SessionPlan, events: Sequence[LoggedEvent]) -> tuple[Tri
 def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
     """Follow the events of one trial; a later outcome replaces an earlier one."""
     takes: dict[int, Take] = {}
+    answers: dict[int, Any] = {}  # by take
     outcome: Outcome = "open"
-    answer: Any = None
+    in_hand: int = 0  # number of a take
     kept: int | None = None
     for event in events:
         number = event.data.get("take")
         match event.kind:
             case "take_started":
-                takes[event.data["take"]] = Take(event.data["take"], event.time_ns, None, 0, None)
-                outcome, answer, kept = "open", None, None
+                in_hand = event.data["take"]
+                takes[in_hand] = Take(in_hand, event.time_ns, None, 0, None)
+                outcome, kept = "open", None
             case "contact_onset" | "stroke_done" if takes:
-                last = max(takes)
-                takes[last] = replace(takes[last], strokes=takes[last].strokes + 1)
+                takes[in_hand] = replace(takes[in_hand], strokes=takes[in_hand].strokes + 1)
             case "scored" | "number_given" | "chosen" if event.kind == _ANSWERED.get(trial.answer):
-                answer = event.data[ANSWERS[event.kind]]
+                answers[in_hand] = event.data[ANSWERS[event.kind]]
             case "take_kept" if number in takes:
-                takes[number] = replace(takes[number], stop_ns=event.time_ns)
-                outcome, kept = _OUTCOMES[trial.answer] if answer is not None else _unanswered(trial), number
+                takes[number] = _ended(takes[number], event, None)
+                outcome, kept = _outcome(trial, answers.get(number)), number
             case "take_discarded" if number in takes:
-                stop = takes[number].stop_ns  # a take that was kept first ended when it was kept
-                takes[number] = replace(
-                    takes[number], stop_ns=event.time_ns if stop is None else stop, discarded=event.data["reason"]
-                )
-                outcome, answer, kept = ("skipped" if outcome == "skipped" else "open"), None, None
+                takes[number] = _ended(takes[number], event, event.data["reason"])
+                outcome, kept = ("skipped" if outcome == "skipped" else "open"), None
+            case "take_restored" if number in takes:
+                in_hand = number
+                takes[number] = replace(takes[number], discarded=None)
             case "skip" | "left_out":
                 outcome = "skipped"
             case _:
                 pass
     counts = takes[kept] if kept is not None else None
     others = tuple(take for take in takes.values() if take is not counts)
+    answer = answers.get(in_hand)
     return TrialRecord(
         trial,
         outcome,
@@ -120,5 +122,12 @@ _OUTCOMES: Mapping[Answer, Outcome] = {
 }
 
 
-def _unanswered(trial: Trial) -> Outcome:
+def _ended(take: Take, event: LoggedEvent, discarded: str | None) -> Take:
+    """Return a take at its end; one that ended before, and was restored or discarded since, ends where it did."""
+    return replace(take, stop_ns=event.time_ns if take.stop_ns is None else take.stop_ns, discarded=discarded)
+
+
+def _outcome(trial: Trial, answer: Any) -> Outcome:  # noqa: ANN401  a score, a number or a choice
+    if answer is not None:
+        return _OUTCOMES[trial.answer]
     return "presented" if trial.answer == "none" else "not answered"

@@ -23,6 +23,7 @@ from sessions.run.steps import (
     LeaveOut,
     MagnitudeEstimate,
     PairedChoice,
+    RestoreTake,
     ShowInstruction,
     StartTake,
     Tell,
@@ -70,6 +71,8 @@ def line_of(command: Command) -> Line | None:
             return "take_kept", trial, {"take": take}
         case DiscardTake(trial, take, reason):
             return "take_discarded", trial, {"take": take, "reason": reason}
+        case RestoreTake(trial, take):
+            return "take_restored", trial, {"take": take}
         case LeaveOut(trial, reason):
             return "left_out", trial, {"reason": reason}
         case Tell(sentence):

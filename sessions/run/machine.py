@@ -1,5 +1,7 @@
 """The course of a session as a table of cases: state and event to state and commands. It does nothing itself."""
 
+from dataclasses import replace
+
 from sessions.plan.plan import SessionPlan
 from sessions.run.answers import Given, problem
 from sessions.run.states import (
@@ -45,6 +47,7 @@ from sessions.run.steps import (
     Pause,
     Redo,
     Refuse,
+    RestoreTake,
     RestOver,
     Resume,
     Scored,
@@ -55,10 +58,13 @@ from sessions.run.steps import (
     StimulusMounted,
     StrokeDone,
     Tell,
+    UndoRedo,
     Zeroed,
 )
 
 Step = tuple[State, tuple[Command, ...]]
+
+UNDONE = "the redo was undone"
 
 
 def start(plan: SessionPlan) -> Step:
@@ -85,8 +91,8 @@ def advance(state: State, event: Event) -> Step:
             return _resting(state, event)
         case _, Redo(reason) | Skip(reason) if not reason.strip():
             return state, (Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
-        case _, Redo(reason):
-            return _again(state, reason)
+        case _, Redo() | UndoRedo():
+            return _again(state, event)
         case _, Skip(reason):
             return _left_out(state, reason)
         case _, ContactOnset() | FingerLifted() | Settled():
@@ -133,7 +139,7 @@ def _went_on(state: State, event: Event) -> Step:
         case Taring(place), Zeroed():
             return Ready(place), (_ask_stroke(place),)
         case Ready(place), StrokeDone() if not place.plan.forces:
-            return _stroke_over(place)
+            return _stroke_over(place.at(place.index))
         case Closing(), Finish():
             reason = "every trial is done"
             return Ended(reason, complete=True), (EndSession(reason, complete=True),)
@@ -145,7 +151,7 @@ def _touched(state: State, event: ContactOnset | FingerLifted | Settled) -> Step
     """Follow the finger, where a transducer tells of it."""
     match state, event:
         case Ready(place), ContactOnset() if place.plan.forces:
-            return Stroking(place), ()
+            return Stroking(place.at(place.index)), ()
         case Stroking(place), FingerLifted():
             return _stroke_over(place)
         case Scoring(place, touching=False, strokes=strokes), ContactOnset() if place.plan.forces:
@@ -194,7 +200,18 @@ def _resting(state: State, event: Pause | Resume | RestOver) -> Step:
             return state, (_refusal(state, event),)
 
 
-def _again(state: State, reason: str) -> Step:
+def _again(state: State, event: Redo | UndoRedo) -> Step:
+    """Repeat a trial, or undo that; a redo that discards no whole stroke cannot be undone."""
+    if isinstance(event, UndoRedo):
+        return _redo_undone(state)
+    after, commands = _repeated(state, event.reason)
+    whole = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
+    if whole and after != state and isinstance(after, Mounting | Taring | Ready):
+        after = replace(after, place=replace(after.place, before_redo=state))
+    return after, commands
+
+
+def _repeated(state: State, reason: str) -> Step:
     """Repeat the trial in hand, or the one before where none is in hand yet; the order after it stays as it was."""
     match state:
         case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
@@ -211,6 +228,42 @@ def _again(state: State, reason: str) -> Step:
             return _taken_up(place, reason)
         case _:
             return state, (_refusal(state, Redo(reason)),)
+
+
+def _redo_undone(state: State) -> Step:
+    """Return to where the last redo came from: what it discarded is restored, what was left out is left out again."""
+    match state:
+        case Mounting(place) | Taring(place) | Ready(place) if place.before_redo is not None:
+            before = place.before_redo
+        case _:
+            return state, (Refuse("there is no redo to undo: it can be undone until the next stroke"),)
+    assert not isinstance(before, Ended)
+    then, trials, restored = before.place, place.plan.trials, list[Command]()
+    in_hand = then.index if isinstance(before, Scoring | Settling) else None
+    for index in range(place.index, then.index + isinstance(before, Scoring | Settling | Closing)):
+        was, takes, number = then.progress[index], place.progress[index].takes, trials[index].number
+        if was.kept or index == in_hand:
+            restored += (RestoreTake(number, was.take), *([KeepTake(number, was.take)] if was.kept else ()))
+        else:
+            restored.append(LeaveOut(number, UNDONE))
+        then = replace(then.at(index).with_take(takes).with_take(was.take, kept=was.kept), index=then.index)
+    after, commands = _gone_back(replace(before, place=then))
+    return after, (*_discarding(state, UNDONE), *restored, *commands)
+
+
+def _gone_back(before: State) -> Step:
+    """Enter the state that a redo had left; the finger has been off since."""
+    match before:
+        case Scoring(place, strokes=strokes):
+            return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
+        case Settling(place):
+            return _kept(place)
+        case Resting(place):
+            return before, (AskRest(place.plan.rests.duration),)
+        case Mounting(place):
+            return before, (AskMount(place.trial),)
+        case _:
+            return before, (AskFinish(),)
 
 
 def _left_out(state: State, reason: str) -> Step:
@@ -231,7 +284,7 @@ def _left_out(state: State, reason: str) -> Step:
 
 def _take_begun(place: Place) -> Step:
     """Open the next take of the trial in hand, its stimulus being on."""
-    place = place.with_progress(Progress(place.take + 1))
+    place = place.with_take(place.progress[place.index].takes + 1)
     begun = StartTake(place.trial.number, place.take)
     if place.plan.forces:
         return Taring(place), (begun, MeasureZero())
@@ -255,7 +308,7 @@ def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
 
 def _kept(place: Place) -> Step:
     kept = KeepTake(place.trial.number, place.take)
-    after, commands = _next(place.with_progress(Progress(place.take, kept=True)))
+    after, commands = _next(place.with_take(place.take, kept=True))
     return after, (kept, *commands)
 
 
@@ -279,13 +332,13 @@ def _undoing(place: Place, reason: str) -> tuple[Command, ...]:
 
 
 def _not_kept(place: Place) -> Place:
-    return place.with_progress(Progress(place.take))
+    return place.with_take(place.take)
 
 
 def _next(place: Place) -> Step:
     """Go on to the next trial, if there is one, or to the rest before it."""
     if place.last:
-        return Closing(place), (AskFinish(),)
+        return Closing(place.at(place.index)), (AskFinish(),)
     after = place.at(place.index + 1)
     if after.rest_due:
         return Resting(after), (AskRest(after.plan.rests.duration),)
@@ -358,6 +411,7 @@ WORDS: dict[type[Event], str] = {
     PairedChoice: "a choice",
     Note: "a note",
     Redo: "redo",
+    UndoRedo: "the undoing of a redo",
     Skip: "skip",
     Pause: "pause",
     Resume: "resume",

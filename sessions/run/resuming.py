@@ -19,7 +19,7 @@ from sessions.run.states import State
 from sessions.run.steps import Command, Refuse
 
 CUT_SHORT = "the recording was cut short in the middle of it"
-OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "left_out"})
+OF_TAKES = frozenset({"take_started", "take_kept", "take_discarded", "take_restored", "left_out"})
 RESUMABLE = frozenset({"device", "client", "disk"})  # causes of an end that cut a session short
 LEAST_GAP_NS = 1_000_000  # where the wall clock shows none: the session clock never stands still or runs backwards
 

@@ -16,7 +16,7 @@ from sessions.run.live_detection import Detector, TakeWatch
 from sessions.run.machine import advance, start, trial_in_hand
 from sessions.run.resuming import Resumption, Seam
 from sessions.run.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
-from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell
+from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell, UndoRedo
 from sessions.strokes.onset import ContactDetector, DetectorSettings
 
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
@@ -233,7 +233,7 @@ class _Run:
             return
         logged = self.writer.event(kind_of(event), trial_in_hand(before), data_of(event), commit=False)
         self._begin_rest(commands, logged.time_ns)
-        if not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
+        if isinstance(event, UndoRedo) or not isinstance(self._state, Taring | Ready | Stroking | Scoring | Settling):
             self._watch = None
         self._carry_out(commands)
 

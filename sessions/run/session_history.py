@@ -19,6 +19,7 @@ ACTS = frozenset(
         "chosen",
         "note",
         "redo",
+        "undo_redo",
         "skip",
         "pause",
         "resume",

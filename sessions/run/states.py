@@ -10,7 +10,8 @@ class Progress:
     """How far one trial is."""
 
     takes: int = 0  # begun so far
-    kept: bool = False  # True when the last of them counts
+    take: int = 0  # number of the one in hand, or in hand last
+    kept: bool = False  # True when that one counts
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,7 @@ class Place:
     plan: SessionPlan
     index: int  # of the trial in hand
     progress: tuple[Progress, ...]  # one for each trial of the plan
+    before_redo: "State | None" = None  # to which a redo can be undone, until the next stroke
 
     @property
     def trial(self) -> Trial:
@@ -33,8 +35,8 @@ class Place:
 
     @property
     def take(self) -> int:
-        """Return the number of the latest take of the trial in hand; 0 before the first."""
-        return self.progress[self.index].takes
+        """Return the number of the take of the trial in hand; 0 before the first."""
+        return self.progress[self.index].take
 
     @property
     def last(self) -> bool:
@@ -60,11 +62,12 @@ class Place:
         return rests.after_trials is not None and counted % rests.after_trials == 0
 
     def at(self, index: int) -> "Place":
-        """Return the place with another trial in hand."""
-        return replace(self, index=index)
+        """Return the place with another trial in hand, to which no redo has led."""
+        return replace(self, index=index, before_redo=None)
 
-    def with_progress(self, progress: Progress) -> "Place":
-        """Return the place with the trial in hand that far."""
+    def with_take(self, take: int, *, kept: bool = False) -> "Place":
+        """Return the place with this take of the trial in hand, the latest or an earlier one."""
+        progress = Progress(max(take, self.progress[self.index].takes), take, kept)
         return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
 
 

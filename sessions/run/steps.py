@@ -114,6 +114,11 @@ class Redo:
 
 
 @dataclass(frozen=True, slots=True)
+class UndoRedo:
+    """The last redo was a mistake: what it discarded counts again. Meant until the next stroke."""
+
+
+@dataclass(frozen=True, slots=True)
 class Skip:
     """The trial in hand is to be left out, and with the first of two that are compared also the second."""
 
@@ -160,6 +165,7 @@ Event = (
     | PairedChoice
     | Note
     | Redo
+    | UndoRedo
     | Skip
     | Pause
     | Resume
@@ -263,8 +269,16 @@ class DiscardTake:
 
 
 @dataclass(frozen=True, slots=True)
+class RestoreTake:
+    """A take that a redo discarded is in hand again; its readings end where they ended."""
+
+    trial: int
+    take: int
+
+
+@dataclass(frozen=True, slots=True)
 class LeaveOut:
-    """A trial that was not begun is left out together with the one before it."""
+    """A trial is left out together with the one before it, or again after a redo was undone."""
 
     trial: int
     reason: str
@@ -310,6 +324,7 @@ Command = (
     | AskRest
     | KeepTake
     | DiscardTake
+    | RestoreTake
     | LeaveOut
     | AskFinish
     | Tell

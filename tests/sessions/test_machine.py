@@ -31,6 +31,7 @@ from sessions.run.steps import (
     Pause,
     Redo,
     Refuse,
+    RestoreTake,
     RestOver,
     Resume,
     Scored,
@@ -41,6 +42,7 @@ from sessions.run.steps import (
     StimulusMounted,
     StrokeDone,
     Tell,
+    UndoRedo,
     Zeroed,
 )
 
@@ -194,6 +196,34 @@ def test_pressing_redo_twice_does_not_reach_further_back():
     same, (refused,) = advance(state, Redo("wrong finger"))
     assert same == state
     assert refused == Refuse("trial 2 is about to be repeated already")
+
+
+def test_a_redo_is_undone_until_the_next_stroke_and_the_answer_is_asked_for_again():
+    so_far = (Begin(), mounted(), Zeroed(), *STROKE, Redo("mistaken"))
+    undone = (DiscardTake(1, 2, "the redo was undone"), RestoreTake(1, 1))
+    for more in ((), (Zeroed(),)):
+        state, commands = after(FORCES, *so_far, *more, UndoRedo())
+        assert commands[:-1] == undone
+        assert isinstance(commands[-1], AskScore)
+        assert isinstance(state, Scoring)
+    assert commands_after(FORCES, *so_far, UndoRedo(), Scored(3.0))[0] == KeepTake(1, 1)
+    assert commands_after(FORCES, *so_far, UndoRedo(), Redo("after all"))[:2] == (
+        DiscardTake(1, 1, "after all"),
+        StartTake(1, 3),
+    )
+    (refused,) = advance(after(FORCES, *so_far, Zeroed(), *STROKE)[0], UndoRedo())[1]
+    assert refused == Refuse("there is no redo to undo: it can be undone until the next stroke")
+
+
+def test_undoing_the_redo_of_a_trial_that_was_done_restores_it_and_of_one_that_was_skipped_leaves_it_out():
+    commands = commands_after(FORCES, Begin(), *done(0), *done(1), Redo("mistaken"), UndoRedo())
+    assert commands == (RestoreTake(2, 1), KeepTake(2, 1), AskMount(FORCES.trials[2]))
+    skipped = (Begin(), mounted(), Skip("surface dirty"), Redo("cleaned"), mounted(), UndoRedo())
+    assert commands_after(FORCES, *skipped) == (
+        DiscardTake(1, 2, "the redo was undone"),
+        LeaveOut(1, "the redo was undone"),
+        AskMount(FORCES.trials[1]),
+    )
 
 
 def test_a_skipped_trial_can_be_taken_up_again():

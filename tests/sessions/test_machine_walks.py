@@ -4,8 +4,20 @@ from hypothesis import given, settings
 from walks import meant, steps, walks
 
 from sessions.run.machine import advance, start
-from sessions.run.states import Closing, Ended
-from sessions.run.steps import Abort, AskMount, DiscardTake, KeepTake, LeaveOut, Note, Refuse, StartTake
+from sessions.run.states import Closing, Ended, Ready, Settling, Stroking, Taring
+from sessions.run.steps import (
+    Abort,
+    AskMount,
+    DiscardTake,
+    KeepTake,
+    LeaveOut,
+    Note,
+    Redo,
+    Refuse,
+    RestoreTake,
+    StartTake,
+    UndoRedo,
+)
 
 
 @given(walk=walks())
@@ -29,7 +41,7 @@ def test_the_same_plan_and_events_give_the_same_session(walk):
 @given(walk=walks())
 @settings(max_examples=200)
 def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
-    kept, open_take, begun, asked, left_out = {}, None, set(), {}, set()
+    kept, open_take, begun, discarded, asked, left_out = {}, None, set(), set(), {}, set()
     for _, _, state, commands in steps(*walk):
         for command in commands:
             match command:
@@ -45,7 +57,12 @@ def test_no_walk_brings_the_order_into_disorder_or_confuses_takes(walk):
                     kept[trial], open_take = take, None
                 case DiscardTake(trial, take):
                     assert (trial, take) == open_take or kept.pop(trial) == take
+                    discarded.add((trial, take))
                     open_take = None
+                case RestoreTake(trial, take):
+                    assert open_take is None
+                    assert (trial, take) in discarded
+                    open_take = (trial, take)
                 case AskMount(trial):
                     asked.setdefault(trial.number)
                 case LeaveOut(trial):
@@ -69,3 +86,22 @@ def test_every_walk_can_be_completed_and_can_be_aborted(walk):
             break
         state, _ = advance(state, meant(state))
     assert isinstance(state, Ended)
+
+
+@given(walk=walks())
+@settings(max_examples=200)
+def test_a_redo_that_is_undone_leaves_every_trial_as_it_was(walk):
+    for before, event, state, _ in steps(*walk):
+        if not isinstance(event, Redo) or state == before:
+            continue
+        after, commands = advance(state, UndoRedo())
+        if isinstance(commands[0], Refuse):
+            assert isinstance(before, Taring | Ready | Stroking)
+            continue
+        counted = {number: trial.take for number, trial in enumerate(before.place.progress) if trial.kept}
+        if isinstance(before, Settling):
+            counted[before.place.index] = before.place.take
+        assert {n: trial.take for n, trial in enumerate(after.place.progress) if trial.kept} == counted
+        assert all(a.takes >= b.takes for a, b in zip(after.place.progress, state.place.progress, strict=True))
+        if not isinstance(before, Settling):
+            assert (type(after), after.place.index) == (type(before), before.place.index)

@@ -283,6 +283,25 @@ def test_a_take_that_was_kept_and_then_discarded_keeps_its_own_end():
     ]
 
 
+def test_a_take_that_is_restored_counts_with_its_own_end_and_the_answer_that_came_after():
+    (record,) = trial_records(
+        PLAN,
+        told(
+            ("take_started", 1, {"take": 1}),
+            ("contact_onset", 1, {}),
+            ("take_discarded", 1, {"take": 1, "reason": "by mistake"}),
+            ("take_started", 1, {"take": 2}),
+            ("take_discarded", 1, {"take": 2, "reason": "the redo was undone"}),
+            ("take_restored", 1, {"take": 1}),
+            ("scored", 1, {"score": 5.0}),
+            ("take_kept", 1, {"take": 1}),
+        ),
+    )
+    assert (record.outcome, record.score) == ("scored", 5.0)
+    assert (record.take.number, record.take.start_ns, record.take.stop_ns, record.take.strokes) == (1, 10, 30, 1)
+    assert [(take.number, take.discarded) for take in record.other_takes] == [(2, "the redo was undone")]
+
+
 def test_a_recording_without_a_plan_of_trials_has_none():
     assert trial_records(replace(PLAN, blocks=()), told(("started", None, {}))) == ()
 

@@ -23,6 +23,7 @@ from sessions.run.steps import (
     Skip,
     StimulusMounted,
     StrokeDone,
+    UndoRedo,
     Zeroed,
 )
 
@@ -61,6 +62,7 @@ EVENTS = st.one_of(
             Resume(),
             RestOver(),
             Finish(),
+            UndoRedo(),
         ]
     ),
     st.builds(StimulusMounted, st.sampled_from([*CODES, "K01", "K02", "K03"])),
@@ -68,7 +70,7 @@ EVENTS = st.one_of(
     st.builds(MagnitudeEstimate, st.none() | st.floats(-1, 1e6)),
     st.builds(PairedChoice, st.sampled_from([None, "first", "second"])),
     st.builds(Note, st.sampled_from(["", "yawned"])),
-    st.builds(Redo, st.sampled_from(["", "sneezed"])),
+    st.builds(Redo, st.sampled_from(["", "sneezed", "coughed"])),
     st.builds(Skip, st.sampled_from(["", "dirty"])),
 )
 PLANS = st.sampled_from(PLANS_OF_ALL_KINDS)

@@ -3,6 +3,7 @@
 import os
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
@@ -11,7 +12,9 @@ from PySide6.QtWidgets import QApplication
 
 from daq_app.qt.start import SIMULATED_BENCH
 from daq_app.recorder.messages import Connect, Disconnect
+from sessions.recording import Recording
 from sessions.run import steps
+from sessions.run.replay import different_events, replay
 
 pytestmark = pytest.mark.qt
 
@@ -158,6 +161,39 @@ def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
     QTest.keyClick(window.subject, Qt.Key.Key_R)
     assert f"trial 1 ({code})" in window.course._question.text()
     QTest.keyClick(window.course.line, ESCAPE)
+
+
+def test_a_redo_by_mistake_is_undone_with_a_key_and_the_replay_of_the_session_agrees(driver, tmp_path):
+    window = driver.window
+    begin(driver)
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    driver.until(lambda: driver.session.of(1).quality is not None, "what is said of the stroke")
+    assert not window.middle.undo.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_R)
+    if window.course.asking:
+        QTest.keyClicks(window.course.line, "mistaken")
+        QTest.keyClick(window.course.line, ENTER)
+    driver.until(lambda: driver.view.course.undo.enabled, "a redo that can be undone")
+    assert window.middle.undo.text() == "Undo redo 1  Ctrl+Z"
+    QTest.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    driver.until(lambda: driver.session.phase == "scoring", "the score is asked for again")
+    QTest.keyClick(window.subject.line, Qt.Key.Key_Right)
+    QTest.keyClick(window.subject.line, ENTER)
+    driver.until(lambda: driver.session.trial == 2, "the second trial")
+    window.bridge.send(steps.Redo("mistaken too"))
+    driver.until(lambda: driver.session.trial == 1, "the first trial again")
+    QTest.mouseClick(window.middle.undo, Qt.MouseButton.LeftButton)
+    driver.until(lambda: driver.session.trial == 2 and driver.session.phase == "mounting", "the second trial")
+    assert driver.session.of(1).quality is not None
+    window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    recording = Recording.open(Path(driver.session.folder))
+    first = recording.trials[0]
+    assert (first.outcome, first.score, first.take.number) == ("scored", 50.0, 1)
+    assert [take.discarded for take in first.other_takes] == ["the redo was undone"]
+    replayed = replay(recording, tmp_path / "replayed", None, lambda *_: None)
+    assert not list(different_events(recording, replayed))
 
 
 def test_the_page_of_the_next_session_has_no_code_and_enter_begins_none(driver):

@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, SCORE, SECOND, TARE, after, logged
+from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, READY, SCORE, SECOND, TARE, TOUCH, after, logged
 
 from daq_app.recorder import messages as m
+from daq_app.window.bench_state import BenchState
 from daq_app.window.messages import Judged
 from daq_app.window.stroke_quality import StrokePicture
+from daq_app.window.view_course import course_view
 from daq_app.window.view_trials import MARKS, inspection, tiles, verdict
 from sessions.plan.plan import Shown
 from sessions.run import steps
@@ -86,3 +88,40 @@ def test_a_protocol_that_keeps_forces_from_the_experimenter_shows_no_stroke():
 def test_a_take_that_was_discarded_keeps_its_reason():
     again = (*SCORE, logged("take_discarded", 1, reason="the finger slipped"), steps.StartTake(1, 2))
     assert "discarded: the finger slipped." in inspection(after(*again).session, 1).details
+
+
+def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset():
+    done = (*SCORE, Judged(1, 1, replace(GOOD, picture=PICTURE)), *KEPT)
+    again = (
+        logged("redo", 2, reason="mistaken"),
+        logged("take_discarded", 1, take=1, reason="mistaken"),
+        steps.AskMount(FIRST),
+        steps.StartTake(1, 2),
+        steps.MeasureZero(),
+    )
+    session = after(*done, *again).session
+    view = course_view(session, BenchState(), 0.0)
+    assert (view.undo.label, view.undo.key, view.undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
+    assert view.told.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
+    undone = (
+        logged("undo_redo", 1),
+        logged("take_discarded", 1, take=2, reason="the redo was undone"),
+        logged("take_restored", 1, take=1),
+        logged("take_kept", 1, take=1),
+        steps.AskMount(SECOND),
+    )
+    before, now = after(*done).session, after(*done, *again, *undone).session
+    assert tiles(now) == tiles(before)
+    assert inspection(now, 1).verdict == "Good"
+    assert "score 40" in inspection(now, 1).heading
+    assert not course_view(now, BenchState(), 0.0).undo.enabled
+    stroked = after(*done, *again, steps.AskStroke(FIRST), logged("contact_onset", 1, time=9.0, noticed=9.0)).session
+    assert not course_view(stroked, BenchState(), 0.0).undo.enabled
+
+
+def test_a_redo_before_the_stroke_or_in_the_middle_of_it_offers_no_undo():
+    for so_far in (READY, TOUCH):
+        session = after(
+            *so_far, logged("redo", 1, reason="sneezed"), steps.StartTake(1, 2), steps.MeasureZero()
+        ).session
+        assert not course_view(session, BenchState(), 0.0).undo.enabled
