@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sessions.prediction import QUANTITIES, SED, Quantity, SessionPrediction, TrialPrediction
 from sessions.prediction.sed_interval import Ends
-from solver.quantities import NAMES, energy
+from solver.quantities import NAMES
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ _ENERGY = 4e-6, "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0
 _STRAIN = 0.01, "1 % strain"
 _STRESS = 8e-4, "stress of 1 % strain in the published dermis, E e with E = 0.08 MPa"
 _THRESHOLDS = {
-    quantity.name: _ENERGY if quantity in energy.QUANTITIES else _STRAIN if quantity.unit == "-" else _STRESS
+    quantity.name: _ENERGY if quantity.name.startswith("sed") else _STRAIN if quantity.unit == "-" else _STRESS
     for quantity in QUANTITIES
 }
 

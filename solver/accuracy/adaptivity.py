@@ -16,7 +16,7 @@ from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import NestedNumbers
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 COARSE = (
     4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again

@@ -11,7 +11,7 @@ from solver.contact.law import FrictionLaw
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.failures import NoSteadyState, NotConverged
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING
 from solver.prediction import Prediction
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 NAMES = ("SED", "normal force", "drag", "indentation")  # what is compared: the first four of all numbers
 WARNED = 0.05  # part of their range from which on a warning says how far differences may be off

@@ -20,7 +20,7 @@ from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newt
 from solver.equilibrium.step_error import Steps
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Response
 from solver.quantities import NAMES
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node

@@ -7,7 +7,7 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 def relaxes(scene: Scene) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 from solver.accuracy.omitted_effects import warnings
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction
-from solver.scene import Materials, Scene, Solve
+from solver.scene.scene import Materials, Scene, Solve
 
 COARSE = 0.5  # tolerance that asks for the coarsest mesh
 Answer = Prediction | SolveFailure

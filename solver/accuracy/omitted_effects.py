@@ -11,7 +11,7 @@ from solver.constitutive.hyperelastic import HUMAN_SKIN
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState
-from solver.scene import Material, Scene
+from solver.scene.scene import Material, Scene
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are

@@ -12,7 +12,7 @@ from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.failures import SolveFailure
 from solver.prediction import COUNT, NestedNumbers
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 def steps_asked(scene: Scene, finger: LinearFinger) -> Steps:

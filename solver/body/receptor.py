@@ -8,10 +8,10 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.stiffness import Centred, Elastic, Probes, local_coordinates
 from solver.element import GAUSS_3
-from solver.mesh import Mesh, distinct
+from solver.mesh.mesh import Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import QUANTITIES
-from solver.scene import Receptor
+from solver.scene.scene import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
 _ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides

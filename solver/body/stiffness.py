@@ -13,7 +13,7 @@ from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.arrays import Array, Indices
 from solver.constitutive.hyperelastic import PLAIN
 from solver.element import Q2P1
-from solver.mesh import Mesh
+from solver.mesh.mesh import Mesh
 from solver.quantities import SED, LocalState
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)

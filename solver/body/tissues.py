@@ -2,7 +2,7 @@
 
 from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
 from solver.constitutive.linear import Moduli, Prony
-from solver.scene import Material, Materials
+from solver.scene.scene import Material, Materials
 
 
 def settled_moduli(materials: Materials) -> list[Moduli]:

@@ -10,8 +10,7 @@ from solver.arrays import Array
 from solver.constitutive.hyperelastic import STIFFENING, Law
 from solver.constitutive.linear import Prony
 from solver.element import Q2P1
-from solver.mesh import Mesh
-from solver.mesh.grid import jacobians
+from solver.mesh.mesh import Mesh, jacobians
 
 HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
 MOTIONS = ("x", "y", "turn")  # of a body as a whole

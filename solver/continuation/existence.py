@@ -14,7 +14,7 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
 APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]

@@ -18,7 +18,7 @@ from solver.equilibrium.loads import load_of, sliding_load
 from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]

@@ -18,7 +18,7 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState
 from solver.failures import NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
-from solver.scene import Finger, Materials, Receptor, Scene
+from solver.scene.scene import Finger, Materials, Receptor, Scene
 
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import _kernels as kernels
-from solver.body.finite_measures import deformation
+from solver.body.finite import deformation
 from solver.constitutive.hyperelastic import Law
 from solver.contact.skin_compression import SkinCompression
 from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch

@@ -11,7 +11,7 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 def direct(scene: Scene, finger: LinearFinger, times: float = 1.0, *, widest: bool) -> EquilibriumState | None:

@@ -19,7 +19,7 @@ from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
 from solver.progress import Progress
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 NUDGE = 1e-4  # of a given force, to see whether the finger gives way

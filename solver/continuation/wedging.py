@@ -15,7 +15,7 @@ from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh

@@ -11,9 +11,9 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
-from solver.mesh.grid import MeshError
+from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
-from solver.scene import SHALLOW, Friction, Loading, Scene, Solve
+from solver.scene.scene import SHALLOW, Friction, Loading, Scene, Solve
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
 COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it

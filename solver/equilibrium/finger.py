@@ -13,10 +13,10 @@ from solver.body.receptor import Endings, Patches, endings, middle
 from solver.body.stiffness import Centred
 from solver.contact.edges import arcs_of, width
 from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.mesh import distinct
+from solver.mesh.mesh import distinct
 from solver.mesh.mesher import FingerMesh
 from solver.prediction import ROW
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them
 

@@ -11,17 +11,16 @@ from numpy.linalg import LinAlgError
 from solver import _kernels as kernels
 from solver._kernels import OPEN
 from solver.arrays import Array, Indices
-from solver.body.finite import FiniteBody, FinitePatches
-from solver.body.finite_measures import deformation, element_forces, energy_slope
+from solver.body.finite import FiniteBody, FinitePatches, deformation, element_forces, energy_slope
 from solver.body.receptor import Endings
 from solver.body.tissues import finite_laws
 from solver.contact.skin_compression import SkinCompression
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton
-from solver.mesh.grid import MeshError
+from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
-from solver.scene import Scene, SceneError
+from solver.scene.scene import Scene, SceneError
 
 
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask

@@ -12,8 +12,7 @@ import numpy as np
 from solver import _kernels as kernels
 from solver._kernels import STICK
 from solver.arrays import Array, Indices
-from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
-from solver.body.finite_measures import deformation
+from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches, deformation
 from solver.body.tissues import relaxing_laws
 from solver.body.validation import check_moduli, check_terms
 from solver.constitutive import overstress
@@ -27,7 +26,7 @@ from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import NotConverged
 from solver.progress import report_progress
-from solver.scene import Loading, Scene
+from solver.scene.scene import Loading, Scene
 
 FIRST, LARGEST = 0.02, 0.1  # steps of a slide, by the indentation; each a fifth longer than the one before
 GOOD, CLOSE = 1e-8, 1e-7  # tolerance of displacements [mm], and by the indentation where that is less

@@ -16,7 +16,7 @@ from solver.element import Q2P1
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask

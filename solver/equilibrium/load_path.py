@@ -12,7 +12,7 @@ from solver.equilibrium.load_stepping import StepControl, advance, never
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.failures import NotConverged, followed_to
 from solver.progress import Progress, report_part
-from solver.scene import Loading
+from solver.scene.scene import Loading
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
 PRESSING_STEPS = 25

@@ -1,7 +1,7 @@
 """What a scene asks of the surface, as equilibria see it."""
 
 from solver.equilibrium.newton import Given, LoadState
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 def load_of(scene: Scene) -> LoadState:

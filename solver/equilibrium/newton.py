@@ -28,8 +28,7 @@ from solver._kernels.arguments import (
 )
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
-from solver.body.finite import CondensedFinite, FiniteBody
-from solver.body.finite_measures import energy, energy_slope
+from solver.body.finite import CondensedFinite, FiniteBody, energy, energy_slope
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
 from solver.failures import ContactLost, NotConverged

@@ -24,9 +24,9 @@ from solver.body.validation import check_body, check_driven, check_held, check_t
 from solver.constitutive.linear import Moduli, Prony, kept
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Way, course
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh import Mesh
+from solver.mesh.mesh import Mesh
 from solver.progress import Progress
-from solver.scene import Loading
+from solver.scene.scene import Loading
 
 KEPT = 4  # lengths of steps that a body is kept ready for, factors and all
 RELAXED = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7

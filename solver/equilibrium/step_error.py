@@ -17,7 +17,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
 MOST = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain

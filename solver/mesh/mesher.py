@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.mesh import Mesh, distinct
-from solver.mesh.grid import grid_mesh
+from solver.mesh.mesh import Mesh, distinct, grid_mesh
 from solver.mesh.outline import Outline
-from solver.scene import Finger, Receptor
+from solver.scene.scene import Finger, Receptor
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
 CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]

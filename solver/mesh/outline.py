@@ -11,7 +11,7 @@ from typing import Self
 import numpy as np
 
 from solver.arrays import Array
-from solver.scene import Finger
+from solver.scene.scene import Finger
 
 
 @dataclass(frozen=True, slots=True)

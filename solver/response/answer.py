@@ -17,7 +17,7 @@ from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)

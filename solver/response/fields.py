@@ -10,11 +10,11 @@ from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.body.tissues import finite_laws, settled_moduli
 from solver.element import Q2P1
-from solver.mesh import Mesh
+from solver.mesh.mesh import Mesh
 from solver.mesh.outline import Outline
 from solver.prediction import Prediction
 from solver.quantities import FIELDS, SED
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 # Eight triangles of each element, in its nine nodes
 _AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element

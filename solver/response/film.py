@@ -16,7 +16,7 @@ from solver.prediction import Skin
 from solver.progress import Progress
 from solver.response.answer import skin_of
 from solver.response.fields import Fields, Sketch
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,7 +25,7 @@ from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
 from solver.response.answer import Solved, history, prediction
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 ROUGH = 1e-8  # unbalanced part of the forces from which displacements are corrected further [-]
 CORRECTIONS = 4  # at most

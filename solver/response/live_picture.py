@@ -14,8 +14,8 @@ from solver.body.tissues import settled_moduli
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState
-from solver.mesh import Mesh
-from solver.scene import Scene
+from solver.mesh.mesh import Mesh
+from solver.scene.scene import Scene
 
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from solver import _kernels as kernels
 from solver._kernels import SLIP
 from solver.arrays import Array
-from solver.body.finite_measures import pressure
+from solver.body.finite import pressure
 from solver.contact.law import NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.limit_point import sound
@@ -28,7 +28,7 @@ from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin
 from solver.response.derivatives import Derivatives, by_stiffness, of_slide
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 GOOD = 1e-8  # tolerance of the displacements [mm]: far less than a difference of friction that anybody could tell
 NUMBERS = {name: state for state, name in NAMES.items()}

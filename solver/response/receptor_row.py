@@ -10,7 +10,7 @@ from solver.body.receptor import LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
 from solver.body.tissues import finite_laws, settled_moduli
 from solver.prediction import ROW, Prediction
-from solver.scene import Receptor
+from solver.scene.scene import Receptor
 
 
 def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, receptor: Receptor | None = None) -> Array:

@@ -23,10 +23,10 @@ from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
-from solver.mesh.grid import MeshError
+from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.quantities import NAMES
-from solver.scene import Scene, SceneError
+from solver.scene.scene import Scene, SceneError
 
 FINENESS = 6.0  # elements to a tip radius, at small strain
 

@@ -33,12 +33,12 @@ from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps, times_on_way
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh.grid import MeshError
+from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import FORCES_AND_PLACES, Prediction
 from solver.progress import Progress, report_part
 from solver.response.answer import Solved, history, prediction
-from solver.scene import Scene, SceneError
+from solver.scene.scene import Scene, SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
 

@@ -18,7 +18,7 @@ from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
 from solver.response import small_solution
 from solver.response.small_solution import Answer, Fingers, Watch
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.accuracy.adaptivity import Meshes

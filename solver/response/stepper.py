@@ -14,7 +14,7 @@ from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import Deformable, EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
-from solver.scene import Scene
+from solver.scene.scene import Scene
 
 if TYPE_CHECKING:
     from solver.response.live_picture import LivePicture

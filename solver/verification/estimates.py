@@ -12,7 +12,7 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.scene import Scene, Solve
+from solver.scene.scene import Scene, Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import random_scene

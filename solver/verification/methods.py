@@ -23,7 +23,7 @@ from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.scene import Scene
+from solver.scene.scene import Scene
 from solver.verification.asked import clock
 
 Kinematics = Literal["small", "finite"]

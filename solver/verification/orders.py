@@ -12,8 +12,8 @@ from solver.continuation.small_states import settled
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.mesh.mesher import Sizing
-from solver.scene import Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
+from solver.scene.scene import Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.published import contacts, locking
 

@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from solver.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, Solve
+from solver.scene.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, Solve
 from solver.verification.methods import Kinematics
 
 CLOSE = 0.06  # of every other set of surfaces, how far the coefficients lie from the first at most

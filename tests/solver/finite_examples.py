@@ -12,7 +12,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.newton import FiniteNewton
-from solver.mesh import Mesh
+from solver.mesh.mesh import Mesh
 from solver.mesh.mesher import Sizing, finger_mesh
 
 

@@ -9,8 +9,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, energy, stress
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import LoadState
-from solver.mesh.blocks import block
-from solver.mesh.grid import quality
+from solver.mesh.mesh import block, quality
 from solver.verification.published.bodies import distorted
 from solver.verification.published.finite_contacts import ELEMENT, light_finite
 from solver.verification.published.problems import CAPPED, FINITE_PARTS

@@ -12,9 +12,7 @@ from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
-from solver.mesh.grid import quality
+from solver.mesh.mesh import Mesh, block, quality
 from solver.verification.published.bodies import distorted
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks

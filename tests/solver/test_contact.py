@@ -12,7 +12,7 @@ from solver.constitutive.linear import Hooke
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
-from solver.mesh.blocks import block
+from solver.mesh.mesh import block
 
 RADIUS = 5.0
 

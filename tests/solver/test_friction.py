@@ -23,7 +23,7 @@ from solver.equilibrium.newton import (
     LoadState,
     Newton,
 )
-from solver.mesh.blocks import block
+from solver.mesh.mesh import block
 from solver.response.small_stepper import Condensed, SmallStepper
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.active_set import Course, touchable, untouched

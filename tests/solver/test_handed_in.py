@@ -16,9 +16,7 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.march import march
 from solver.equilibrium.newton import FiniteNewton, Given, LoadState, Newton
 from solver.equilibrium.relaxation import RelaxingBody
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
-from solver.mesh.grid import MeshError
+from solver.mesh.mesh import Mesh, MeshError, block
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
 ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))

@@ -16,8 +16,7 @@ from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finite_finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_FRICTION, FiniteNewton, LoadState
-from solver.mesh import mesher
-from solver.mesh.grid import grid_mesh
+from solver.mesh.mesh import grid_mesh, mesher
 from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow

@@ -5,11 +5,9 @@ import pytest
 from numpy.linalg import LinAlgError
 
 from solver import Finger, Receptor, solve, solve_many
-from solver.body.linear import LinearBody
-from solver.body.linear_elimination import LinearElimination
+from solver.body.linear import LinearBody, LinearElimination
 from solver.constitutive.linear import Hooke, Moduli
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
+from solver.mesh.mesh import Mesh, block
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.oracle import linear as oracle

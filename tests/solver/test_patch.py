@@ -12,8 +12,7 @@ from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
+from solver.mesh.mesh import Mesh, block
 
 DERMIS = Hooke(0.08, 0.48)
 PRESSURE = 0.001

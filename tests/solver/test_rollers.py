@@ -13,8 +13,8 @@ from solver.constitutive.linear import Hooke
 from solver.equilibrium.dead_loads import loaded
 from solver.equilibrium.march import march
 from solver.equilibrium.newton import FiniteNewton, LoadState, Newton
-from solver.mesh import Mesh
-from solver.mesh.blocks import block as round_block
+from solver.mesh.mesh import Mesh
+from solver.mesh.mesh import block as round_block
 from solver.verification.published.bodies import ring
 from solver.verification.published.locking import INNER, OUTER, YOUNG, widening
 from tests.solver.finite_examples import block

@@ -6,8 +6,8 @@ from solver.body.linear import LinearBody
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.constitutive.linear import MATERIALS, Hooke
 from solver.element import Q2P1
-from solver.linalg.nested_dissection import Tree, places
-from solver.mesh.blocks import block
+from solver.linalg.multifrontal import Tree, places
+from solver.mesh.mesh import block
 from solver.mesh.mesher import Sizing, finger_mesh
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48)]

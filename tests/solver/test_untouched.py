@@ -9,7 +9,7 @@ from solver._kernels import STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh.grid import grid_mesh
+from solver.mesh.mesh import grid_mesh
 
 RADIUS, YOUNG, NU, MU = 5.0, 0.08, 0.4999, 0.3  # nearly incompressible: normal and shear do not couple
 LOAD = 0.0005  # [N/mm]

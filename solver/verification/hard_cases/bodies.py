@@ -14,8 +14,7 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.march import march
 from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState, Newton
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
+from solver.mesh.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.scene.published import STICKINESS, scene
 from solver.verification.hard_cases.meshes import slabs, two_parts

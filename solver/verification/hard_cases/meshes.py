@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.arrays import Array
-from solver.mesh import Mesh
-from solver.mesh.blocks import block
+from solver.mesh.mesh import Mesh, block
 
 STIFF_LAYERS = 2
 

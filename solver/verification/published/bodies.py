@@ -12,8 +12,7 @@ from solver.body.stiffness import Probes, local_coordinates
 from solver.contact.law import OPEN, SLIP
 from solver.element import Q2P1
 from solver.equilibrium.newton import Newton
-from solver.mesh import Mesh
-from solver.mesh.grid import grid_mesh
+from solver.mesh.mesh import Mesh, grid_mesh
 
 NONE: Indices = np.zeros(0, np.int64)
 

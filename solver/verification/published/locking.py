@@ -7,7 +7,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke
 from solver.element import Q2P1
-from solver.mesh import Mesh
+from solver.mesh.mesh import Mesh
 from solver.verification.published.bodies import distorted, membrane, ring
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa

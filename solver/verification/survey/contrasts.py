@@ -14,7 +14,7 @@ from solver.accuracy.contrasts import WARNED
 from solver.arrays import Array
 from solver.failures import SolveFailure
 from solver.response.solution import solve_many
-from solver.scene import Scene
+from solver.scene.scene import Scene
 from solver.verification.asked import clock
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import surface_set

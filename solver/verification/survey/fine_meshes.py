@@ -12,7 +12,7 @@ from solver.continuation.wedging import WIDE
 from solver.equilibrium.linear_finger import LinearFinger
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.scene import Scene
+from solver.scene.scene import Scene
 from solver.verification.methods import FiniteMeshed
 from solver.verification.truth import SHIFTED
 

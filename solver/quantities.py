@@ -1,0 +1,304 @@
+"""Responses of the tissue at a receptor, from what is known of a place: energies, strains and stresses.
+
+At an ending each is averaged over the ending's patch: the mean of the values at its places. Strains along the skin are
+in the frame of the skin at rest; stretches are given less one. Stresses are Cauchy's, those across the plane included.
+The list of quantities is at the foot; the first is the published one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.constitutive.hyperelastic import log1p, shape, slopes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalState:
+    """Deformation and moduli of n places, in c states of the body each. All arrays broadcast to (n, c).
+
+    The displacement gradient is du_a/dx_b; at small strain its symmetric part alone. `tangent` is the direction of the
+    undeformed skin above the place, towards the tip: a unit vector in the plane. Its normal points into the tissue.
+    Numbers may be complex, for derivatives by complex steps.
+    """
+
+    xx: Array
+    xy: Array
+    yx: Array
+    yy: Array
+    dilatation: Array  # volume strain at small strain, ln J at finite: each element's best fit of it [-]
+    shear: Array  # modulus [MPa]
+    lame: Array  # Lamé's first constant [MPa]
+    stiffening: Array  # Ogden's exponent [-]; at small strain unused
+    tangent: tuple[Array, Array]
+
+    @property
+    def volume(self) -> Array:
+        """J: volume by undeformed volume at the place itself [-]."""
+        return 1.0 + self._grown
+
+    @property
+    def log_volume(self) -> Array:
+        """Logarithm of the volume to the digits of the strains [-]."""
+        return log1p(self._grown)
+
+    @property
+    def excess(self) -> Array:
+        """Tr C - 3 - 2 ln J at the place itself, to the digits of the strains [-]."""
+        squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
+        return 2.0 * (self.trace - self.log_volume) + squares
+
+    @property
+    def _grown(self) -> Array:
+        return self.trace + self.xx * self.yy - self.xy * self.yx
+
+    @property
+    def trace(self) -> Array:
+        """Trace of the gradient: the volume strain at the place itself, at small strain [-]."""
+        return self.xx + self.yy
+
+    @property
+    def engineering_shear(self) -> Array:
+        """The engineering shear strain between x and y, at small strain [-]."""
+        return self.xy + self.yx
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One response of the tissue at a place."""
+
+    name: str  # key in files and options
+    label: str  # for people
+    unit: str  # "MPa", or "-" for a strain
+    meaning: str  # in a sentence
+    small: Callable[[LocalState], Array]
+    finite: Callable[[LocalState], Array]
+
+
+def _small_energy(at: LocalState) -> Array:
+    """Return W = G eps:eps + lambda/2 theta^2 [MPa]."""
+    squares = at.xx**2 + at.yy**2 + at.engineering_shear**2 / 2.0
+    return at.shear * squares + at.lame / 2.0 * at.dilatation**2
+
+
+def _finite_energy(at: LocalState) -> Array:
+    """Return W of `solver.constitutive.hyperelastic` [MPa], ln J being the element's best fit of it."""
+    return at.shear / 2.0 * shape(at.stiffening, at.excess) + at.lame / 2.0 * at.dilatation**2
+
+
+def _small_volumetric(at: LocalState) -> Array:
+    """Return K/2 theta^2, K = lambda + 2 G/3; the part of it that G makes is of the volume strain at the place."""
+    return at.lame / 2.0 * at.dilatation**2 + at.shear / 3.0 * at.trace**2
+
+
+def _finite_volumetric(at: LocalState) -> Array:
+    """Return W of the same change of volume, alike in all three directions."""
+    dilated = 3.0 * np.expm1(2.0 / 3.0 * at.log_volume) - 2.0 * at.log_volume  # tr C - 3 - 2 ln J
+    return at.shear / 2.0 * shape(at.stiffening, dilated) + at.lame / 2.0 * at.dilatation**2
+
+
+SED = Quantity("sed", "SED", "MPa", "strain-energy density", _small_energy, _finite_energy)
+VOLUMETRIC = Quantity(
+    "sed_volumetric",
+    "SED of volume",
+    "MPa",
+    "strain-energy density of the same change of volume, alike in all directions",
+    _small_volumetric,
+    _finite_volumetric,
+)
+DEVIATORIC = Quantity(
+    "sed_deviatoric",
+    "SED of shape",
+    "MPa",
+    "strain-energy density less that of the change of volume",
+    lambda at: _small_energy(at) - _small_volumetric(at),
+    lambda at: _finite_energy(at) - _finite_volumetric(at),
+)
+
+
+def _small_radius(at: LocalState) -> Array:
+    """Return the radius of Mohr's circle of strains [-]."""
+    return np.sqrt((at.xx - at.yy) ** 2 + at.engineering_shear**2) / 2.0
+
+
+def _finite_sum(at: LocalState) -> Array:
+    """Return the sum of the principal stretches in the plane [-]."""
+    return np.sqrt((2.0 + at.xx + at.yy) ** 2 + (at.xy - at.yx) ** 2)
+
+
+def _finite_difference(at: LocalState) -> Array:
+    """Return the difference of the principal stretches in the plane [-]."""
+    return np.sqrt((at.xx - at.yy) ** 2 + at.engineering_shear**2)
+
+
+def _small_along(at: LocalState) -> Array:
+    x, y = at.tangent
+    return x * x * at.xx + y * y * at.yy + x * y * at.engineering_shear
+
+
+def _small_shear_along(at: LocalState) -> Array:
+    x, y = at.tangent
+    return _size((x * x - y * y) * at.engineering_shear + 2.0 * x * y * (at.yy - at.xx))
+
+
+def _lines(at: LocalState) -> tuple[Array, Array, Array, Array]:
+    """Return F t and F n, x and y of each, for the skin's tangent t and normal n."""
+    x, y = at.tangent
+    return (
+        x + at.xx * x + at.xy * y,
+        y + at.yx * x + at.yy * y,
+        -y - at.xx * y + at.xy * x,
+        x - at.yx * y + at.yy * x,
+    )
+
+
+def _finite_along(at: LocalState) -> Array:
+    x, y, _, _ = _lines(at)
+    return np.sqrt(x * x + y * y) - 1.0
+
+
+def _finite_shear_along(at: LocalState) -> Array:
+    x, y, across, up = _lines(at)
+    return _size((x * across + y * up) / at.volume)
+
+
+def _size(number: Array) -> Array:
+    """Return the size of real numbers; that of complex ones keeps their small imaginary parts' slope."""
+    return np.sqrt(number * number)
+
+
+GREATEST_STRAIN = Quantity(
+    "principal_strain_greatest",
+    "greatest principal strain",
+    "-",
+    "greatest principal stretch in the plane, less one",
+    lambda at: at.trace / 2.0 + _small_radius(at),
+    lambda at: (_finite_sum(at) + _finite_difference(at)) / 2.0 - 1.0,
+)
+LEAST_STRAIN = Quantity(
+    "principal_strain_least",
+    "least principal strain",
+    "-",
+    "least principal stretch in the plane, less one",
+    lambda at: at.trace / 2.0 - _small_radius(at),
+    lambda at: (_finite_sum(at) - _finite_difference(at)) / 2.0 - 1.0,
+)
+SHEAR = Quantity(
+    "shear_greatest",
+    "greatest shear",
+    "-",
+    "difference of the principal stretches in the plane: the greatest engineering shear at small strain",
+    lambda at: 2.0 * _small_radius(at),
+    _finite_difference,
+)
+SHEAR_ALONG = Quantity(
+    "shear_along_skin",
+    "shear along the skin",
+    "-",
+    "size of the tangent of the angle by which skin's tangent and normal leave their right angle",
+    _small_shear_along,
+    _finite_shear_along,
+)
+STRETCH_ALONG = Quantity(
+    "stretch_along_skin",
+    "stretch along the skin",
+    "-",
+    "stretch of a line along the skin at rest, less one",
+    _small_along,
+    _finite_along,
+)
+
+
+Stress = tuple[Array, Array, Array, Array]  # xx, yy, xy, zz [MPa], tension positive
+
+
+def _small_stress(at: LocalState) -> Stress:
+    """Return sigma = 2 G eps + lambda theta 1 of plane strain."""
+    bulk = at.lame * at.dilatation
+    return (
+        2.0 * at.shear * at.xx + bulk,
+        2.0 * at.shear * at.yy + bulk,
+        at.shear * at.engineering_shear,
+        bulk,
+    )
+
+
+def _finite_stress(at: LocalState) -> Stress:
+    """Return sigma = (G f (F F^T - 1) + lambda ln J 1) / J of plane strain."""
+    J = at.volume
+    shear = at.shear * slopes(at.stiffening, at.excess)[0] / J
+    bulk = at.lame * at.dilatation / J
+    return (
+        shear * (2.0 * at.xx + at.xx**2 + at.xy**2) + bulk,
+        shear * (2.0 * at.yy + at.yy**2 + at.yx**2) + bulk,
+        shear * (at.xy + at.yx + at.xx * at.yx + at.xy * at.yy),
+        bulk,
+    )
+
+
+def _pressure(stress: Stress) -> Array:
+    xx, yy, _, zz = stress
+    return -(xx + yy + zz) / 3.0
+
+
+def _von_mises(stress: Stress) -> Array:
+    xx, yy, xy, zz = stress
+    return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2.0 + 3.0 * xy**2)
+
+
+def _principal(stress: Stress) -> tuple[Array, Array]:
+    """Return the greatest and the least of the three principal stresses [MPa]."""
+    xx, yy, xy, zz = stress
+    middle, radius = (xx + yy) / 2.0, np.hypot((xx - yy) / 2.0, xy)
+    return np.maximum(middle + radius, zz), np.minimum(middle - radius, zz)
+
+
+PRESSURE = Quantity(
+    "pressure",
+    "pressure",
+    "MPa",
+    "mean of the three normal stresses, compression positive",
+    lambda at: _pressure(_small_stress(at)),
+    lambda at: _pressure(_finite_stress(at)),
+)
+VON_MISES = Quantity(
+    "von_mises",
+    "von Mises stress",
+    "MPa",
+    "von Mises stress",
+    lambda at: _von_mises(_small_stress(at)),
+    lambda at: _von_mises(_finite_stress(at)),
+)
+GREATEST_STRESS = Quantity(
+    "principal_stress_greatest",
+    "greatest principal stress",
+    "MPa",
+    "greatest of the three principal stresses, tension positive",
+    lambda at: _principal(_small_stress(at))[0],
+    lambda at: _principal(_finite_stress(at))[0],
+)
+LEAST_STRESS = Quantity(
+    "principal_stress_least",
+    "least principal stress",
+    "MPa",
+    "least of the three principal stresses, tension positive",
+    lambda at: _principal(_small_stress(at))[1],
+    lambda at: _principal(_finite_stress(at))[1],
+)
+
+QUANTITIES = (
+    SED,
+    DEVIATORIC,
+    VOLUMETRIC,
+    GREATEST_STRAIN,
+    LEAST_STRAIN,
+    SHEAR,
+    SHEAR_ALONG,
+    STRETCH_ALONG,
+    PRESSURE,
+    VON_MISES,
+)
+NAMES: tuple[str, ...] = tuple(quantity.name for quantity in QUANTITIES)
+# What is drawn over the whole tissue. Principal stresses are drawn only: no receptor is said to answer to them.
+FIELDS = (SED, GREATEST_STRAIN, LEAST_STRAIN, GREATEST_STRESS, LEAST_STRESS, VON_MISES, PRESSURE)
