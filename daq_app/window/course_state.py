@@ -45,6 +45,13 @@ class TrialState:
     answer: str | None = None  # in words; None: none was asked for yet
     quality: Quality | None = None
     discarded: str = ""  # why its last take but the one in hand no longer counts; empty: none was discarded
+    chosen: bool = True  # False: answers to come choose its stimulus
+
+    @property
+    def code(self) -> str:
+        """Return the label of its stimulus, or dots where that is not chosen yet."""
+        return self.trial.stimulus.code if self.chosen else "…"
+
     earlier: tuple["TrialState", ...] = ()  # as it was when each of its takes was discarded
 
 
@@ -123,7 +130,7 @@ def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
         begun.plan,
         begun.people,
         begun.simulated,
-        tuple(TrialState(t) for t in begun.plan.trials),
+        tuple(TrialState(t, chosen=t.standard or not b.candidates) for b in begun.plan.blocks for t in b.trials),
         now,
         since=now,
     )
@@ -204,6 +211,7 @@ def _shown(session: SessionState, message: Message) -> SessionState:
         case steps.AskBegin():
             return replace(session, phase="idle", asked=message)
         case steps.AskMount(trial):
+            session = session.with_trial(trial.number, trial=trial, chosen=True)
             return replace(session, phase="mounting", trial=trial.number, asked=message, told=None)
         case steps.MeasureZero():
             return replace(session, phase="taring", asked=message, told=None)
@@ -272,7 +280,7 @@ def _of_trial(session: SessionState, number: int | None, kind: str, data: Mappin
         case "left_out":
             return session.with_trial(number, outcome="skipped")
         case "take_started":
-            return session.with_trial(number, takes=data["take"], outcome="coming")
+            return session.with_trial(number, takes=data["take"], outcome="coming", chosen=True)
         case "take_kept":
             return session.with_trial(number, outcome="done")
         case "take_discarded":

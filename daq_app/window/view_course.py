@@ -273,7 +273,7 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
 
 
 def _row(session: SessionState, trial: TrialState) -> PlanRow:
-    name = f"{trial.trial.number}  {trial.trial.stimulus.code}"
+    name = f"{trial.trial.number}  {trial.code}"
     if trial.trial.number == session.trial and session.phase != "ended":
         again = tr("take {takes}", takes=trial.takes) if trial.takes > 1 else ""
         return PlanRow("current", "▶", name, again)

@@ -62,7 +62,7 @@ class Inspection:
 
 def tiles(session: SessionState) -> tuple[Tile, ...]:
     """Return a tile for each trial, in the order of the plan."""
-    return tuple(Tile(t.trial.number, t.trial.stimulus.code, _kind(session, t)) for t in session.trials)
+    return tuple(Tile(t.trial.number, t.code, _kind(session, t)) for t in session.trials)
 
 
 def inspection(session: SessionState, number: int) -> Inspection | None:
@@ -75,7 +75,7 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     heading = tr(
         "Trial {number}, {code}{again}: {state}",
         number=number,
-        code=trial.trial.stimulus.code,
+        code=trial.code,
         again=again,
         state=tr(STATES[kind]),
     )

@@ -7,6 +7,7 @@ Origin = Literal["measured", "set", "default"]  # where a value came from; a def
 Hand = Literal["left", "right"]
 Phase = Literal["pre-evaluation", "practice", "main"]  # only the trials of "main" are the experiment's
 Answer = Literal["line", "number", "choice", "none"]  # on a 0 to 100 line, a free number, which of two, nothing
+Choice = Literal["first", "second"]  # of two that are compared
 SubjectSees = Literal["instruction", "trial count", "code", "forces"]
 ExperimenterSees = Literal["trial count", "answer", "forces"]
 PROXIMAL_TO_DISTAL = 1
@@ -70,6 +71,7 @@ class Block:
     strokes_allowed: int = 1  # in a trial; every further one is recorded and flagged
     ticks: int = 0  # marks on the line between its ends
     indentation_origin: Origin = "set"
+    candidates: tuple[Stimulus, ...] = ()  # among which answers choose what is compared next; empty: it is planned
 
     @property
     def standard(self) -> Stimulus | None:

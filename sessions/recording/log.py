@@ -4,11 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from sessions.plan.plan import Answer, SessionPlan, Trial
+from sessions.plan.plan import Answer, Choice, SessionPlan, Trial
 
 Outcome = Literal["scored", "numbered", "chosen", "presented", "not answered", "skipped", "open"]
 OUTCOMES = "scored, numbered, chosen, presented (no answer asked for), not answered, skipped or open"
-Choice = Literal["first", "second"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from drivers.status import flagged_words
 from drivers.transducer import TransducerInfo
 from sessions.file_access import DATABASE_FAILURES, bounded, remedy
 from sessions.json_document import converted, json_value
+from sessions.plan.adaptive import with_mounted
 from sessions.plan.plan import SessionPlan
 from sessions.recording.errors import RecordingError
 from sessions.recording.event_shapes import event_data
@@ -88,7 +89,7 @@ class Recording:
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
-            plan, transducer = plan_from_dict(head["plan"]), head["transducer"]
+            plan, transducer = with_mounted(plan_from_dict(head["plan"]), _mounted(events)), head["transducer"]
             info = info_from_dict(transducer) if transducer else None
             check_provenance(head["provenance"])
         except (ValueError, KeyError, TypeError) as error:
@@ -282,6 +283,12 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
             " use a later program"
         )
     return head
+
+
+def _mounted(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
+    """Return the code of the stimulus that was mounted last in each trial."""
+    kind = "stimulus_mounted"
+    return {event.trial: event.data["code"] for event in events if event.kind == kind and event.trial is not None}
 
 
 def _readable(made: Any) -> bool:  # noqa: ANN401  any JSON value

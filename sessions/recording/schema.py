@@ -13,7 +13,7 @@ from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent
 
 FORMAT = "daq-app session"
-FORMAT_VERSION = 2  # also PRAGMA user_version of the live file
+FORMAT_VERSION = 3  # also PRAGMA user_version of the live file
 APPLICATION_ID = 0x44415146  # "DAQF" in ASCII: PRAGMA application_id, at byte 68 of the file
 
 LIVE_FILE = "session.sqlite"

@@ -176,6 +176,8 @@ def _answered(state: Scoring, given: Given) -> Step:
     wrong = problem(given, place.trial.answer)
     if wrong is not None:
         return state, (Refuse(wrong),)
+    if isinstance(given, PairedChoice):
+        place = place.with_progress(replace(place.progress[place.index], choice=given.choice))
     if state.settled or not place.plan.forces:
         return _kept(place)
     return Settling(place, touching=state.touching), ()
@@ -246,7 +248,7 @@ def _redo_undone(state: State) -> Step:
             restored += (RestoreTake(number, was.take), *([KeepTake(number, was.take)] if was.kept else ()))
         else:
             restored.append(LeaveOut(number, UNDONE))
-        then = replace(then.at(index).with_take(takes).with_take(was.take, kept=was.kept), index=then.index)
+        then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
     after, commands = _gone_back(replace(before, place=then))
     return after, (*_discarding(state, UNDONE), *restored, *commands)
 
@@ -308,7 +310,7 @@ def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
 
 def _kept(place: Place) -> Step:
     kept = KeepTake(place.trial.number, place.take)
-    after, commands = _next(place.with_take(place.take, kept=True))
+    after, commands = _next(place.with_progress(replace(place.progress[place.index], kept=True)))
     return after, (kept, *commands)
 
 
@@ -339,10 +341,10 @@ def _next(place: Place) -> Step:
     """Go on to the next trial, if there is one, or to the rest before it."""
     if place.last:
         return Closing(place.at(place.index)), (AskFinish(),)
-    after = place.at(place.index + 1)
+    after = place.following()
     if after.rest_due:
         return Resting(after), (AskRest(after.plan.rests.duration),)
-    return Mounting(after), _asking_for(after, new_block=after.block != place.block)
+    return Mounting(after), _asking_for(after, new_block=after.block.name != place.block.name)
 
 
 def _asking_for(place: Place, *, new_block: bool) -> tuple[Command, ...]:

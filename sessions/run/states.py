@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-from sessions.plan.plan import Block, SessionPlan, Trial
+from sessions.plan.adaptive import with_comparison
+from sessions.plan.plan import Block, Choice, SessionPlan, Stimulus, Trial
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,6 +13,7 @@ class Progress:
     takes: int = 0  # begun so far
     take: int = 0  # number of the one in hand, or in hand last
     kept: bool = False  # True when that one counts
+    choice: Choice | None = None  # given in that one, of the two compared
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +67,28 @@ class Place:
         """Return the place with another trial in hand, to which no redo has led."""
         return replace(self, index=index, before_redo=None)
 
-    def with_take(self, take: int, *, kept: bool = False) -> "Place":
-        """Return the place with this take of the trial in hand, the latest or an earlier one."""
-        progress = Progress(max(take, self.progress[self.index].takes), take, kept)
+    def following(self) -> "Place":
+        """Return the place with the next trial in hand; an adaptive block's answers choose what it compares."""
+        after = self.at(self.index + 1)
+        return replace(after, plan=with_comparison(self.plan, after.trial.number, after.answers))
+
+    @property
+    def answers(self) -> tuple[tuple[Stimulus, bool], ...]:
+        """Return what was compared with the standard of this block, and whether it was chosen, where a take counts."""
+        trials = self.plan.trials
+        said: list[tuple[Stimulus, bool]] = []
+        for n, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
+            if trial.block == self.trial.block and progress.kept and progress.choice is not None:
+                compared = trials[n - 1] if trial.standard else trial
+                said.append((compared.stimulus, (progress.choice == "second") == (compared is trial)))
+        return tuple(said)
+
+    def with_take(self, take: int) -> "Place":
+        """Return the place with this take of the trial in hand, the latest or an earlier one, which does not count."""
+        return self.with_progress(Progress(max(take, self.progress[self.index].takes), take))
+
+    def with_progress(self, progress: Progress) -> "Place":
+        """Return the place with the trial in hand that far."""
         return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
 
 

@@ -1,9 +1,8 @@
 """What may happen in the course of a session, and what is to be done: events and commands. All of it is data."""
 
 from dataclasses import dataclass
-from typing import Literal
 
-from sessions.plan.plan import Block, Hand, Trial
+from sessions.plan.plan import Block, Choice, Hand, Trial
 
 # ---- what may happen
 
@@ -89,7 +88,7 @@ class MagnitudeEstimate:
 class PairedChoice:
     """The subject has said which of two stimuli has more of what is asked."""
 
-    choice: Literal["first", "second"] | None  # None: the subject gave no answer
+    choice: Choice | None  # None: the subject gave no answer
     first_touch: float | None = None  # [s, session clock]
     corrections: int | None = None  # how often the subject changed an answer given
     hand: Hand | None = None  # that answered

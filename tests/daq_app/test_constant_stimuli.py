@@ -34,9 +34,9 @@ def session(folder, seed):
     return Recording.open(folder)
 
 
-def felt(recording):
+def felt(recording, planted=()):
     """Return as an analysis the friction that the simulated bench plants in every stroke."""
-    surfaces = {record.trial.number: planted_surface(record.trial) for record in recording.trials}
+    surfaces = {record.trial.number: planted_surface(record.trial, planted) for record in recording.trials}
     return SimpleNamespace(friction=[SimpleNamespace(trial=n, mu=surface.mu) for n, surface in surfaces.items()])
 
 

@@ -1,5 +1,7 @@
 """Plans of all kinds, and random walks through them: events of which at least half lead on."""
 
+from dataclasses import replace
+
 from hypothesis import strategies as st
 
 from sessions.plan.plan import Block, Frame, Rests, SessionPlan, Stimulus, Trial
@@ -47,7 +49,9 @@ PAIRS = made_plan(["none", "choice"] * 3)
 PAIRS_UNSEEN = made_plan(["none", "choice"] * 3, forces=False)
 NUMBERS = made_plan(["number"] * 4, forces=False)
 RESTFUL = made_plan(["line"] * 5, forces=False, rests=Rests(after_trials=2, duration=30.0))
-PLANS_OF_ALL_KINDS = [FORCES, SCORES, PAIRS, PAIRS_UNSEEN, NUMBERS, RESTFUL]
+_WHOLE = plan(protocol("adaptive-comparison"), "S01", 3, forces=False)
+ADAPTIVE = replace(_WHOLE, blocks=tuple(replace(block, trials=block.trials[:10]) for block in _WHOLE.blocks))
+PLANS_OF_ALL_KINDS = [FORCES, SCORES, PAIRS, PAIRS_UNSEEN, NUMBERS, RESTFUL, ADAPTIVE]
 
 EVENTS = st.one_of(
     st.sampled_from(

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
+from sessions.plan.adaptive import next_comparison
 from sessions.plan.orders import Item, drawn, pairs, pairs_with, shuffled, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
@@ -118,6 +119,8 @@ def plan(
         key_sha256=None if place is None else place.key_sha256,
     )
     if made.key_sha256 is not None:
+        if any(block.candidates for block in made.blocks):
+            raise SettingsError("an adaptive block needs to know which stimulus is which: its study is not blinded")
         made = blinded(made)
     return made if area is None else replace(made, contact_area=area, contact_area_origin="set")
 
@@ -207,6 +210,8 @@ class _Blocks:
     def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
         """Return the order of each repetition."""
         made: list[tuple[int, ...]] = []
+        if outline.adaptive is not None and outline.standard is not None:
+            return self._adaptive_orders(outline, outline.standard, outline.adaptive)
         for repetition in range(1, outline.repetitions + 1):
             name = outline.name if repetition == 1 else f"{outline.name}#{repetition}"
             if self.protocol.scale.answer == "choice":
@@ -218,6 +223,20 @@ class _Blocks:
             else:
                 made.append(self._shuffled(outline, name, [order[0] for order in made]))
         return made
+
+    def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
+        """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
+        first = next_comparison(self._candidates(outline), ()).known_index
+        leading = shuffled(range(comparisons), self.seed, f"{outline.name}/first")[: comparisons // 2]
+        return [(first, standard) if n in leading else (standard, first) for n in range(comparisons)]
+
+    def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
+        """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""
+        others = sorted(set(outline.indices) - {outline.standard}) if outline.adaptive is not None else ()
+        return tuple(self._stimulus(outline, index) for index in others)
+
+    def _stimulus(self, outline: BlockOutline, index: int) -> Stimulus:
+        return Stimulus(outline.descriptor, index, self.labels[outline.descriptor, index])
 
     def _pairs(
         self, outline: BlockOutline, codes: Sequence[str], repetition: int, name: str
@@ -267,7 +286,7 @@ class _Blocks:
                 Trial(
                     number=next(self._numbers),
                     block=name,
-                    stimulus=Stimulus(outline.descriptor, index, self.labels[outline.descriptor, index]),
+                    stimulus=self._stimulus(outline, index),
                     direction=direction,
                     repetition=times[index],
                     phase=phase,
@@ -288,4 +307,5 @@ class _Blocks:
             strokes_allowed=outline.strokes_allowed,
             ticks=self.protocol.scale.ticks,
             indentation_origin="set" if own is None else "measured",
+            candidates=self._candidates(outline) if phase == "main" else (),
         )

@@ -42,6 +42,7 @@ class BlockOutline:
     practice: tuple[int, ...] = ()  # stimuli of the practice trials, in their order
     planted_friction: tuple[float, ...] = ()  # µ of each of `indices` on the simulated bench, for rehearsals [-]
     standard: int | None = None  # of `indices`: every pair is of it and another; None: every two are compared
+    adaptive: int | None = None  # comparisons with the standard, each chosen by the answers before it; None: planned
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -73,6 +74,8 @@ class BlockOutline:
             raise NotAllowed("planted_friction", list(self.planted_friction), "each must lie between 0.01 and 5")
 
     def _check_standard(self) -> None:
+        if self.adaptive is not None:
+            self._check_adaptive()
         if self.standard is None:
             return
         if self.standard not in self.indices:
@@ -80,9 +83,17 @@ class BlockOutline:
         if len(self.indices) < 1 + LEAST_COMPARISONS:
             few = f"with a standard there must be {LEAST_COMPARISONS} others: fewer fix no psychometric function"
             raise NotAllowed("indices", list(self.indices), few)
-        if self.repetitions % 2:
+        if self.adaptive is None and self.repetitions % 2:
             even = "with a standard it must be even, so that each comparison comes first as often as second"
             raise NotAllowed("repetitions", self.repetitions, even)
+
+    def _check_adaptive(self) -> None:
+        if self.standard is None:
+            raise NotAllowed("adaptive", self.adaptive, "it takes a standard, with which all are compared")
+        if not 10 <= (self.adaptive or 0) <= 200:
+            raise NotAllowed("adaptive", self.adaptive, "it must lie between 10 and 200 comparisons")
+        if self.repetitions != 1:
+            raise NotAllowed("repetitions", self.repetitions, "an adaptive block repeats what its answers ask for")
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ pytestmark = pytest.mark.qt
 # What no translator is given: what was recorded, named or typed, units, formats of files, names of keys.
 DATA = re.compile(
     r"SIMULATED Net F/T[^:]*|SIM00000|sensotact-friction|constant-stimuli|magnitude-estimation|paired-comparison|three"
+    r"|adaptive-comparison"
     r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|bids|csv|hdf5|nwb|analyst|dragged by hand"
     r"|counts per unit read from|Ctrl|P01_\S*|<[^>]*>|&\w+;"
 )

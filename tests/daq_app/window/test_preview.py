@@ -12,6 +12,7 @@ from sessions.plan.protocols import protocol, protocol_names
 from tests.daq_app.session_messages import PLAN, READY, after
 
 ANSWERS = {
+    "adaptive-comparison": "choice",
     "constant-stimuli": "choice",
     "magnitude-estimation": "number",
     "paired-comparison": "choice",

@@ -1,0 +1,139 @@
+"""Adaptive comparisons from protocol to psychometric function: answers choose what is compared next."""
+
+import math
+from itertools import product
+
+import pytest
+from test_constant_stimuli import felt
+
+from daq_app.console import Console
+from daq_app.simulation.conduct import Participants, conduct
+from daq_app.simulation.wiring import SimulatedPeople
+from drivers.clock import ToldClock
+from sessions.plan.adaptive import next_comparison
+from sessions.plan.plan import Stimulus
+from sessions.plan.protocols import plan, protocol
+from sessions.plan.protocols.planning import StudyPlace
+from sessions.plan.protocols.protocol import FOLDER
+from sessions.recording import Recording
+from sessions.recording.archive import problems
+from sessions.report.experiments import experiments, with_psychometric
+from sessions.run.resuming import resumption
+from sessions.run.states import Mounting
+from sessions.statistics.scales.psychometric import QUARTILE
+from sessions.strokes.contact_area import FIXED
+from sessions.toml_file import SettingsError
+from simulators.subject import SubjectSettings
+
+ADAPTIVE = protocol("adaptive-comparison")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    folder, clock = tmp_path_factory.mktemp("adaptive") / "S03", ToldClock()
+    people = SimulatedPeople(3, clock, planted=ADAPTIVE.planted_friction)
+    planned = plan(ADAPTIVE, "S03", 3, forces=False)
+    conduct(planned, folder, Participants(people, None, clock), Console(as_json=True), durable=False)
+    return Recording.open(folder)
+
+
+def compared(trials):
+    """Index of what was compared with the standard in each pair, and whether it came first."""
+    pairs = zip(trials[::2], trials[1::2], strict=True)
+    return [(second if first.standard else first).stimulus.index for first, second in pairs]
+
+
+def test_each_comparison_leaves_the_least_entropy_that_can_be_expected():
+    # Watson's rule (2017, equations 5 to 12), written out over every subject that is held for possible.
+    indices = (0, 10, 25, 40)
+    candidates = [Stimulus("friction", index, f"K{index}") for index in indices]
+    pses = [n for n in range(41)]
+    spreads = [40.0 / 3.0 / 5.0 * 15.0 ** (n / 14.0) for n in range(15)]  # a fifth of the mean step, to the range
+    possible = list(product(pses, spreads, (1.0, -1.0), (0.0, 0.05)))
+
+    def chance(one, index):
+        pse, spread, sense, lapse = one
+        return lapse / 2 + (1 - lapse) * 0.5 * math.erfc(-sense * (index - pse) / spread / math.sqrt(2.0))
+
+    def entropy(weights):
+        return -sum(w * math.log(w) for w in weights if w > 0.0)
+
+    answers, weights = [], [1.0 / len(possible)] * len(possible)
+    for chosen in (True, False, False, True):
+        expected = []
+        for index in indices:
+            left = 0.0
+            for yes in (True, False):
+                joint = [
+                    w * (p if yes else 1 - p)
+                    for w, p in zip(weights, [chance(o, index) for o in possible], strict=True)
+                ]
+                total = sum(joint)
+                left += total * entropy([w / total for w in joint])
+            expected.append(left)
+        told = next_comparison(candidates, answers)
+        assert expected[indices.index(told.index)] == pytest.approx(min(expected), abs=1e-6)
+        answers.append((told, chosen))
+        likely = [chance(one, told.index) if chosen else 1 - chance(one, told.index) for one in possible]
+        total = sum(w * p for w, p in zip(weights, likely, strict=True))
+        weights = [w * p / total for w, p in zip(weights, likely, strict=True)]
+
+
+def test_a_session_compares_what_its_answers_ask_for_and_its_recording_says_so(recording):
+    trials = [record.trial for record in recording.trials]
+    mounted = [event.data["code"] for event in recording.events if event.kind == "stimulus_mounted"]
+    assert [trial.stimulus.code for trial in trials] == mounted
+    candidates, answers = recording.plan.blocks[0].candidates, []
+    for first, second in zip(recording.trials[::2], recording.trials[1::2], strict=True):
+        one = second if first.trial.standard else first
+        assert one.trial.stimulus == next_comparison(candidates, answers)
+        answers.append((one.trial.stimulus, second.choice == ("second" if one is second else "first")))
+    assert sum(trial.standard for trial in trials[::2]) == 20  # half of the pairs begin with the standard
+    assert len({*compared(trials)}) > 4
+    assert problems(recording.folder) == ()
+
+
+def test_the_function_of_an_adaptive_session_holds_what_was_planted_in_the_subject(recording):
+    judged = experiments(recording.plan, [], {}, None, FIXED)
+    (found,) = with_psychometric(judged, recording, felt(recording, ADAPTIVE.planted_friction))
+    function, planted = found.psychometric, SubjectSettings()
+    assert function.answers == 40
+    assert function.pse.low < 0.0 < function.pse.high
+    assert function.jnd.low < QUARTILE * planted.discrimination < (function.jnd.high or 9.0)
+
+
+def test_a_session_that_was_cut_short_goes_on_with_the_comparison_its_answers_ask_for(recording):
+    given = [n for n, event in enumerate(recording.events) if event.kind == "chosen"]
+    for answers in (1, 7, 23):
+        told = resumption(plan(ADAPTIVE, "S03", 3, forces=False), recording.events[: given[answers - 1] + 2])
+        assert isinstance(told.state, Mounting)
+        assert told.state.place.trial == recording.trials[2 * answers].trial
+
+
+def test_a_recording_of_a_later_kind_of_plan_is_not_read_by_a_program_that_would_not_follow_the_answers(recording):
+    assert recording.head["format"]["version"] == 3
+    stood_for = [trial["stimulus"]["index"] for trial in recording.head["plan"]["blocks"][0]["trials"]]
+    assert {*stood_for} == {50, compared([record.trial for record in recording.trials])[0]}
+
+
+def test_a_blinded_study_refuses_an_adaptive_block():
+    place = StudyPlace("s", 0, 1, 1, ADAPTIVE.labels, key_sha256="0" * 64)
+    with pytest.raises(SettingsError, match=r"adaptive block .* not blinded"):
+        plan(ADAPTIVE, "S01", 1, place=place)
+
+
+@pytest.mark.parametrize(
+    ("was", "written", "named"),
+    [
+        ("standard = 50\n", "", r"adaptive = 40 .*takes a standard"),
+        ("adaptive = 40", "adaptive = 5", r"adaptive = 5 .*between 10 and 200"),
+        ("adaptive = 40", "adaptive = 40\nrepetitions = 2", r"repetitions = 2 .*what its answers ask for"),
+    ],
+)
+def test_an_adaptive_block_that_cannot_be_is_refused(tmp_path, was, written, named):
+    text = (FOLDER / "adaptive-comparison.toml").read_text()
+    assert was in text
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(text.replace(was, written))
+    with pytest.raises(SettingsError, match=named):
+        protocol(wrong)
