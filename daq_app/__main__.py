@@ -4,15 +4,13 @@ import gc
 import os
 import sys
 
-from daq_app.child_process import keep_current_folder_out
+from daq_app.child_process import keep_current_folder_out, use_one_thread
 
 
 def main() -> None:
     """Run the command line, or without one open the window, and leave with the exit code."""
     keep_current_folder_out()
-    # The solver's matrices are small: threads of the linear algebra only wait for each other (2 to 10 times slower).
-    # Read when numpy is imported, which no module has done by now.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    use_one_thread()
     from daq_app.cli.main import run
 
     first = sys.argv[1] if len(sys.argv) > 1 else "window"
@@ -25,7 +23,7 @@ def main() -> None:
 
 def _leave(code: int) -> None:
     """Leave with an exit code; at once where the user asked to stop and nothing is left to be ended."""
-    from daq_app.cli.main import STOPPED
+    from daq_app.console import STOPPED
 
     if code == STOPPED and not _children():
         sys.stdout.flush()

@@ -14,6 +14,7 @@ from typing import Any, TextIO
 
 from solver.progress import listening
 
+DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130  # exit codes
 _MOST_DIGITS = 9  # of a range whose ends read alike with fewer
 _COLUMNS = 80  # of a terminal that does not say how many it has
 PATIENCE = 1.0  # of people, before they want to see that something is going on [s]
@@ -80,16 +81,20 @@ class Console:
         """Say whether people see progress as a moving bar, with the time left."""
         return self._err.isatty()
 
-    def say(self, text: str = "") -> None:
-        """Print a line for people; left out where a script reads."""
+    def say(self, *lines: str | None) -> None:
+        """Print lines for people, None left out; nothing where a script reads."""
         if not self.as_json:
             self._end_progress()
-            self._answer(harmless(text))
+            for line in lines:
+                if line is not None:
+                    self._answer(harmless(line))
 
-    def note(self, text: str) -> None:
-        """Print a line on stderr: progress, warnings, losses."""
+    def note(self, *lines: str | None) -> None:
+        """Print lines on stderr, None left out: progress, warnings, losses."""
         self._end_progress()
-        print(harmless(text), file=self._err, flush=True)
+        for line in lines:
+            if line is not None:
+                print(harmless(line), file=self._err, flush=True)
 
     def result(self, document: Mapping[str, Any]) -> None:
         """Print the one JSON document; left out where a person reads. NaN and infinity are refused by the format."""
@@ -115,6 +120,15 @@ class Console:
         else:
             print(f"{100 * done:3.0f} %  {text}", file=self._err, flush=True)
         self._line_open = terminal
+
+    def reporter(self, text: str, until: float = 1.0) -> Callable[[float], bool]:
+        """Return what a long job calls with the part done (0 to 1), shown up to `until`; the answer is to go on."""
+
+        def report(part: float) -> bool:
+            self.progress(until * part, text)
+            return True
+
+        return report
 
     def _bar(self, text: str, now: float, end_known: bool) -> str:
         """Return the line of a terminal: part done, text, bar, and where the end is known rate and time left."""
@@ -200,15 +214,15 @@ def table(rows: list[list[str]], *, head: list[str]) -> str:
     return "\n".join(text.rstrip() for text in aligned)
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with so many significant digits, and a dash where there is none.
+def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
+    """Return a number times a factor with so many significant digits, and a dash where there is none.
 
-    >>> number(0.0052573, 3), number(None), number(12.0, 3)
+    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3)
     ('0.00526', '–', '12.0')
     """
     if value is None:
         return "–"
-    return f"{value:#.{digits}g}".rstrip(".")
+    return f"{factor * value:#.{digits}g}".rstrip(".")
 
 
 def span(low: float, high: float, digits: int = 3) -> str:

@@ -1,6 +1,5 @@
 """The analyst's work in a process of its own, and its client in the window."""
 
-import os
 import signal
 import sys
 import time
@@ -21,7 +20,6 @@ URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left
 
 def run(connection: Connection, folder: str) -> None:
     """Analyse and predict the session in `folder`, and do what is asked for until the window is gone."""
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # What is half written is taken back before the end.
     signal.signal(signal.SIGTERM, _leave)

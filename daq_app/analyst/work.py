@@ -13,7 +13,7 @@ from daq_app.analyst.edges import brought_back, decision_meant, decision_of, tak
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
-from daq_app.batch.derived import analysis_document, settings_kept
+from daq_app.batch.derived import analysis_document, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
 from sessions.plan.plan import Blinded
@@ -105,7 +105,7 @@ class Work:
 
     def _analyse(self) -> None:
         self._say(m.Step(0.0, tr("analysing")))
-        self._analysis = analyse(self._recording, settings_kept(self._recording))
+        self._analysis = analyse(self._recording, stored_settings(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
         self._say(m.Found("analysed", self._report))
@@ -254,7 +254,7 @@ class Work:
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))
         recording = _opened(folder)
-        analysis = analyse(recording, settings_kept(recording))
+        analysis = analyse(recording, stored_settings(recording))
         told = self.timed(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 

@@ -4,8 +4,8 @@ import asyncio
 import importlib
 import logging
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
@@ -24,8 +24,9 @@ class SchedulerError(Exception):
     """The cluster cannot be used: why, and what to do."""
 
 
-def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
-    """Yield answers as they come, from the workers of a cluster. Raises SchedulerError."""
+@contextmanager
+def cluster_client(address: str) -> Generator[Any]:
+    """Give a client of the scheduler at an address. Raises SchedulerError where none answers, or it goes meanwhile."""
     try:
         library: Any = importlib.import_module("distributed")
     except ImportError as error:
@@ -37,12 +38,19 @@ def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> 
         raise SchedulerError(f"{address} is the address of a Dask {kind.lower()}: give that of its scheduler")
     client: Any = library.Client(address, timeout=ANSWERS, set_as_default=False, security=security)
     try:
-        yield from _by_client(client, library.as_completed(loop=client.loop), folders, options, address)
+        yield client
     except OSError as error:
         raise SchedulerError(f"{address}: the scheduler is gone ({error}); {AGAIN}") from error
     finally:
         with suppress(OSError, TimeoutError):  # it may be gone
             client.close()
+
+
+def by_cluster(folders: Sequence[Path], options: VisitOptions, address: str) -> Iterator[Answer]:
+    """Yield answers as they come, from the workers of a cluster. Raises SchedulerError."""
+    with cluster_client(address) as client:
+        answers = importlib.import_module("distributed").as_completed(loop=client.loop)
+        yield from _by_client(client, answers, folders, options, address)
 
 
 def refuse_other_versions(answer: Answer, address: str) -> None:

@@ -17,7 +17,9 @@ from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
 from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.provenance import software_versions
 from sessions.recording.unblinding import revealed
+from sessions.recording.verification import differences, told, why
 from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import BootstrapSettings, drawn_from, intervals_of
@@ -30,7 +32,7 @@ ANALYSIS = "analysis.json"
 PREDICTION = "prediction.json"
 
 
-def analysed(
+def analyse_session(
     recording: Recording,
     console: Console,
     area: AreaLaw | None = None,
@@ -44,7 +46,7 @@ def analysed(
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what
     somebody set is not lost by a verb that says nothing of it. Raises RecordingError where the last is damaged.
     """
-    before = _kept(recording, ANALYSIS)
+    before = _stored(recording, ANALYSIS)
     if gain_error is None:
         gain_error = gain_error_set(recording.folder)
     else:
@@ -57,18 +59,18 @@ def analysed(
     analysis = analyse(
         recording, AnalysisSettings(area=area or stood.area, gain_error=gain_error, bootstrap_seed=drawn)
     )
-    _keep(recording, ANALYSIS, analysis_document(analysis), console)
+    _store(recording, ANALYSIS, analysis_document(analysis), console)
     return analysis
 
 
-def settings_kept(recording: Recording) -> AnalysisSettings:
+def stored_settings(recording: Recording) -> AnalysisSettings:
     """Return the settings that were asked for a session before. Raises RecordingError where the last is damaged."""
-    return replace(settings_of(_kept(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
+    return replace(settings_of(_stored(recording, ANALYSIS)), gain_error=gain_error_set(recording.folder))
 
 
-def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:
+def outdated_prediction(recording: Recording, now: AnalysisSettings) -> str | None:
     """Say that the kept prediction has another law of the area, calibration error or seed; None where it has not."""
-    before = _kept(recording, PREDICTION)
+    before = _stored(recording, PREDICTION)
     if not before:
         return None
     stood = settings_of(before)
@@ -80,15 +82,15 @@ def made_otherwise(recording: Recording, now: AnalysisSettings) -> str | None:
     return f"{PREDICTION} was made with {' and '.join(other)}: 'daq-app predict' makes it anew"
 
 
-def asked_before(recording: Recording) -> PredictionOptions | None:
+def stored_options(recording: Recording) -> PredictionOptions | None:
     """Return the options of the prediction that was kept before; None where there is none that can be read."""
-    before = _kept(recording, PREDICTION)
+    before = _stored(recording, PREDICTION)
     return from_table(before["options"], PredictionOptions, PREDICTION) if "options" in before else None
 
 
-def afferent_before(recording: Recording) -> AfferentSettings | None:
+def stored_afferent(recording: Recording) -> AfferentSettings | None:
     """Return the parameters of the afferent kept with the prediction before; None where none was kept."""
-    return _afferent_of(_kept(recording, PREDICTION))
+    return _afferent_of(_stored(recording, PREDICTION))
 
 
 def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
@@ -97,7 +99,7 @@ def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
     return None if held is None else from_table(held.get("settings") or {}, AfferentSettings, PREDICTION)
 
 
-def kept(folder: Path, name: str) -> dict[str, Any] | None:
+def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
     """Return the analysis or prediction kept in a session's folder; None where there is none.
 
     Raises RecordingError where it is damaged: what it holds, or which verb makes it anew.
@@ -118,15 +120,15 @@ def kept(folder: Path, name: str) -> dict[str, Any] | None:
     return document
 
 
-def _kept(recording: Recording, name: str) -> Mapping[str, Any]:
+def _stored(recording: Recording, name: str) -> Mapping[str, Any]:
     """Return a document as it was kept before; empty where there is none, or one that is damaged and made anew."""
     try:
-        return kept(recording.folder, name) or {}
+        return stored_document(recording.folder, name) or {}
     except RecordingError:
         return {}
 
 
-def predicted(
+def predict_session(
     recording: Recording,
     analysis: Analysis,
     console: Console,
@@ -138,18 +140,13 @@ def predicted(
     The firing of an `afferent` is kept with it; where nobody asks for one, with the parameters of the one kept before.
     What else was kept before and is not asked for again is named. Raises as `predict` does.
     """
-
-    def shown(part: float) -> bool:
-        console.progress(part, "predicting")
-        return True
-
-    prediction = _predicted(analysis, recording.plan, options, shown)
-    before = _kept(recording, PREDICTION)
+    prediction = _predict(analysis, recording.plan, options, console.reporter("predicting"))
+    before = _stored(recording, PREDICTION)
     document = _with_firing(prediction, afferent or _afferent_of(before))
     lost = _no_longer(before, prediction.options)
     if lost:
         console.note(f"{PREDICTION} held more before, which is not kept: {', '.join(lost)}")
-    _keep(recording, PREDICTION, document, console)
+    _store(recording, PREDICTION, document, console)
     return prediction
 
 
@@ -168,19 +165,32 @@ def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     return lost
 
 
-def predicted_again(recording: Recording, analysis: Analysis, stored: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the prediction made once more, with the options stored beside it, as blind as it was made.
+def repeat(
+    name: str, stored: Mapping[str, Any], recording: Recording, decisions: Decisions, plan_of: Recording | None = None
+) -> dict[str, Any]:
+    """Return the analysis or prediction made once more as `stored` was, with its settings, options and blindness.
 
-    Raises SettingsError where damaged.
+    The plan is that of `plan_of`, where `recording` is a replay of it. Raises SettingsError where `stored` is damaged.
     """
+    if name == ANALYSIS:
+        bootstrap = bootstrap_of(stored) if "bootstrap" in stored else None
+        return analysis_document(analyse(recording, settings_of(stored), decisions), bootstrap)
     options = from_table(stored.get("options", {}), PredictionOptions, PREDICTION)
     stimuli: list[Mapping[str, Any]] = [row.get("stimulus") or {} for row in stored.get("trials", ())]
     blind = all(stimulus.get("index") is None for stimulus in stimuli)
-    plan = (recording if blind else revealed(recording)).plan
-    return _with_firing(_predicted(analysis, plan, options, lambda _: True), _afferent_of(stored))
+    original = plan_of or recording
+    plan = (original if blind else revealed(original)).plan
+    analysis = analyse(recording, settings_of(stored), decisions)
+    return _with_firing(_predict(analysis, plan, options, lambda _: True), _afferent_of(stored))
 
 
-def _predicted(
+def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
+    """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
+    found = told(list(differences(stored, json.loads(json.dumps(fresh)), name)))
+    return [*found, why(name, stored, software_versions())] if found else []
+
+
+def _predict(
     analysis: Analysis, plan: SessionPlan, options: PredictionOptions | None, progress: Progress
 ) -> SessionPrediction:
     """Return the prediction with all that its options ask for beside it."""
@@ -204,12 +214,6 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
     }
 
 
-def analysed_again(recording: Recording, stored: Mapping[str, Any], decisions: Decisions) -> dict[str, Any]:
-    """Return the analysis made once more as the document `stored` was. Raises SettingsError where that is damaged."""
-    drawn = bootstrap_of(stored) if "bootstrap" in stored else None
-    return analysis_document(analyse(recording, settings_of(stored), decisions), drawn)
-
-
 def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
     """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
     held: Mapping[str, Any] = stored.get("bootstrap") or {}
@@ -231,13 +235,13 @@ def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")), bootstrap_seed=seed)
 
 
-def made_under(stored: Mapping[str, Any], decisions: Decisions) -> bool:
+def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:
     """Say whether a stored document was made with the decisions that are in force now."""
     now = json.loads(json.dumps([decision.to_dict() for decision in decisions.in_force]))
     return stored.get("decisions", []) == now
 
 
-def visit(path: Path, subject: str | None) -> Recording:
+def open_visit(path: Path, subject: str | None) -> Recording:
     """Return a session with all that is known of its stimuli, or a subject's visit with forces to a study.
 
     Raises RecordingError, StudyError, WrongValue.
@@ -252,7 +256,7 @@ def visit(path: Path, subject: str | None) -> Recording:
     return recording
 
 
-def _keep(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:
+def _store(recording: Recording, name: str, document: Mapping[str, Any], console: Console) -> None:
     """Store a document in the session's folder; a folder that cannot be written is named, and nothing fails."""
     try:
         store_derived(recording.folder, name, document)

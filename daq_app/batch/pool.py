@@ -2,11 +2,9 @@
 
 import hashlib
 import json
-import multiprocessing
-import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import asdict
@@ -15,8 +13,7 @@ from typing import Any
 
 from daq_app.batch.cluster import by_cluster
 from daq_app.batch.session_numbers import Answer, computed, content_of
-from daq_app.batch.workers import attend
-from daq_app.child_process import fresh_processes
+from daq_app.batch.workers import local_pool
 from daq_app.console import Console
 from sessions.atomic_file import write_whole
 from sessions.recording import RecordingError
@@ -122,9 +119,8 @@ def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) 
     if not folders:
         return
     left = {folder.name: folder for folder in folders}
-    count = workers or min(os.cpu_count() or 1, len(folders))
     try:
-        for answer in _in_pool(list(left.values()), options, count):
+        for answer in _in_pool(list(left.values()), options, workers):
             del left[answer[0]]
             yield answer
     except BrokenProcessPool:  # a worker died, and nobody knows over which session: each gets a worker of its own
@@ -135,22 +131,10 @@ def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) 
                 yield folder.name, "the process that computed it died, perhaps for want of memory"
 
 
-def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int) -> Iterator[Answer]:
-    # Threads of the linear algebra would change the last bits, and cost more than they bring at these sizes.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    pool = ProcessPoolExecutor(workers, mp_context=fresh_processes(), initializer=attend)
-    try:
+def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
+    with local_pool(len(folders), workers) as pool:
         waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
         while waiting:
             ready, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
             for future in ready:
                 yield future.result()
-        pool.shutdown()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        ended = multiprocessing.active_children()
-        for process in ended:
-            process.kill()  # they hold nothing that is not computed again
-        for process in ended:
-            process.join(LOOK)
-        raise

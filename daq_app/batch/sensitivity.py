@@ -149,7 +149,13 @@ def sobol_indices(
 ) -> tuple[Index, ...]:
     """Return the index of each number of a design, greatest total first, from `answers` at its `saltelli_points`."""
     analyse: Any = importlib.import_module("SALib.analyze.sobol")
-    result: Any = analyse.analyze(_problem(design), answers, calc_second_order=False, seed=seed, num_resamples=200)
+    result: Any = analyse.analyze(
+        _problem(design),
+        answers,
+        calc_second_order=False,
+        seed=seed + 1,  # SALib takes 0 for no seed at all
+        num_resamples=200,
+    )
     columns = zip(
         design, *(np.asarray(result[name]).tolist() for name in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
     )

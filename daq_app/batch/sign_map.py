@@ -5,13 +5,11 @@ surfaces. Fingers are computed side by side, and kept as they come where a file 
 """
 
 import hashlib
-import importlib
 import json
 import math
-import os
 from collections.abc import Callable, Generator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager, suppress
+from concurrent.futures import Executor, as_completed
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,10 +18,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.batch.cluster import ANSWERS, SchedulerError, refuse_other_workers
+from daq_app.batch.cluster import cluster_client, refuse_other_workers
 from daq_app.batch.sensitivity import Index, sobol_indices
-from daq_app.batch.workers import attend
-from daq_app.child_process import fresh_processes
+from daq_app.batch.workers import local_pool
 from sessions.prediction.series_slopes import SERIES, Press, series_slopes
 from sessions.recording.provenance import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
@@ -183,14 +180,14 @@ def answers_of(
     missing = [number for number, key in enumerate(keys) if key not in known]
     done = len(trials) - len(missing)
     if missing:
-        with _executor(scheduler, workers or min(os.cpu_count() or 1, len(missing))) as pool:
+        log = nullcontext() if keep is None else keep.open("a", encoding="utf-8", buffering=1)
+        with log as file, _executor(scheduler, len(missing), workers) as pool:
             waiting = {pool.submit(answered, trials[number]): keys[number] for number in missing}
             for future in as_completed(waiting):
                 key = waiting[future]
                 known[key] = future.result()
-                if keep is not None:
-                    with keep.open("a", encoding="utf-8") as file:
-                        file.write("\n" + json.dumps({"key": key, "answer": known[key]}))
+                if file is not None:
+                    file.write("\n" + json.dumps({"key": key, "answer": known[key]}))
                 done += 1
                 progress(done / len(trials))
     return [known[key] for key in keys]
@@ -208,25 +205,13 @@ def _kept(keep: Path | None) -> dict[str, Any]:
 
 
 @contextmanager
-def _executor(scheduler: str | None, workers: int) -> Generator[Executor]:
-    """Give what runs work: processes of this computer, or the workers of a cluster. Raises SchedulerError."""
+def _executor(scheduler: str | None, work: int, workers: int | None) -> Generator[Executor]:
+    """Give what runs the work: processes of this computer, or the workers of a cluster. Raises SchedulerError."""
     if scheduler is None:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads cost more than they bring at these sizes
-        pool = ProcessPoolExecutor(workers, mp_context=fresh_processes(), initializer=attend)
-        try:
+        with local_pool(work, workers) as pool:
             yield pool
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
         return
-    try:
-        library: Any = importlib.import_module("distributed")
-    except ImportError as error:
-        raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
-    try:
-        client: Any = library.Client(scheduler, timeout=ANSWERS, set_as_default=False)
-    except OSError as error:
-        raise SchedulerError(f"{scheduler}: no Dask scheduler answers there ({error})") from error
-    with client:
+    with cluster_client(scheduler) as client:
         refuse_other_workers(client, list(client.nthreads()), scheduler)
         yield client.get_executor(pure=False)
 

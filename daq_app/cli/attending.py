@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from daq_app.cli.terminal import Terminal
-from daq_app.console import Console, WrongValue
+from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     Connect,
@@ -38,6 +38,12 @@ class Attended:
     folder: str  # where it lies: another folder than asked for where that was taken away meanwhile
     end: SessionEnd
     sealed: bool
+
+    @property
+    def exit_code(self) -> int:
+        """Return DONE for a session with every trial and no flaw of its transducer, else FLAWED."""
+        health = self.end.health
+        return DONE if self.end.complete and not (health.lost or health.doubtful or health.off_units) else FLAWED
 
 
 def opened(recorder: Recorder, uri: str) -> Device:

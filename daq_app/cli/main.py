@@ -7,10 +7,9 @@ import traceback
 from types import ModuleType
 from typing import NoReturn
 
-from daq_app.console import Console, WrongValue, harmless, takes_all
+from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, WrongValue, harmless, takes_all
 
 LONGEST = 1500  # of the sentence a failure is told in [characters]: half a page of a terminal
-DONE, FAILED, WRONG, FLAWED, STOPPED = 0, 1, 2, 3, 130
 
 # Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
 VERBS = {

@@ -1,10 +1,11 @@
 """Start of the recorder's process; `client.py` starts it."""
 
-import os
 import sys
 
+from daq_app.child_process import use_one_thread
+
 if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when numpy is imported
-    from daq_app.recorder.process import main
+    use_one_thread()
+    from daq_app.recorder.process import main  # after that: it imports numpy
 
     main(sys.argv[1:])

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import import_module
 
-from daq_app.batch.workers import attend
-from daq_app.child_process import fresh_processes
+from daq_app.child_process import process_pool
 from daq_app.recorder import messages as m
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.messages import DrawingFailed, Judged
@@ -33,7 +32,7 @@ class Judge:
     def prepare(self) -> None:
         """Start the process, so that the first stroke need not wait for it."""
         if self._worker is None:
-            self._worker = ProcessPoolExecutor(1, fresh_processes(), initializer=attend)
+            self._worker = process_pool(1)
             self._worker.submit(_warm)
 
     def close(self) -> None:

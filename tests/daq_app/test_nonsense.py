@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from report_session import record
 from study_example import study
 
-from daq_app.batch.derived import ANALYSIS, PREDICTION, kept
+from daq_app.batch.derived import ANALYSIS, PREDICTION, stored_document
 from daq_app.cli.main import run
 from sessions.exchange import ExportSource
 from sessions.exchange.session_tables import tables
@@ -65,7 +65,7 @@ def test_a_stored_document_with_nonsense_is_named_with_its_verb_or_makes_every_t
     room = tmp_path_factory.mktemp("room")
     (room / name).write_text(json.dumps(spoilt(data, documents[name])))
     try:
-        found = kept(room, name)
+        found = stored_document(room, name)
     except RecordingError as damaged:
         told = str(damaged)
         found = None
@@ -100,7 +100,7 @@ def test_an_export_of_nonsense_ends_in_one_sentence(session, tmp_path, capsys, n
 
 @pytest.mark.parametrize("name", [ANALYSIS, PREDICTION])
 def test_a_document_comes_back_as_it_was_stored(session, documents, name):
-    assert kept(session, name) == documents[name]
+    assert stored_document(session, name) == documents[name]
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_a_document_that_lacks_a_number_is_damaged_and_the_sentence_names_it(doc
     del holder[last]
     (tmp_path / name).write_text(json.dumps(document))
     with pytest.raises(RecordingError, match=f"{name} is damaged .*{last}.*{VERB[name]}"):
-        kept(tmp_path, name)
+        stored_document(tmp_path, name)
 
 
 @settings(max_examples=40, deadline=None)

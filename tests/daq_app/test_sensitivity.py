@@ -40,6 +40,15 @@ def test_of_a_sum_each_index_is_its_share_of_the_variance():
     assert found["friction.mu"].total == pytest.approx(share, abs=0.02)
 
 
+@pytest.mark.parametrize("seed", [0, 3])
+def test_one_seed_gives_one_answer_intervals_included(seed):
+    first, second = (
+        sensitivity(SCENE, DESIGN, 16, seed, quiet, lambda s: s.friction.mu + (s.loading.indentation or 0.0))[0]
+        for _ in range(2)
+    )
+    assert first == second
+
+
 def test_of_a_product_about_zero_nothing_acts_alone():
     middle = {"friction.mu": 0.4, "loading.indentation": 1.0}
     indices, _ = sensitivity(

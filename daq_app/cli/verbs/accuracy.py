@@ -6,12 +6,11 @@ asked of the speed is met. Ctrl-C stops it and keeps what was measured until the
 
 import argparse
 import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.child_process import interpreter
-from daq_app.console import Console, WrongValue, table
+from daq_app.console import DONE, STOPPED, Console, WrongValue, table
 
 if TYPE_CHECKING:
     from solver.verification.measuring import Measured
@@ -31,8 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Measure, write and tell."""
-    # Before arrays are loaded: threads cost more than they bring at these sizes, and one thread is what is asked.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from daq_app.accuracy_page.docs_tables import fill
     from daq_app.accuracy_page.page import PAGE, write
     from daq_app.accuracy_page.tables import tables
@@ -51,13 +48,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if "targets" in made:
         rows = [[cell for n, cell in enumerate(row) if n != 7] for row in made["targets"].rows]
         console.say(table(rows, head=list(made["targets"].header[:7])))
-    for name in ("hard-small", "hard-finite"):
-        if name in made:
-            console.say(made[name].caption)
-    for sentence in found.left_out:
-        console.note(f"note: {sentence}")
+    console.say(*(made[name].caption for name in ("hard-small", "hard-finite") if name in made))
+    console.note(*(f"note: {sentence}" for sentence in found.left_out))
     console.say(f"{options.out / PAGE}")
-    return 130 if found.stopped else 0
+    return STOPPED if found.stopped else DONE
 
 
 def _found(options: argparse.Namespace, console: Console) -> "Measured":

@@ -5,12 +5,12 @@ seeded block bootstrap over sensor noise, zero, calibration and choice of window
 """
 
 import argparse
-from pathlib import Path
+import math
 
-from daq_app.batch.derived import analysed, analysis_document, made_otherwise
-from daq_app.cli.area_option import add_area, area_law
-from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.console import Console, WrongValue, number, span, table
+from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
+from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import add_session, within
+from daq_app.console import DONE, FLAWED, Console, number, span, table
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals, drawn_from
 from sessions.strokes.tilt import Tilt
@@ -23,58 +23,55 @@ WAYS = {1: "p → d", -1: "d → p", None: "–"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session folder."""
-    parser.add_argument("session", type=Path, metavar="SESSION", help="a session folder")
-    add_calibration(parser)
-    parser.add_argument("--bootstrap-seed", type=int, metavar="SEED", help="of the intervals (as before, or 0)")
-    add_area(parser)
+    """Declare the session, and what the analysis may be told."""
+    add_session(parser)
+    parser.add_argument(
+        "--bootstrap-seed",
+        type=within("--bootstrap-seed", int, 0, math.inf),
+        metavar="SEED",
+        help="of the intervals (as before, or 0)",
+    )
+    add_analysis(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse the session, keep the result in its folder and print it."""
-    given = calibration_error(options)
-    if options.bootstrap_seed is not None and options.bootstrap_seed < 0:
-        raise WrongValue(f"--bootstrap-seed {options.bootstrap_seed} is not allowed: a whole number from 0 on")
     recording = Recording.open(options.session)
-    analysis = analysed(recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=given)
-    older = made_otherwise(recording, analysis.settings)
-    if older is not None:
-        console.note(older)
+    analysis = analyse_session(
+        recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=calibration_error(options)
+    )
+    console.note(outdated_prediction(recording, analysis.settings))
     chosen = drawn_from(analysis.settings, analysis.tilt)
     console.result(analysis_document(analysis, chosen))
-    if recording.simulated_sentence:
-        console.say(recording.simulated_sentence)
+    console.say(recording.simulated_sentence)
     rows = [
         [
-            ("–" if stroke.trial is None else str(stroke.trial)) + ("*" if stroke.decided else ""),
+            _trial(stroke.trial) + ("*" if stroke.decided else ""),
             number(stroke.onset, 5),
             "–" if stroke.steady is None else f"{stroke.steady[0]:.2f} to {stroke.steady[1]:.2f}",
             number(stroke.mu_static),
             number(stroke.mu_dynamic),
             number(stroke.mu_max),
-            number(None if stroke.tau_max is None else stroke.tau_max * 1e3),
+            number(stroke.tau_max, factor=1e3),
             number(stroke.speed),
             WAYS[stroke.direction],
         ]
         for stroke in analysis.strokes
     ]
     console.say(table(rows, head=HEAD) if rows else "no stroke")
-    for decision in analysis.decisions:
-        console.say(f"* {decision.sentence}")
-    intervals = analysis.intervals
-    if any(end != "–" for found in intervals for end in _row(found)[1:] + _course(found)[1:]):
-        console.say(f"\n{chosen.kind}:")
-        console.say(table([_row(found) for found in intervals], head=INTERVALS))
+    console.say(*(f"* {decision.sentence}" for decision in analysis.decisions))
+    rows, courses = [_row(one) for one in analysis.intervals], [_course(one) for one in analysis.intervals]
+    if any(end != "–" for row in (*rows, *courses) for end in row[1:]):
+        console.say(f"\n{chosen.kind}:", table(rows, head=INTERVALS))
         console.say("\nof the same repeats; same way: share of them with the direction told:")
-        console.say(table([_course(found) for found in intervals], head=COURSES))
-        for name, kind in chosen.kinds.items():
-            console.say(f"  {name.replace('_', ' ')}: {kind}")
+        console.say(table(courses, head=COURSES))
+        console.say(*(f"  {name.replace('_', ' ')}: {kind}" for name, kind in chosen.kinds.items()))
     if analysis.tilt is not None:
         console.say(_leaning(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:
         where = "" if flaw.trial is None else f"trial {flaw.trial}: "
         console.say(f"{flaw.grade}: {where}{flaw.sentence}")
-    return 3 if analysis.flawed else 0
+    return FLAWED if analysis.flawed else DONE
 
 
 def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
@@ -88,18 +85,21 @@ def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
     return f"tilt of the face, if the hand pressed straight down: {', '.join(told)}; {tilt.kind}; {done}"
 
 
-def _row(found: StrokeIntervals) -> list[str]:
-    kilo = None if found.tau_max is None else (1e3 * found.tau_max[0], 1e3 * found.tau_max[1])
-    pairs = (found.mu_static, found.mu_dynamic, found.mu_max, kilo, found.speed)
-    return ["–" if found.trial is None else str(found.trial), *map(_ends, pairs)]
+def _row(intervals: StrokeIntervals) -> list[str]:
+    kilo = None if intervals.tau_max is None else (1e3 * intervals.tau_max[0], 1e3 * intervals.tau_max[1])
+    pairs = (intervals.mu_static, intervals.mu_dynamic, intervals.mu_max, kilo, intervals.speed)
+    return [_trial(intervals.trial), *map(_ends, pairs)]
 
 
-def _course(found: StrokeIntervals) -> list[str]:
-    share = "–" if found.direction_agrees is None else f"{100 * found.direction_agrees:.3g} %"
-    forces = map(_ends, (found.normal_force, found.tangential_force))
-    instants = (_ends(pair, 5) for pair in (found.onset, found.break_away, found.slide_onset))
-    trial = "–" if found.trial is None else str(found.trial)
-    return [trial, *forces, _ends(found.heading), share, *instants]
+def _course(intervals: StrokeIntervals) -> list[str]:
+    share = "–" if intervals.direction_agrees is None else f"{100 * intervals.direction_agrees:.3g} %"
+    forces = map(_ends, (intervals.normal_force, intervals.tangential_force))
+    instants = (_ends(pair, 5) for pair in (intervals.onset, intervals.break_away, intervals.slide_onset))
+    return [_trial(intervals.trial), *forces, _ends(intervals.heading), share, *instants]
+
+
+def _trial(number_of: int | None) -> str:
+    return "–" if number_of is None else str(number_of)
 
 
 def _ends(pair: tuple[float, float] | None, figures: int = 3) -> str:

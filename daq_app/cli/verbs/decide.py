@@ -7,11 +7,10 @@ back, by a line of its own. Times are seconds on the device's clock, as 'daq-app
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
-from daq_app.batch.derived import ANALYSIS, PREDICTION, analysed, kept, settings_of
-from daq_app.cli.main import DONE, FLAWED
-from daq_app.console import Console, WrongValue, number
+from daq_app.batch.derived import ANALYSIS, PREDICTION, analyse_session, settings_of, stored_document
+from daq_app.cli.options import add_session
+from daq_app.console import DONE, FLAWED, Console, WrongValue, number
 from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.calibration_uncertainty import gain_error_set
@@ -24,7 +23,7 @@ EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 -
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session, the stroke, and what can be decided of it."""
-    parser.add_argument("session", type=Path, metavar="SESSION")
+    add_session(parser)
     parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
     parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
     what = parser.add_mutually_exclusive_group(required=True)
@@ -64,23 +63,19 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.by is None or options.why is None:
         raise WrongValue("a decision says who decides and why: give --by CODE and --why REASON")
     check_code("--by", options.by)
-    stored = kept(recording.folder, ANALYSIS)
+    stored = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
     asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
     decision = with_old(analysis, asked)
     after = tried(recording, decision, before, analysis)
-    made = append(recording, decision)
+    line = append(recording, decision)
     if stored is not None:
-        analysed(recording, console)
+        analyse_session(recording, console)
     older = (recording.folder / PREDICTION).is_file()
-    changed = _changes(analysis, after)
-    console.result({"decision": made.to_dict(), "changes": changed, "prediction_is_older": older})
-    if recording.simulated_sentence:
-        console.say(recording.simulated_sentence)
-    console.say(made.sentence)
-    for sentence in changed:
-        console.say(sentence)
+    changes = _changes(analysis, after)
+    console.result({"decision": line.to_dict(), "changes": changes, "prediction_is_older": older})
+    console.say(recording.simulated_sentence, line.sentence, *changes)
     if older:
         console.say(f"{PREDICTION} was made before this decision: 'daq-app predict' makes it anew")
     return DONE
@@ -121,10 +116,7 @@ def _list(decisions: Decisions, console: Console) -> int:
     for line in decisions.lines:
         over = "" if line.number in acting or line.undoes is not None else " (no longer in force)"
         console.say(f"{line.made_utc}  {line.sentence}{over}")
-    for problem in decisions.problems:
-        console.say(problem)
-    if not decisions.lines:
-        console.say("nothing was decided")
+    console.say(*decisions.problems, None if decisions.lines else "nothing was decided")
     return FLAWED if decisions.problems else DONE
 
 

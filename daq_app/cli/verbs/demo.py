@@ -11,9 +11,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from daq_app.batch.derived import analysed, predicted
-from daq_app.cli.main import FLAWED
-from daq_app.console import Console, WrongValue, number, table
+from daq_app.batch.derived import analyse_session, predict_session
+from daq_app.cli.options import LARGEST_SEED, within
+from daq_app.console import DONE, FLAWED, Console, number, table
 from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
 from drivers.clock import LONGEST_STEP, PacedClock, RealClock
 from sessions.prediction import PredictionOptions, SessionPrediction
@@ -23,13 +23,17 @@ from sessions.strokes import Analysis
 
 EXAMPLE = "daq-app demo --seed 7"
 PACE = 20.0  # told seconds a real second
-LARGEST_SEED = 10_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare seed, pace and folder."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
-    parser.add_argument("--seed", type=int, default=1, help="of surfaces' noise, subjects and orders (1)")
+    parser.add_argument(
+        "--seed",
+        type=within("--seed", int, 0, LARGEST_SEED),
+        default=1,
+        help="of surfaces' noise, subjects and orders (1)",
+    )
     parser.add_argument(
         "--real-time", action="store_true", help=f"keep the clock; otherwise time runs {PACE:g} times faster"
     )
@@ -38,8 +42,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     """Run the study and print its table."""
     began = time.monotonic()
-    if not 0 <= options.seed <= LARGEST_SEED:
-        raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {LARGEST_SEED}")
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     clock = RealClock() if options.real_time else PacedClock(PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
@@ -49,8 +51,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.note(f"daq-app: {cut}")
         return FLAWED
     recording = Recording.open(study.stroked)
-    analysis = analysed(recording, console)
-    prediction = predicted(recording, analysis, console, PredictionOptions(intervals=True, beside="small"))
+    analysis = analyse_session(recording, console)
+    prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, beside="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
     from sessions.report import findings, score_table
     from sessions.report.html import plates, write_figures, write_report
@@ -77,7 +79,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     }
     console.result(summary)
     _print(summary, rows, console)
-    return 3 if analysis.flawed or study.lost else 0
+    return FLAWED if analysis.flawed or study.lost else DONE
 
 
 def _rows(
@@ -114,25 +116,22 @@ def _print(summary: Mapping[str, Any], rows: list[dict[str, Any]], console: Cons
             f"{row['descriptor']} {row['index']}",
             number(row["planted_mu"]),
             number(row["mu"]),
-            number(_kilo(row["planted_tau_max"])),
-            number(_kilo(row["tau_max"])),
+            number(row["planted_tau_max"], factor=1e3),
+            number(row["tau_max"], factor=1e3),
             number(row["planted_speed"]),
             number(row["speed"]),
-            number(_kilo(row["sed"]), 4),
+            number(row["sed"], 4, factor=1e3),
             number(row["mean_score"]),
         ]
         for row in rows
     ]
-    console.say()
-    console.say(table(cells, head=head))
-    console.say()
-    console.say(f"{summary['readings']} readings, {summary['lost']} lost; {summary['seconds']:.1f} s in all")
-    for sentence in summary["flaws"]:
-        console.say(f"flaw: {sentence}")
-    console.say(f"session   {summary['session']}")
-    console.say(f"report    {summary['report']}")
-    console.say(f"pictures  {summary['pictures']}")
-
-
-def _kilo(value: float | None) -> float | None:
-    return None if value is None else value * 1e3
+    console.say(
+        "",
+        table(cells, head=head),
+        "",
+        f"{summary['readings']} readings, {summary['lost']} lost; {summary['seconds']:.1f} s in all",
+        *(f"flaw: {sentence}" for sentence in summary["flaws"]),
+        f"session   {summary['session']}",
+        f"report    {summary['report']}",
+        f"pictures  {summary['pictures']}",
+    )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from daq_app.console import Console, WrongValue, number, table
+from daq_app.console import DONE, FLAWED, Console, WrongValue, number, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connected
 from drivers.catalog import Found, reachable
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             console.say(told if device.uri in told else f"{device.uri}: {told}")
         if device.info is not None and (life := life_of(device.info.serial)) is not None:
             console.say(f"{device.info.serial}: {_told(life)}")
-    return 0
+    return DONE
 
 
 def _described(device: Found) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def _probe(uri: str, console: Console) -> int:
         ]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
     flawed = any(counts[name] for name in FLAWS) or not len(readings)
-    return 3 if flawed else 0
+    return FLAWED if flawed else DONE
 
 
 def _listened(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:

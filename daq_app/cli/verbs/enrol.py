@@ -9,9 +9,9 @@ import secrets
 from pathlib import Path
 from typing import Any
 
-from daq_app.cli.body_option import add_body_arguments, body_of
-from daq_app.cli.main import DONE
-from daq_app.console import Console, WrongValue, table
+from daq_app.cli.body_options import add_body_arguments, body_of
+from daq_app.cli.options import within
+from daq_app.console import DONE, Console, WrongValue, table
 from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study import Member, Study, StudyError
@@ -26,7 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the study, the subject, and what is done."""
     parser.add_argument("study", type=Path, metavar="STUDY", help="the study's folder")
     parser.add_argument("--protocol", metavar="PROTOCOL", help="make the study: a built-in protocol, or a TOML file")
-    parser.add_argument("--seed", type=int, help="of a new study's orders (one by chance, recorded, unless given)")
+    parser.add_argument(
+        "--seed",
+        type=within("--seed", int, 0, 2**31 - 1),
+        help="of a new study's orders (one by chance, recorded, unless given)",
+    )
     parser.add_argument("--blind", action="store_true", help="of a new study: codes alone until it is unblinded")
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name")
     add_body_arguments(parser)
@@ -63,8 +67,6 @@ def _refuse_mixtures(options: argparse.Namespace) -> None:
         raise StudyError(f"{options.study} is a study already, and its protocol is fixed: enrol without --protocol")
     if (options.blind or options.seed is not None) and not making:
         raise WrongValue("--blind and --seed are decided when a study is made: give --protocol")
-    if options.seed is not None and not 0 <= options.seed < 2**31:
-        raise WrongValue(f"--seed {options.seed} is not allowed: a whole number from 0 to {2**31 - 1}")
     if options.withdraw is not None and options.subject is None:
         raise WrongValue("--withdraw needs --subject")
     if (options.finger or options.depth) and (options.subject is None or options.withdraw is not None):

@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from daq_app.batch.derived import settings_kept, visit
-from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.console import Console, WrongValue, number, span, table
+from daq_app.batch.derived import open_visit, stored_settings
+from daq_app.cli.analysis_options import add_calibration, calibration_error
+from daq_app.cli.options import add_visit, within
+from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.atomic_file import write_whole
 from sessions.exchange.displacement_log import displacement_log
 from sessions.plan.plan import SessionPlan
@@ -39,23 +40,28 @@ AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare session, log, what is known of finger and surface, and where the finger goes."""
-    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
-    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces")
+    add_visit(parser)
     parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
-    parser.add_argument("--shift", type=float, default=0.0, metavar="S", help="added to the log's times (0)")
+    parser.add_argument(
+        "--shift",
+        type=within("--shift", float, -1e9, 1e9),
+        default=0.0,
+        metavar="S",
+        help="added to the log's times (0)",
+    )
     parser.add_argument(
         "--finger", type=Path, metavar="FILE", help="scene file with the finger's dimensions (else the session's own)"
     )
     parser.add_argument(
         "--mu",
-        type=float,
+        type=within("--mu", float, 0.0, 5.0),
         default=MU,
         metavar="MU",
         help=f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly changes)",
     )
     parser.add_argument(
         "--prior",
-        type=float,
+        type=within("--prior", float, 1.1, 4.0),
         default=FACTOR,
         metavar="FACTOR",
         help=f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)",
@@ -63,25 +69,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the posterior's draws (0)")
+    parser.add_argument("--seed", type=within("--seed", int, 0, 2**32), default=0, help="of the posterior's draws (0)")
     parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
     add_calibration(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Fit the finger and print its layers."""
-    from daq_app.cli.main import DONE, FLAWED
-
-    _check_values(options)
-    recording = visit(options.session, options.subject)
-    settings = settings_kept(recording)
+    if options.scene is not None and not options.scene.parent.is_dir():
+        raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
+    recording = open_visit(options.session, options.subject)
+    settings = stored_settings(recording)
     gain_error = calibration_error(options)
     if gain_error is not None:
         settings = replace(settings, gain_error=gain_error)
     curves = _curves(options, recording, settings)
     flaws = [*curves.left_out, *([] if options.relaxation else _relaxes(curves))]
-    for sentence in flaws:
-        console.note(sentence)
+    console.note(*flaws)
     found = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
     if options.scene is not None:
@@ -106,8 +110,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             "assumed": assumed,
         }
     )
-    if simulated:
-        console.say(simulated)
+    console.say(simulated)
     _print(found, options, console)
     return FLAWED if flaws or found.check.deviation > AGREE else DONE
 
@@ -123,16 +126,6 @@ class _Outcome(NamedTuple):
     def scene(self) -> Scene:
         """The finger found."""
         return self.fit.scene if self.relaxation is None else self.relaxation.relaxing(self.fit.scene)
-
-
-def _check_values(options: argparse.Namespace) -> None:
-    """Raise WrongValue for an option out of its range."""
-    ranges = {"mu": (0.0, 5.0), "prior": (1.1, 4.0), "shift": (-1e9, 1e9), "seed": (0, 2**32)}
-    for name, (low, high) in ranges.items():
-        if not low <= getattr(options, name) <= high:
-            raise WrongValue(f"--{name} {getattr(options, name)} is not allowed: {low:g} to {high:g}")
-    if options.scene is not None and not options.scene.parent.is_dir():
-        raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
 
 
 def _curves(options: argparse.Namespace, recording: Recording, settings: AnalysisSettings) -> PressCurves:
@@ -171,12 +164,8 @@ def _fitted(
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
     given, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=given), plan))
-
-    def shown(part: float) -> bool:
-        console.progress(part, "solving presses")
-        return True
-
-    model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, shown)
+    progress = console.reporter("solving presses")
+    model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
     if options.relaxation:
         found, rate = relaxing_fit(model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed)
     else:
@@ -190,7 +179,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
     rows = [
         [
             one.name,
-            number(1e3 * one.stiffness.value),
+            number(one.stiffness.value, factor=1e3),
             _ends(one.stiffness),
             _ends(one.profile),
             _ends(one.prior),
@@ -205,8 +194,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         f"{found.points} points of {len(found.touch)} presses up to {number(found.deepest)} mm"
         + (f", and {found.widths} lengths of contact" if found.widths else "")
     )
-    for one in found.layers:
-        console.say(one.sentence)
+    console.say(*(one.sentence for one in found.layers))
     if outcome.relaxation is not None:
         part, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(

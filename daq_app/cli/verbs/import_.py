@@ -11,8 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.main import FLAWED
-from daq_app.console import Console, WrongValue, number
+from daq_app.console import DONE, FLAWED, Console, WrongValue, number
 
 if TYPE_CHECKING:
     from sessions.exchange.exported import ExportedSession
@@ -55,11 +54,9 @@ def _restored(told: "ExportedSession", options: argparse.Namespace, console: Con
     made = import_session(told, folder)
     seal(folder)
     console.result({"session": str(folder), "format": told.form, **asdict(made)})
-    for sentence in made.differences:
-        console.say(sentence)
     outcome = "with the above" if made.differences else "as they were"
-    console.say(f"{folder}: {made.readings} readings, {made.events} events, {outcome}")
-    return FLAWED if made.differences else 0
+    console.say(*made.differences, f"{folder}: {made.readings} readings, {made.events} events, {outcome}")
+    return FLAWED if made.differences else DONE
 
 
 def _foreign(options: argparse.Namespace, console: Console) -> int:
@@ -86,12 +83,12 @@ def _foreign(options: argparse.Namespace, console: Console) -> int:
     seal(made.folder)
     list_in_manifest(made.folder, (ORIGINAL_FILE,), Recording.open(made.folder).simulated_sentence)
     console.result({"session": str(made.folder), **{k: v for k, v in asdict(made).items() if k != "folder"}})
-    console.say(f"{made.folder}: {made.readings} readings at {number(made.rate, 4)} a second")
-    for default in made.defaults:
-        console.say(f"default: {default}")
-    if made.extra:
-        console.say(f"kept in the original file alone: {', '.join(made.extra)}")
-    return 0
+    console.say(
+        f"{made.folder}: {made.readings} readings at {number(made.rate, 4)} a second",
+        *(f"default: {default}" for default in made.defaults),
+        f"kept in the original file alone: {', '.join(made.extra)}" if made.extra else None,
+    )
+    return DONE
 
 
 def _parts(text: str | None) -> tuple[str, ...] | None:

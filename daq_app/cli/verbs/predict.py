@@ -5,19 +5,18 @@ the same press slid the other way.
 """
 
 import argparse
+import math
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from daq_app.batch.derived import analysed, predicted, visit
-from daq_app.cli.area_option import add_area, area_law
-from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.model_option import add_kinematics, add_tau
-from daq_app.console import Console, WrongValue, number, span, table
+from daq_app.batch.derived import analyse_session, open_visit, predict_session
+from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import add_kinematics, add_quantity, add_tau, add_visit, numbers_by_key, within
+from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.prediction import (
     QUANTITIES,
-    SED,
     PredictionOptions,
     Quantity,
     SessionPrediction,
@@ -39,8 +38,7 @@ MARKED = "by the solver's tangent, or where marked * by solving draws"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session and what may be asked of the model."""
-    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
-    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces")
+    add_visit(parser)
     add_kinematics(
         parser, "small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding"
     )
@@ -54,13 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="scene file with another finger; friction and loading are the trials'",
     )
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
-    parser.add_argument(
-        "--quantity",
-        choices=list(BY_NAME),
-        default=SED.name,
-        metavar="NAME",
-        help=f"of the ending, to print in place of the SED: {', '.join(BY_NAME)}; --json has all",
-    )
+    add_quantity(parser, "to print (--json has all)")
     parser.add_argument(
         "--beside",
         choices=["none", "small", "both"],
@@ -83,24 +75,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="a parameter of the afferent, such as static_gain=30; --afferent prints all of them",
     )
-    parser.add_argument("--afferent-seed", type=int, default=0, metavar="SEED", help="of the spike times (0)")
+    parser.add_argument(
+        "--afferent-seed",
+        type=within("--afferent-seed", int, 0, math.inf),
+        default=0,
+        metavar="SEED",
+        help="of the spike times (0)",
+    )
     parser.add_argument(
         "--seal",
         action="store_true",
         help="hash and keep the prediction, so that it is shown to be older than unblinding",
     )
-    add_area(parser)
-    add_calibration(parser)
+    add_analysis(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Predict, keep the result in the session's folder and print it."""
-    if options.afferent_seed < 0:
-        raise WrongValue(f"--afferent-seed {options.afferent_seed} is not allowed: a whole number from 0 on")
     afferent = _afferent(options)
     scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
-    if ignored:
-        console.note(ignored)
+    console.note(ignored or None)
     asked = PredictionOptions(
         tau_reading=options.tau,
         scene=scene,
@@ -110,23 +104,22 @@ def run(options: argparse.Namespace, console: Console) -> int:
         intervals=options.intervals,
         beside_intervals=options.intervals,
     )
-    recording = visit(options.session, options.subject)
-    analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
-    prediction = predicted(recording, analysis, console, asked, afferent if options.afferent else None)
+    recording = open_visit(options.session, options.subject)
+    analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
+    prediction = predict_session(recording, analysis, console, asked, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}
     console.result({**prediction.to_dict(), **seal, **firing})
-    if recording.simulated_sentence:
-        console.say(recording.simulated_sentence)
+    console.say(recording.simulated_sentence)
     quantity = BY_NAME[options.quantity]
     unit = "kPa" if quantity.unit == "MPa" else quantity.unit
     head = ["trial", "surface", "mu", "tau_max [kPa]", f"{quantity.label} [{unit}]", "error"]
     rows = [
         [
-            str(row.trial or (row.stroke or 0) + 1),
+            _called(row),
             "–" if row.stimulus is None else row.stimulus.called,
             number(row.mu),
-            number(None if row.tau_max is None else row.tau_max * 1e3),
+            number(row.tau_max, factor=1e3),
             *_response(row, quantity),
             number(row.normal_force),
             number(row.measured_normal),
@@ -147,14 +140,23 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print_firing(firing["afferent"], console)
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
-    without: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    for row in prediction.trials:
-        for reason in dict.fromkeys(row.reasons.values()):
-            missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
-            without[missing.replace("_", " "), reason].append(_called(row))
-    for (missing, reason), trials in without.items():
-        console.say(f"{', '.join(trials)}: no {missing}: {reason}")
-    return 3 if any(row.sed is None for row in prediction.trials) else 0
+    _print_once(console, ((_called(row), words) for row in prediction.trials for words in _without(row)))
+    return FLAWED if any(row.sed is None for row in prediction.trials) else DONE
+
+
+def _without(row: TrialPrediction) -> Iterator[str]:
+    """Yield what has no value, and why, once for each reason."""
+    for reason in dict.fromkeys(row.reasons.values()):
+        missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
+        yield f"no {missing.replace('_', ' ')}: {reason}"
+
+
+def _print_once(console: Console, sentences: Iterable[tuple[str, str]]) -> None:
+    """Print each sentence once, after the names of all that it holds for; each pair is a name and a sentence."""
+    names: defaultdict[str, list[str]] = defaultdict(list)
+    for name, sentence in sentences:
+        names[sentence].append(name)
+    console.say(*(f"{', '.join(held)}: {sentence}" for sentence, held in names.items()))
 
 
 def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
@@ -162,32 +164,27 @@ def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
     if quantity.name not in row.responses:
         return "–", "–"
     value, error = row.responses[quantity.name]
-    factor = 1e3 if quantity.unit == "MPa" else 1.0
-    return number(factor * value, 4), f"{100 * error / abs(value):.2g} %" if value else "–"
+    return number(
+        value, 4, factor=1e3 if quantity.unit == "MPa" else 1.0
+    ), f"{100 * error / abs(value):.2g} %" if value else "–"
 
 
 def _print_beside(prediction: SessionPrediction, console: Console) -> None:
     """Print what another finger changes of signs, the SED of each trial in every variant, and why it has none."""
-    for sentence in other_signs(prediction.finger):
-        console.note(sentence)
+    console.note(*other_signs(prediction.finger))
     rows = [row for row in prediction.trials if row.alternatives]
     if not rows:
         return
     console.say("\nthe same trials side by side, SED [kPa] with model N [N], or the depth [mm] found under a force:")
-    head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
-    console.say(table([[_called(row), *map(_cell, row.alternatives)] for row in rows], head=head))
-    for number_of, one in enumerate(rows[0].alternatives, 1):
-        console.say(f"  ({number_of}) {one.variant.sentence}")
-    missing: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
-    for row in rows:
-        for one in row.alternatives:
-            if one.sed is None:
-                missing[one.variant.sentence, one.reason].append(_called(row))
-    for (variant, reason), trials in missing.items():
-        console.say(f"{', '.join(trials)}: none for {variant}: {reason}")
-    doubt = next((one.doubt for row in rows for one in row.alternatives if one.doubt), "")
-    if doubt:
-        console.say(f"!: {doubt} (the first of those marked)")
+    variants = {f"({place})": one.variant.sentence for place, one in enumerate(rows[0].alternatives, 1)}
+    console.say(table([[_called(row), *map(_cell, row.alternatives)] for row in rows], head=["trial", *variants]))
+    console.say(*(f"  {mark} {sentence}" for mark, sentence in variants.items()))
+    pairs = [(_called(row), one) for row in rows for one in row.alternatives]
+    _print_once(
+        console, ((trial, f"none for {one.variant.sentence}: {one.reason}") for trial, one in pairs if one.sed is None)
+    )
+    doubt = next((one.doubt for _, one in pairs if one.doubt), "")
+    console.say(f"!: {doubt} (the first of those marked)" if doubt else None)
 
 
 def _called(row: TrialPrediction) -> str:
@@ -198,7 +195,7 @@ def _cell(one: Alternative) -> str:
     if one.sed is None:
         return "–"
     beside = one.indentation if one.variant.driven == "force" else one.normal_force
-    return f"{number(one.sed * 1e3, 4)} ({number(beside)}){'!' if one.doubt else ''}"
+    return f"{number(one.sed, 4, factor=1e3)} ({number(beside)}){'!' if one.doubt else ''}"
 
 
 def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:
@@ -216,7 +213,7 @@ def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> 
         for n, one in enumerate(row.alternatives, 1)
         if one.sed is not None
     )
-    _say_missing(missing, console)
+    _print_missing(missing, console)
 
 
 def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
@@ -231,17 +228,15 @@ def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
         for row in prediction.trials
         if row.opposite_sed is not None
     ]
-    _say_missing([*missing, *back], console)
+    _print_missing([*missing, *back], console)
 
 
-def _say_missing(told: Iterable[tuple[str, SedInterval | None]], console: Console) -> None:
-    """Say once for each reason which SEDs have no interval: those without an SED have told theirs elsewhere."""
-    which: defaultdict[str, list[str]] = defaultdict(list)
-    for name, one in told:
-        if one is not None and one.low is None:
-            which[one.reason].append(name)
-    for reason, names in which.items():
-        console.say(f"{', '.join(names)}: no interval: {reason}")
+def _print_missing(intervals: Iterable[tuple[str, SedInterval | None]], console: Console) -> None:
+    """Print why SEDs have no interval: those without an SED have told their reason elsewhere."""
+    _print_once(
+        console,
+        ((name, f"no interval: {one.reason}") for name, one in intervals if one is not None and one.low is None),
+    )
 
 
 def _row(row: TrialPrediction) -> list[str]:
@@ -249,8 +244,8 @@ def _row(row: TrialPrediction) -> list[str]:
     return [
         _called(row),
         _ends(one),
-        number(None if one.by_mu is None else 1e4 * one.by_mu),
-        number(None if one.by_tau_max is None else 1e3 * one.by_tau_max),
+        number(one.by_mu, factor=1e4),
+        number(one.by_tau_max, factor=1e3),
         _ends(row.opposite_interval),
     ]
 
@@ -264,13 +259,7 @@ def _ends(one: SedInterval | None) -> str:
 
 def _afferent(options: argparse.Namespace) -> AfferentSettings:
     """Return the parameters of the afferent with those that were set. Raises WrongValue."""
-    changes: dict[str, float] = {}
-    for given in options.afferent_set:
-        name, _, value = given.partition("=")
-        try:
-            changes[name.strip()] = float(value)
-        except ValueError:
-            raise WrongValue(f"--afferent-set {given} is not allowed: NAME=VALUE, such as static_gain=30") from None
+    changes = numbers_by_key(options.afferent_set, "--afferent-set", "static_gain=30")
     try:
         return settings_with(changes, options.afferent_seed, options.quantity)
     except ValueError as wrong:
@@ -289,9 +278,10 @@ def _print_firing(firing: dict[str, Any], console: Console) -> None:
         ]
         for one in firing["trials"]
     ]
-    console.say(f"\nSA-II afferent, {firing['about']}:")
-    console.say(table(rows, head=head))
-    for one in firing["parameters"]:
-        console.say(
+    console.say(f"\nSA-II afferent, {firing['about']}:", table(rows, head=head))
+    console.say(
+        *(
             f"  {one['name'].replace('_', ' ')} = {one['value']:g} {one['unit']} ({one['standing']}; {one['basis']})"
+            for one in firing["parameters"]
         )
+    )

@@ -7,14 +7,13 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from daq_app.batch.derived import afferent_before, analysed, asked_before, predicted, visit
-from daq_app.cli.area_option import add_area, area_law
-from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.model_option import add_paths
-from daq_app.console import Console
+from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
+from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import add_paths, add_quantity, add_visit
+from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
-from sessions.prediction import QUANTITIES, SED, PredictionOptions, Progress, SessionPrediction
+from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
@@ -25,14 +24,12 @@ from sessions.report.predictions import afferent_facts
 from sessions.statistics.multiverse import trial_paths
 
 PAGE = "report.html"
-NAMES = [quantity.name for quantity in QUANTITIES]
 EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 recordings/P02"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session, the page and further scores."""
-    parser.add_argument("session", type=Path, metavar="SESSION|STUDY")
-    parser.add_argument("--subject", metavar="CODE", help="of a study: whose visit with forces; all its scores join in")
+    add_visit(parser, "; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
     add_paths(
@@ -52,22 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept "
         "before)",
     )
-    parser.add_argument(
-        "--quantity",
-        choices=NAMES,
-        default=SED.name,
-        metavar="NAME",
-        help=f"of the ending, to hold against scores in place of the SED: {', '.join(NAMES)}",
-    )
+    add_quantity(parser, "to hold against scores")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
-    add_area(parser)
-    add_calibration(parser)
+    add_analysis(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse, predict and write the page."""
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
-    recording = visit(options.session, options.subject)
+    recording = open_visit(options.session, options.subject)
     others = [revealed(Recording.open(folder)) for folder in options.scores]
     if is_study(options.session):
         others += score_visits(options.session, besides=recording)
@@ -78,11 +68,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     if options.out is not None:
         html.leave_others_alone(options.out)
-    analysis = analysed(recording, console, area_law(options), gain_error=calibration_error(options))
-    afferent = afferent_before(recording)
+    analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
+    afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
-    prediction = predicted(recording, analysis, console, _asked(recording, options), afferent)
+    prediction = predict_session(recording, analysis, console, _asked(recording, options), afferent)
     from sessions.report import findings, score_table
 
     further = _further(recording, prediction, afferent, options, console)
@@ -97,12 +87,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     pictures = html.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
-    return 3 if analysis.flawed else 0
+    return FLAWED if analysis.flawed else DONE
 
 
 def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
     """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
-    before = asked_before(recording) or PredictionOptions()
+    before = stored_options(recording) or PredictionOptions()
     beside = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
     return replace(before, intervals=True, beside=beside, course="history")
 
@@ -115,17 +105,10 @@ def _further(
     console: Console,
 ) -> Further:
     """Return the intervals of the SEDs, and what was asked for beside."""
-
-    def shown(text: str) -> Progress:
-        def tell(part: float) -> bool:
-            console.progress(0.9 * part, text)
-            return True
-
-        return tell
-
     reference, firing = (None, ()) if afferent is None else session_firing(prediction, afferent)
     paths = None
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
-        paths = trial_paths(recording, prediction, shown("many paths of the analysis"), finite=finite)
+        progress = console.reporter("many paths of the analysis", until=0.9)
+        paths = trial_paths(recording, prediction, progress, finite=finite)
     return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, options.quantity, paths)

@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from daq_app.cli.attending import attended
-from daq_app.cli.main import DONE, FLAWED
-from daq_app.console import Console, WrongValue
+from daq_app.cli.options import add_session
+from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, ResumeSession
 from sessions.recording import Recording, RecordingError
@@ -22,7 +22,7 @@ EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare session, device and people."""
-    parser.add_argument("session", type=Path, metavar="SESSION")
+    add_session(parser)
     parser.add_argument("--device", metavar="URI", help="the transducer (where it was when the session began)")
     parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
     parser.add_argument(
@@ -55,4 +55,4 @@ def run(options: argparse.Namespace, console: Console) -> int:
     gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})
     console.say(f"{folder}: {end.reason}; {end.readings} readings in all, {end.health.lost} lost since it was resumed")
-    return DONE if end.complete and not (end.health.lost or end.health.doubtful or end.health.off_units) else FLAWED
+    return outcome.exit_code

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from daq_app.cli.attending import attended, opened
-from daq_app.cli.body_option import add_body_arguments, body_of, own_sentence
-from daq_app.cli.main import DONE, FLAWED
+from daq_app.cli.body_options import add_body_arguments, body_of, own_sentence
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
@@ -78,8 +77,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     stamp = datetime.now().strftime("%Y%m%dT%H%M%S")
     what = planned.protocol if place is None else "forces" if planned.forces else "scores"
     folder = options.out or (options.study or Path("recordings")) / f"{options.subject}_{what}_{stamp}"
-    if (own := own_sentence(planned)) is not None:
-        console.note(own)
+    console.note(own_sentence(planned))
     simulated = options.simulate_subject
     people = People() if simulated is None else People("simulated people", simulated, chosen.planted_friction)
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
@@ -101,7 +99,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.note(
             f"it is not sealed yet: 'daq-app resume {folder}' goes on at the same trial, with --end it is ended"
         )
-    return DONE if end.complete and not (end.health.lost or end.health.doubtful or end.health.off_units) else FLAWED
+    return outcome.exit_code
 
 
 def _decided(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:

@@ -9,8 +9,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from daq_app.cli.main import DONE, FLAWED
-from daq_app.console import Console
+from daq_app.console import DONE, FLAWED, Console
 from daq_app.recorder.selftest import SelfTestFailed, selftest
 from sessions.recording.certificate import write_certificate
 from sessions.recording.storage_safety import unsafe
@@ -44,7 +43,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     path = write_certificate(out, certificate)
     console.result({"passed": True, "certificate": str(path), "warning": warning, **certificate})
     console.say(certificate["sentence"])
-    if warning is not None:
-        console.note(f"all the same, {warning}")
+    console.note(None if warning is None else f"all the same, {warning}")
     console.say(f"certificate  {path}")
     return DONE if warning is None else FLAWED

@@ -9,6 +9,8 @@ keeps that sign: single changes, a map over the receptor's place and the tip rad
 """
 
 import argparse
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +19,9 @@ from numpy.typing import NDArray
 from daq_app.batch import sign_map
 from daq_app.batch.sensitivity import Index, checked, doubts, left_as_it_is, saltelli_points, sensitivity, usual_design
 from daq_app.batch.sign_map import Answer
-from daq_app.cli.model_option import add_kinematics
-from daq_app.console import Console, WrongValue, number, table
-from sessions.prediction import QUANTITIES, SED, Quantity
+from daq_app.cli.options import add_kinematics, add_quantity, add_workers, within
+from daq_app.console import DONE, Console, WrongValue, number, table
+from sessions.prediction import QUANTITIES, Quantity
 from sessions.prediction.series_slopes import SERIES
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
@@ -40,14 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {len(sign_map.DESIGN) + 2} N fingers "
         f"({OF_FINGERS})",
     )
-    parser.add_argument("--seed", type=int, default=0, help="of the samples (0)")
-    parser.add_argument(
-        "--quantity", choices=NAMES, default=SED.name, metavar="NAME", help=f"whose signs are shown: {', '.join(NAMES)}"
-    )
+    parser.add_argument("--seed", type=within("--seed", int, 0, math.inf), default=0, help="of the samples (0)")
+    add_quantity(parser, "whose signs are shown")
     add_kinematics(parser, "strain of every finger but the one change that takes the other")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, written as they come: another run goes on")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes of this computer (its cores)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, in place of this computer")
+    add_workers(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -58,8 +57,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.scene is None:
         if options.design is not None:
             raise WrongValue("--design needs a scene: daq-app sensitivity SCENE.toml --design FILE")
-        if options.workers is not None and not 1 <= options.workers <= 1024:
-            raise WrongValue(f"--workers {options.workers} is not allowed: 1 to 1024")
         return _signs(options, samples, console)
     scene = load_toml(options.scene, Scene)
     if options.design is None:
@@ -74,29 +71,28 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     indices, seds = sensitivity(scene, design, samples, options.seed, shown)
     low, high = float(seds.min()), float(seds.max())
-    rows = [
-        [
-            one.name,
-            f"{number(one.low)} to {number(one.high)}",
-            f"{one.first:.2f} ± {one.first_error:.2f}",
-            f"{one.total:.2f} ± {one.total_error:.2f}",
-        ]
-        for one in indices
-    ]
-    doubted = doubts(indices, samples)
-    told = {"samples": samples, "seed": options.seed, "design_origin": origin, "sed_range": [low, high]}
-    left = left_as_it_is(scene, design)
-    console.result({**told, "indices": [one.to_dict() for one in indices], "doubts": doubted, "not_varied": left})
-    console.say(
-        f"SED from {number(1e3 * low, 4)} to {number(1e3 * high, 4)} kPa over {len(seds)} scenes; design {origin}"
+    doubtful = doubts(indices, samples)
+    constant = left_as_it_is(scene, design)
+    console.result(
+        {
+            "samples": samples,
+            "seed": options.seed,
+            "design_origin": origin,
+            "sed_range": [low, high],
+            "indices": [one.to_dict() for one in indices],
+            "doubts": doubtful,
+            "not_varied": constant,
+        }
     )
-    console.say(table(rows, head=["number", "varied", "alone", "with others"]))
-    console.say("Shares of the variance of the SED, Sobol indices with half of their 95 % bootstrap intervals.")
-    if left:
-        console.say(f"Not varied, so nothing is said of them: {', '.join(left)}.")
-    for sentence in doubted:
-        console.say(sentence)
-    return 0
+    console.say(
+        f"SED from {number(low, 4, factor=1e3)} to {number(high, 4, factor=1e3)} kPa over {len(seds)} scenes; "
+        f"design {origin}",
+        _index_table(indices),
+        "Shares of the variance of the SED, Sobol indices with half of their 95 % bootstrap intervals.",
+        f"Not varied, so nothing is said of them: {', '.join(constant)}." if constant else None,
+        *doubtful,
+    )
+    return DONE
 
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
@@ -161,7 +157,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             break
     for name, (found, count) in indices.items():
         _print_indices(name, found, count, samples, quantity, console)
-    return 0
+    return DONE
 
 
 def _print_changes(single: dict[str, Answer | str], quantity: Quantity, console: Console) -> None:
@@ -227,6 +223,10 @@ def _print_indices(
     if not found:
         console.say("too few whole blocks of the design have an answer: ask for more --samples")
         return
+    console.say(_index_table(found), *doubts(found, samples))
+
+
+def _index_table(indices: Sequence[Index]) -> str:
     rows = [
         [
             one.name,
@@ -234,8 +234,6 @@ def _print_indices(
             f"{one.first:.2f} ± {one.first_error:.2f}",
             f"{one.total:.2f} ± {one.total_error:.2f}",
         ]
-        for one in found
+        for one in indices
     ]
-    console.say(table(rows, head=["number", "varied", "alone", "with others"]))
-    for sentence in doubts(found, samples):
-        console.say(sentence)
+    return table(rows, head=["number", "varied", "alone", "with others"])

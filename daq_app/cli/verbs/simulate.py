@@ -10,6 +10,7 @@ import argparse
 import time
 from pathlib import Path
 
+from daq_app.cli.options import within
 from daq_app.console import Console, WrongValue
 from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
 
@@ -25,10 +26,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", "--rdt-port", type=_port, dest="rdt_port", help="UDP port (49152)")
     parser.add_argument("--tcp-port", type=_port, help="TCP command port (49151)")
     parser.add_argument("--http-port", type=_port, help="HTTP port (80, or a free one)")
-    parser.add_argument("--rate", type=int, help="readings a second of net-ft, 1 to 7000 (200)")
+    parser.add_argument(
+        "--rate",
+        type=within("--rate", int, 1, 7000, "the box gives 1 to 7000 readings a second"),
+        help="readings a second of net-ft, 1 to 7000 (200)",
+    )
     parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits a second (38400)")
     parser.add_argument("--seed", type=int, default=0, help="of noise, drift and strokes (0)")
-    parser.add_argument("--factor", type=float, default=1.0, help="how much faster than real time runs (1)")
+    parser.add_argument(
+        "--factor",
+        type=within("--factor", float, 0.01, 1000.0),
+        default=1.0,
+        help="how much faster than real time runs (1)",
+    )
     parser.add_argument("--script", type=Path, help="TOML timetable of strokes and faults")
 
 
@@ -38,12 +48,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for name in given:
         if OF_ONE_WIRE[name] != options.wire:
             raise WrongValue(f"--{name.replace('_', '-')} belongs to {OF_ONE_WIRE[name]}, not to {options.wire}")
-    if not 1 <= given.get("rate", 1) <= 7000:
-        raise WrongValue(f"--rate {options.rate} is not allowed: the box gives 1 to 7000 readings a second")
     if given.get("baud", 9600) not in BAUDS:
         raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
-    if not 0.01 <= options.factor <= 1000:
-        raise WrongValue(f"--factor {options.factor:g} is not allowed: 0.01 to 1000")
     serve = {"net-ft": serve_net_ft, "serial-ft": serve_serial_ft, "digital-ft": serve_digital_ft}[options.wire]
     box = serve(**given, seed=options.seed, factor=options.factor, script=options.script)
     try:

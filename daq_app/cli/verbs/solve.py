@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.cli.main import DONE, FLAWED, STOPPED
-from daq_app.console import Console, WrongValue, number, table
+from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, number, table
 from solver.quantities import QUANTITIES, Quantity
 
 if TYPE_CHECKING:
@@ -89,9 +88,9 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.result({**found.to_dict(), **{name: value for name, value in further.items() if value}})
     console.say(title)
     rows = [
-        ["SED at the ending", number(found.sed_ending * 1e3, 5), "kPa", _percent(found.error_estimate)],
-        *([] if found.nested is None else [["corrected", number(found.sed_ending_corrected * 1e3, 5), "kPa", ""]]),
-        ["SED at the point", number(found.sed_point * 1e3, 5), "kPa", _percent(found.sed_point_error)],
+        ["SED at the ending", number(found.sed_ending, 5, factor=1e3), "kPa", _percent(found.error_estimate)],
+        *([["corrected", number(found.sed_ending_corrected, 5, factor=1e3), "kPa", ""]] if found.nested else []),
+        ["SED at the point", number(found.sed_point, 5, factor=1e3), "kPa", _percent(found.sed_point_error)],
         ["normal force", number(found.normal_force, 5), "N/mm", _percent(found.normal_force_error)],
         ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(found.tangential_force_error)],
         ["contact width", number(found.contact_width, 3), "mm", _percent(found.contact_width_error)],
@@ -102,9 +101,9 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
             else [["sideways shift", number(found.shift, 4), "mm", _length(found.shift_error)]]
         ),
         ["unknowns", str(found.dofs), "", ""],
-        ["solving took", number(found.wall_s * 1e3, 3), "ms", ""],
-        ["setting up took", number(found.setup_s * 1e3, 3), "ms", ""],
-        ["estimating errors took", number(found.estimate_s * 1e3, 3), "ms", ""],
+        ["solving took", number(found.wall_s, factor=1e3), "ms", ""],
+        ["setting up took", number(found.setup_s, factor=1e3), "ms", ""],
+        ["estimating errors took", number(found.estimate_s, factor=1e3), "ms", ""],
     ]
     console.say(table(rows, head=["", "", "", "error, estimated"]))
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
@@ -129,8 +128,7 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
     shown = [[told, number(found.audits[name] + 0.0, 2)] for name, told in AUDITS.items() if name in found.audits]
     console.say(table(shown, head=["", ""]).lstrip("\n"))
-    for warning in found.warnings:
-        console.note(f"note: {warning}")
+    console.note(*(f"note: {warning}" for warning in found.warnings))
 
 
 def _rates(found: "Prediction") -> "Mapping[str, Rates]":
@@ -164,7 +162,7 @@ def _row(found: "Prediction", receptor: "Receptor") -> dict[str, list[float | No
 
 def _response(quantity: Quantity, value: float, error: float) -> list[str]:
     factor, unit = (1e3, "kPa") if quantity.unit == "MPa" else (1.0, "")
-    return [quantity.label, number(factor * value, 4), unit, number(factor * error, 2)]
+    return [quantity.label, number(value, 4, factor=factor), unit, number(error, 2, factor=factor)]
 
 
 def _length(error: float | None) -> str:
@@ -172,4 +170,4 @@ def _length(error: float | None) -> str:
 
 
 def _percent(part: float | None) -> str:
-    return "–" if part is None else f"{number(100 * part, 2)} %"
+    return "–" if part is None else f"{number(part, 2, factor=100)} %"

@@ -9,7 +9,6 @@ With --synthetic a study of ten simulated subjects is made first, and what was p
 
 import argparse
 import json
-import re
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from datetime import datetime
@@ -17,10 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.pool import Shelf, visits
-from daq_app.cli.area_option import add_area, area_law
-from daq_app.cli.calibration_option import add_calibration, calibration_error
-from daq_app.cli.model_option import add_kinematics, add_paths, add_tau
-from daq_app.console import Console, WrongValue, table
+from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import (
+    LARGEST_SEED,
+    add_kinematics,
+    add_paths,
+    add_tau,
+    add_workers,
+    numbers_by_key,
+    within,
+)
+from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
 from sessions.prediction import PredictionOptions
@@ -36,22 +42,25 @@ from sessions.strokes.contact_area import FIXED
 
 EXAMPLE = "daq-app study recordings --out results"
 PLANTED = "planted.json"
-LARGEST_SEED = 10_000_000
 SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # designs whose power is told
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the folder of sessions, or the seed of a synthetic study."""
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
-    parser.add_argument("--synthetic", type=int, metavar="SEED", help="make a study of ten simulated subjects instead")
+    parser.add_argument(
+        "--synthetic",
+        type=within("--synthetic", int, 0, LARGEST_SEED),
+        metavar="SEED",
+        help="make a study of ten simulated subjects instead",
+    )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
         help="page, table and results (FOLDER/pooled); with --synthetic the study too",
     )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster you trust, such as tls://host:8786")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes on this computer (as many as cores)")
+    add_workers(parser)
     add_kinematics(parser, "as for 'daq-app predict'; finite strain takes ten times as long")
     add_paths(
         parser,
@@ -74,11 +83,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"{', '.join(f'{one.name}={one.default:g}' for one in fields(Planted))}",
     )
     parser.add_argument(
-        "--studies", type=int, default=400, metavar="N", help="with --power: simulated per design (400)"
+        "--studies",
+        type=within("--studies", int, 20, 100_000),
+        default=400,
+        metavar="N",
+        help="with --power: simulated per design (400)",
     )
-    parser.add_argument("--seed", type=int, default=0, help="with --power: of the simulated studies (0)")
-    add_area(parser, "fixed for all sessions, however each was analysed before")
-    add_calibration(parser)
+    parser.add_argument(
+        "--seed",
+        type=within("--seed", int, 0, LARGEST_SEED),
+        default=0,
+        help="with --power: of the simulated studies (0)",
+    )
+    add_analysis(parser, "fixed for all sessions, however each was analysed before")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -107,15 +124,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
     _print(study, files, console)
     flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
-    return 3 if failed or flawed else 0
+    return FLAWED if failed or flawed else DONE
 
 
 def _power(options: argparse.Namespace, console: Console) -> int:
     """Print the power of designs of so many subjects and surfaces."""
     if options.folder is not None or options.synthetic is not None:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
-    if not 20 <= options.studies <= 100_000 or not 0 <= options.seed <= LARGEST_SEED:
-        raise WrongValue(f"--studies is 20 to 100000, and --seed 0 to {LARGEST_SEED}")
     planted = _set(options.power)
     found = power(
         planted,
@@ -137,23 +152,19 @@ def _power(options: argparse.Namespace, console: Console) -> int:
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
         f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
     )
-    return 0
+    return DONE
 
 
-def _set(given: Sequence[str]) -> Planted:
+def _set(texts: Sequence[str]) -> Planted:
     """Return what is planted, with the values that were set. Raises WrongValue."""
-    changes: dict[str, float] = {}
-    for one in given:
-        name, _, value = one.partition("=")
-        try:
-            changes[name] = float(value)
-        except ValueError:
-            raise WrongValue(f"--power {one} is not allowed: NAME=VALUE, such as effect=20") from None
-        if name not in (field.name for field in fields(Planted)):
-            raise WrongValue(f"--power {one} is not allowed: one of {', '.join(f.name for f in fields(Planted))}")
+    names = [field.name for field in fields(Planted)]
+    changes = numbers_by_key(texts, "--power", "effect=20")
+    for name, value in changes.items():
+        if name not in names:
+            raise WrongValue(f"--power {name}={value:g} is not allowed: one of {', '.join(names)}")
         least = -100.0 if name == "effect" else 0.0
-        if not least <= changes[name] <= 100.0:
-            raise WrongValue(f"--power {one} is not allowed: {least:g} to 100")
+        if not least <= value <= 100.0:
+            raise WrongValue(f"--power {name}={value:g} is not allowed: {least:g} to 100")
     return Planted(**changes)
 
 
@@ -173,14 +184,8 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
     """Return where the sessions lie and where the result goes; makes the synthetic study where one is asked for."""
     if (options.folder is None) == (options.synthetic is None):
         raise WrongValue("give a FOLDER of sessions, or --synthetic SEED, and not both")
-    if options.workers is not None and options.workers < 1:
-        raise WrongValue(f"--workers {options.workers} is not allowed: 1 or more")
-    if options.scheduler is not None and re.fullmatch(r"[a-z]+://[^/\s]+:\d+", options.scheduler) is None:
-        raise WrongValue(f"--scheduler {options.scheduler} is not allowed: scheme, host and port, as tcp://host:8786")
     if options.synthetic is None:
         return options.folder, options.out or options.folder / "pooled"
-    if not 0 <= options.synthetic <= LARGEST_SEED:
-        raise WrongValue(f"--synthetic {options.synthetic} is not allowed: a whole number from 0 to {LARGEST_SEED}")
     from daq_app.simulation.synthetic import synthetic_study  # simulators are loaded only where they are asked for
 
     folder = options.out or Path("synthetic-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
@@ -211,15 +216,11 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
     from sessions.report.study_prose import excluded, remarks, summary
 
-    if study.simulated:
-        console.say(study.simulated)
-    for sentence in (*summary(study), *excluded(study), *remarks(study)):
-        console.say(sentence)
+    console.say(study.simulated or None, *summary(study), *excluded(study), *remarks(study))
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(
             f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, found {one.found:.3g} "
             f"({one.low:.3g} to {one.high:.3g}): {inside}"
         )
-    for what, path in files.items():
-        console.say(f"{what:8}  {path}")
+    console.say(*(f"{what:8}  {path}" for what, path in files.items()))

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from daq_app.console import Console, WrongValue
+from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject_texts import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
 from sessions.atomic_file import write_whole
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
             raise RecordingError(f"{options.out} cannot be written ({error.strerror})") from error
     console.result({"language": options.language, "missing": missing, "out": options.out and str(options.out)})
     console.note(f"{missing} texts are yet to be translated" if missing else "every text is translated")
-    return 0
+    return DONE
 
 
 def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from daq_app.cli.main import DONE, FLAWED
-from daq_app.console import Console
+from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.blinding import Key
 from sessions.plan.study import StudyError, check_code
 from sessions.plan.study_file import is_study, note, open_study, study_key
@@ -53,9 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         store_derived(recording.folder, UNBLINDING, told)
     names = [recording.folder.name for recording in chosen]
     console.result({"study": str(folder), "sessions": names, "left_out": refused, "by": options.by, "utc": utc})
-    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}")
-    for sentence in refused:
-        console.say(sentence)
+    console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refused)
     if not whole:
         console.say("labels are the same throughout the study: whoever saw this session's stimuli knows them all")
     return FLAWED if refused else DONE

@@ -1,8 +1,8 @@
 """What is a subject's own, as the command line states it: finger, contact angle, depths."""
 
 import argparse
-import math
 
+from daq_app.cli.options import numbers_by_key
 from daq_app.console import WrongValue
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
@@ -16,7 +16,7 @@ def add_body_arguments(parser: argparse.ArgumentParser) -> None:
         "--finger",
         nargs="+",
         default=[],
-        metavar="KEY=VALUE",
+        metavar="NAME=VALUE",
         help="as measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]",
     )
     parser.add_argument(
@@ -26,14 +26,14 @@ def add_body_arguments(parser: argparse.ArgumentParser) -> None:
 
 def body_of(options: argparse.Namespace) -> Body:
     """Return what the options state. Raises WrongValue."""
-    finger = _numbers(options.finger, "--finger")
+    finger = numbers_by_key(options.finger, "--finger", "tip_radius=6.5")
     for key in finger:
         if key not in FINGER:
             raise WrongValue(f"--finger {key} is not known; allowed here: {', '.join(FINGER)}")
     return Body(
         Finger(finger.get("tip_radius"), finger.get("width")),
         finger.get("contact_angle"),
-        _numbers(options.depth, "--depth"),
+        numbers_by_key(options.depth, "--depth", "stickiness=1.9"),
     )
 
 
@@ -49,19 +49,3 @@ def own_sentence(plan: SessionPlan) -> str | None:
     own = [block for block in plan.blocks if block.indentation_origin == "measured"]
     parts += [f"depth of {block.name} {block.indentation:g} mm" for block in own]
     return f"{plan.subject}'s own: {', '.join(parts)}" if parts else None
-
-
-def _numbers(given: list[str], option: str) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for text in given:
-        key, equals, value = text.partition("=")
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not (key and equals and math.isfinite(number)):
-            raise WrongValue(f"{option} {text} is not allowed: a key, =, and a number")
-        if key in found:
-            raise WrongValue(f"{option} {key} is given twice")
-        found[key] = number
-    return found

@@ -1,15 +1,16 @@
-"""The option that says how the contact area follows the normal force."""
+"""Options of the analysis: how the contact area follows the normal force, how uncertain the calibration is."""
 
 import argparse
 
+from daq_app.cli.options import within
 from daq_app.console import WrongValue
 from sessions.strokes.contact_area import FIXED, HERTZ, PLANNED_AT, AreaLaw
 
 AS_BEFORE = "as the session was analysed before, or else fixed"
 
 
-def add_area(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
-    """Declare --area and --area-force; `otherwise` says what holds without."""
+def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
+    """Declare --area, --area-force and --calibration-error; `otherwise` says which area holds without."""
     parser.add_argument(
         "--area",
         metavar="LAW",
@@ -18,23 +19,32 @@ def add_area(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> Non
     )
     parser.add_argument(
         "--area-force",
-        type=float,
+        type=within("--area-force", float, 0.01, 100.0, "0.01 to 100 (N)"),
         metavar="NEWTON",
         help=f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)",
+    )
+    add_calibration(parser)
+
+
+def add_calibration(parser: argparse.ArgumentParser) -> None:
+    """Declare --calibration-error."""
+    parser.add_argument(
+        "--calibration-error",
+        type=within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)"),
+        metavar="PERCENT",
+        help="standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)",
     )
 
 
 def area_law(options: argparse.Namespace) -> AreaLaw | None:
-    """Return the law asked for, None where none was. Raises WrongValue."""
+    """Return the law that the options state, None where they state none. Raises WrongValue."""
     if options.area is None and options.area_force is None:
         return None
-    force = PLANNED_AT if options.area_force is None else options.area_force
-    if not 0.01 <= force <= 100.0:
-        raise WrongValue(f"--area-force {force:g} is not allowed: 0.01 to 100 (N)")
     if options.area in ("fixed", None):
         if options.area_force is not None:
             raise WrongValue("--area-force says nothing of a fixed area: give --area hertz or an exponent too")
         return FIXED
+    force = PLANNED_AT if options.area_force is None else options.area_force
     if options.area == "hertz":
         return AreaLaw("hertz", HERTZ, force)
     try:
@@ -44,3 +54,9 @@ def area_law(options: argparse.Namespace) -> AreaLaw | None:
     if not 0.0 <= exponent <= 1.0:
         raise WrongValue(f"--area {options.area} is not allowed: fixed, hertz, or an exponent from 0 to 1")
     return AreaLaw("power", exponent, force)
+
+
+def calibration_error(options: argparse.Namespace) -> float | None:
+    """Return the standard uncertainty of each axis' gain [-], None where it was not given."""
+    percent: float | None = options.calibration_error
+    return None if percent is None else percent / 100.0
