@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
 from solver.equilibrium.step_error import Steps
@@ -77,7 +78,9 @@ def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | No
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     pairs = [pair for edge in edges for pair in ((edge, edge + 1), (edge + 1, edge))]
-    found = newton.linearise(state, state.load, x, 0, given)
+    kept = newton.condensed.found is state.u  # the tangent of the last iteration is there still
+    linearise = newton.relinearise if kept else newton.linearise
+    found = linearise(state, state.load, x, 0, given)
     return [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
 
 
@@ -91,7 +94,7 @@ def _moved(
     states, senses = state.state.copy(), state.sense.copy()
     states[node], senses[node] = states[other], senses[other]
     begin = replace(state, state=states, sense=senses)
-    if not newton.relinearise(begin, state.load, x, 0, given):
+    if newton.solve_contact(begin, state.load, x, 0, given) == SINGULAR:
         return None
     deeper, along = newton.system.motion.tolist() if given is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)

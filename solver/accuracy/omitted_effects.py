@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.arrays import Array
+from solver.arrays import Array, Indices
 from solver.body.receptor import Patches
 from solver.constitutive.hyperelastic import HUMAN_SKIN
 from solver.equilibrium.finger import Finger
@@ -54,7 +54,7 @@ def model(
     Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
     out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
     """
-    slide = float(np.abs(displacement[finger.geometry.mesh.skin, 0]).max())
+    slide = sideways(displacement, finger.geometry.mesh.skin[state.touching])
     small = {"finite strain": _finite_strain(finger, displacement)} if isinstance(finger, LinearFinger) else {}
     modes, skin, tractions = ("pressure", "skin", "tractions") if small else ("ln J", "deformed skin", "true tractions")
     return {
@@ -75,6 +75,11 @@ def model(
             "the third dimension": _width(scene, width),
         },
     }
+
+
+def sideways(displacement: Array, touching: Indices) -> float:
+    """Return how far skin follows the surface sideways [mm]: at most, of the nodes that touch."""
+    return float(np.abs(displacement[touching, 0]).max(initial=0.0))
 
 
 def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:

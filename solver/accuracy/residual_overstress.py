@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.omitted_effects import RELAXATION, warnings
+from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
 from solver.body.tissues import relaxing_laws
 from solver.continuation.small_states import settled
 from solver.equilibrium.linear_finger import LinearFinger
@@ -100,7 +100,8 @@ def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | 
     if scene is None or not found.sed_ending > 0.0:
         return None
     direction = scene.loading.direction
-    slide = float(np.abs(found.displacement[found.mesh.skin, 0]).max()) if direction else 0.0
+    touching = found.mesh.skin[[state != "open" for state in found.skin.state]]
+    slide = sideways(found.displacement, touching) if direction else 0.0
     kind, depth = scene.solve.kinematics, scene.loading.depth
     lasting = slide / scene.loading.speed if direction else 0.0
     press, along = (np.arange(1, steps + 1) / steps for steps in STEPS[kind])

@@ -1,12 +1,13 @@
 """The endings as patches of tissue: where their responses are probed, and with which weights they are averaged."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.stiffness import Centred, Elastic, Probes, local_coordinates
+from solver.body.stiffness import Centred, Elastic, Probes
 from solver.element import GAUSS_3
 from solver.mesh.mesh import Mesh, distinct
 from solver.mesh.mesher import FingerMesh
@@ -50,7 +51,7 @@ class Patches(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: the energy forms are made when they are first needed
 class LinearPatches:
     """Endings of an elastic body at small strain."""
 
@@ -64,7 +65,32 @@ class LinearPatches:
 
     def average(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
-        return self._means(self.endings.probes.energy(self.mesh, self.elastic, displacement))
+        element, patch, form = self._energy_forms
+        local = displacement[self.mesh.elements[element]]
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
+        energy = np.einsum("mic,mic->mc", local, form @ local)
+        total = np.zeros((self.endings.count, energy.shape[1]))
+        np.add.at(total, patch, energy)
+        return (total / self.endings.areas[:, None]).reshape(-1, *displacement.shape[2:])
+
+    @cached_property
+    def _energy_forms(self) -> tuple[Indices, Indices, Array]:
+        """The parts of patches within one element (m,): element, patch, and the energy as a quadratic form (m, 18, 18).
+
+        Each form is of the displacements of the element's nodes [N/mm per mm2].
+        """
+        probes, patch = self.endings.probes, self.endings.patch
+        order = np.lexsort((probes.element, patch))
+        element, patch = probes.element[order], patch[order]
+        starts = (np.diff(element, prepend=-1) != 0) | (np.diff(patch, prepend=-1) != 0)
+        part, first = np.cumsum(starts) - 1, np.flatnonzero(starts)
+        place = np.arange(len(part)) - first[part]
+        shear, lame = self.elastic.shear[element], self.elastic.lame[element]
+        moduli = self.endings.weights[order] * [shear, shear, shear, lame / 2.0]  # W = G eps:eps + lambda/2 theta^2
+        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 4, 18))
+        roots[part, place] = probes.strain[order] * np.sqrt(moduli.T)[:, :, None]
+        roots = roots.reshape(len(first), -1, 18)
+        return element[first], patch[first], np.swapaxes(roots, 1, 2) @ roots
 
     def responses(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
@@ -127,12 +153,31 @@ def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
 
 def _probes(finger: FingerMesh, elements: Centred, arc: Array, depth: Array) -> Probes:
     """Find the elements that hold the places at `arc` and `depth` (p,) and the local coordinates in them."""
-    mesh = finger.mesh
     station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
     layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
     element = station * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
+    side, depth = _along_side(finger, arc, depth, station)
     out = (finger.depths[layer] - depth) / (finger.depths[layer] - finger.depths[layer + 1]) * 2.0 - 1.0
-    side = (arc - finger.arcs[station]) / np.diff(finger.arcs)[station] * 2.0 - 1.0
-    corners = mesh.nodes[mesh.elements[element]]
-    local = local_coordinates(corners, finger.outline.tissue(arc, depth), np.stack([out, side], axis=1))
-    return Probes.at(mesh, elements, element, local)
+    return Probes.at(finger.mesh, elements, element, np.stack([out, side], axis=1))
+
+
+def _along_side(finger: FingerMesh, arc: Array, depth: Array, station: Indices) -> tuple[Array, Array]:
+    """Return the local coordinates (p,) along the skin of places, and the depths (p,) that elements know them by.
+
+    The sides of an element run along normals of the skin, and its nodes lie at `depth` on them. Between these normals
+    it follows the skin's arc by a parabola, which lies a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m +
+    s sin a e_t at unit radius, with half its angle a, and e_m, e_t radial and tangential in its middle.
+    """
+    start, stop = finger.arcs[station], finger.arcs[station + 1]
+    here, first, last = (finger.outline.angle(place) for place in (arc, start, stop))
+    half, angle = (last - first) / 2.0, here - (first + last) / 2.0
+    sine, rise = np.sin(half), 1.0 - np.cos(half)
+    slope = np.tan(angle)
+    straight = half == 0.0
+    along = (2.0 * arc - start - stop) / (stop - start)
+    side = np.where(
+        straight, along, 2.0 * slope / np.where(straight, 1.0, sine + np.sqrt(sine**2 + 4.0 * slope**2 * rise))
+    )
+    radius = finger.outline.finger.tip_radius
+    reach = np.cos(angle) * (1.0 - side**2 * rise) + np.sin(angle) * side * sine
+    return side, np.where(straight, depth, radius - (radius - depth) / reach)

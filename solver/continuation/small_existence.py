@@ -14,15 +14,13 @@ from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.scene.scene import Scene
 
 
-def direct(scene: Scene, finger: LinearFinger, times: float = 1.0, *, widest: bool) -> EquilibriumState | None:
-    """Return the settled state; None where contact must be looked for on more of the skin than this, not the `widest`.
+def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
+    """Return the settled state; where it depends on its way, after so many `times` the usual load steps.
 
-    Where it depends on its way, that takes so many `times` the usual load steps. Near a limit, or beyond it, guesses
-    can end in states that no sliding leads to. Where none was found, or one that is folded, only what is reached by
-    following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    Near a limit, or beyond it, guesses can end in states that no sliding leads to. Where none was found, or one that is
+    folded, only what is reached by following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
-    state: EquilibriumState | None = None
     try:
         state = settled(scene, finger, times)
         on_way = direction == 0 or bool((state.state == STICK).any())
@@ -31,8 +29,6 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0, *, widest: bo
         why = "the state found is folded"
     except ContactLost as lost:
         why = str(lost)
-    if not widest:
-        return None
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:

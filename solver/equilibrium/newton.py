@@ -180,7 +180,7 @@ class Newton:
         self.skin_x = condensed.place(self._rest)[:, 0].copy()
         zero = np.zeros(skin, np.int32)
         self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
-        self._solve_contact = bind_arguments(kernels.solve_active_set, self.system)
+        self._active_set = bind_arguments(kernels.solve_active_set, self.system)
         self._meet = bind_arguments(kernels.meet, self.skin, self.system.length)
 
     def linearise(
@@ -194,7 +194,7 @@ class Newton:
         self.systems += 1
         if not self.condensed.linearise(shape.u, shape.pressure):
             return False
-        return self._touch(shape, load, anchor, rounds, given) != SINGULAR
+        return self.solve_contact(shape, load, anchor, rounds, given) != SINGULAR
 
     def relinearise(
         self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None = None
@@ -202,9 +202,11 @@ class Newton:
         """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
         if not self.condensed.relinearise(shape.u):
             return False
-        return self._touch(shape, load, anchor, rounds, given) != SINGULAR
+        return self.solve_contact(shape, load, anchor, rounds, given) != SINGULAR
 
-    def _touch(self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None) -> int:
+    def solve_contact(
+        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None = None
+    ) -> int:
         """Solve the contact of the linearised body at `shape`; return what `solve_active_set` does."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = shape.state, shape.sense
@@ -212,7 +214,7 @@ class Newton:
         if given is not None:
             kind = PUSH_GIVEN if given.tangential is None else DRAG_GIVEN
             drag, push = given.tangential or 0.0, given.normal
-        return self._solve_contact(
+        return self._active_set(
             self.arrays(), self.skin, self._states, load_arguments(load), self._position(shape.u, load, anchor),
             ForceControl(kind, float(drag), float(push), np.inf if body.constant else STRIDE), rounds,
         )  # fmt: skip
@@ -329,7 +331,7 @@ class Newton:
         self.systems += 1
         self.condensed.relinearise(self._rest)  # from which all is one step
         rounds = PATIENCE + 4 * len(self.skin_x) if rounds is None else rounds
-        used = self._touch(replace(shape, u=self._rest), load, anchor, rounds, given)
+        used = self.solve_contact(replace(shape, u=self._rest), load, anchor, rounds, given)
         if used == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
         if used == UNSETTLED:

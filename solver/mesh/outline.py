@@ -43,9 +43,13 @@ class Outline:
         """Arc position of the proximal end of the nail plate, which begins where the tip's arc ends [mm]."""
         return self.dorsal + self.finger.nail_length
 
+    def angle(self, arc: Array) -> Array:
+        """Return the angle on the tip's arc [rad]; on a straight edge, that of its end."""
+        return np.asarray(self.touch + np.clip(arc, self.palmar, self.dorsal) / self.finger.tip_radius)
+
     def _course(self, arc: Array) -> tuple[Array, Array]:
         """Return the angle on the tip's arc [rad], and the distance back along a straight edge [mm], 0 on the arc."""
-        angle = self.touch + np.clip(arc, self.palmar, self.dorsal) / self.finger.tip_radius
+        angle = self.angle(arc)
         back = np.maximum(self.palmar - arc, 0.0) + np.maximum(arc - self.dorsal, 0.0)
         return angle, back
 
@@ -67,7 +71,7 @@ class Outline:
         array([[ 1.    ,  0.    ],
                [ 0.7071, -0.7071]])
         """
-        angle = self._course(arc)[0]
+        angle = self.angle(arc)
         return self._turned(-np.sin(angle), np.cos(angle))
 
     def bone(self, arc: Array, part: Array | float = 1.0) -> Array:

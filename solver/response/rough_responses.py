@@ -5,6 +5,7 @@ what it is used for.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import groupby
 
 import numpy as np
@@ -41,27 +42,20 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
         return _finite(scenes, np.asarray(arcs, np.float64))
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
     depth = max(expected_depth(scene) for scene in scenes)
-    pending = list(range(len(scenes)))
-    for margin in (1.0, WIDE):
-        try:
-            finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=margin))
-        except (MeshError, LinAlgError) as bad:
-            key, value = "finger.tip_radius", first.finger.tip_radius
-            raise SceneError(key, value, f"no mesh fits this finger ({bad})") from bad
-        states: dict[int, EquilibriumState] = {}
-        for number in pending:
-            try:
-                state = direct(scenes[number], finger, widest=margin == WIDE)
-            except SolveFailure:
-                continue
-            if state is not None and not finger.reaches_out(state, finger.displacement(state), state.load.depth):
+    try:
+        finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=WIDE))
+    except (MeshError, LinAlgError) as bad:
+        key, value = "finger.tip_radius", first.finger.tip_radius
+        raise SceneError(key, value, f"no mesh fits this finger ({bad})") from bad
+    states: dict[int, EquilibriumState] = {}
+    for number, scene in enumerate(scenes):
+        with suppress(SolveFailure):
+            state = direct(scene, finger)
+            if not finger.reaches_out(state, finger.displacement(state), state.load.depth):
                 states[number] = state
-        if states:
-            row = finger.patches(endings(finger.geometry, finger.elements, first.receptor, np.asarray(arcs)))
-            out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
-        pending = [number for number in pending if number not in states]
-        if not pending:
-            break
+    if states:
+        row = finger.patches(endings(finger.geometry, finger.elements, first.receptor, np.asarray(arcs)))
+        out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
     return out
 
 

@@ -65,7 +65,6 @@ class _Shared:
     nested: Callable[[], LinearFinger]  # made when first asked for
     setup_s: float
     count: int  # of scenes
-    widest: bool  # whether contact was looked for wherever it can be
 
 
 class Fingers:
@@ -103,13 +102,10 @@ def answers(
     """Solve all scenes on one mesh, and on its nested one for the estimate; look wider where contact reaches out."""
     fingers.begin(fineness)
     most = max(depth, min(WIDE * depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much skin on
-    sizings = [Sizing(fineness, depth, margin=margin) for margin in (1.0, 4.0, WIDE)]
-    for sizing in (*sizings, last := Sizing(fineness, most, margin=WIDE)):
+    for sizing in (Sizing(fineness, depth, margin=WIDE), last := Sizing(fineness, most, margin=WIDE)):
         try:
             mesh, took = fingers.of(sizing)
-            shared = _Shared(
-                mesh, partial(_nested, fingers, sizing), took - mesh.solve_s, len(scenes), widest=sizing.margin == WIDE
-            )
+            shared = _Shared(mesh, partial(_nested, fingers, sizing), took - mesh.solve_s, len(scenes))
             done = _on_mesh(scenes, shared, progress, watch, all_of_them=sizing is last)
         except NotConverged as failure:
             return [failure] * len(scenes)
@@ -168,19 +164,18 @@ def _meshed(scene: Scene, sizing: Sizing) -> LinearFinger:
         raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
-def _in_steps(scene: Scene, shared: _Shared) -> tuple[EquilibriumState | None, Steps | None]:
+def _in_steps(scene: Scene, mesh: LinearFinger) -> tuple[EquilibriumState, Steps | None]:
     """Return the settled state as `direct` does, and the load steps it took where it depends on its way.
 
     Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its limits.
     """
-    before = scene.earlier_slides() if scene.solve.course == "history" else ()
-    if any(direct(leg, shared.mesh, widest=shared.widest) is None for leg in before):
-        return None, None
-    contact = direct(scene, shared.mesh, widest=shared.widest)
-    if contact is None or not depends_on_way(scene, contact):
+    for leg in scene.earlier_slides() if scene.solve.course == "history" else ():
+        direct(leg, mesh)
+    contact = direct(scene, mesh)
+    if not depends_on_way(scene, contact):
         return contact, None
-    steps = steps_asked(scene, shared.mesh)
-    return (contact if steps.times == 1 else direct(scene, shared.mesh, steps.times, widest=shared.widest)), steps
+    steps = steps_asked(scene, mesh)
+    return (contact if steps.times == 1 else direct(scene, mesh, steps.times)), steps
 
 
 def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[Solved, Way | None] | None:
@@ -190,13 +185,11 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
     """
     finger = shared.mesh
     begun = perf_counter()
-    contact, steps = _in_steps(scene, shared)
-    if contact is None:
-        return None
+    contact, steps = _in_steps(scene, finger)
     times = times_on_way(scene, lambda press: steps_asked(press, finger)) if steps is None else steps.times
     way: Way | None = None
     over_time: Array | None = None
-    direct = contact
+    settled = contact
     if scene.solve.course == "history":
         way, over_time = marched(scene, finger, progress, times)
         contact = way[-1].state if over_time is None else finger.newton.relaxed(way[-1].state)
@@ -217,7 +210,7 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
     if way is not None:
         checks |= course_audits(finger.newton, [instant.state for instant in way], relaxing=relaxed)
         if over_time is None or not (contact.state == STICK).any():  # stuck and relaxing, the end depends on the way
-            checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(direct)) / sed - 1.0)
+            checks["course_against_direct"] = abs(finger.sed_ending(finger.displacement(settled)) / sed - 1.0)
     warnings = tuple(filter(None, [inside_out(checks), YIELDS if gives_way(scene, finger, contact) else ""]))
     course = None if way is None else history(scene, finger, way, over_time)
     took = perf_counter() - begun + finger.solve_s / shared.count

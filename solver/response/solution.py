@@ -59,11 +59,10 @@ def solve_many(
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene, in their order, or the failure that says why it has none.
 
-    Scenes with the same finger, materials and receptor share one mesh, fine enough for the strictest tolerance among
-    them, so that differences between them are more accurate than each of them. At finite strain those share it that are
-    pressed alike. Where a `contrast_tolerance` is asked for, it is also so fine that differences in SED between
-    surfaces pressed alike are as good as that, as estimated. Where they may be off by more than 5 % of their range, a
-    warning says by how much.
+    Scenes with the same finger, materials and receptor share meshes; those whose tolerance is missed are solved again
+    on a finer one. Where a `contrast_tolerance` is asked for, surfaces pressed alike share a mesh so fine that
+    differences in SED between them are as good as that, as estimated. Where they may be off by more than 5 % of their
+    range, a warning says by how much.
 
     At small strain `watch` is given each answer, by the position of its scene, as soon as it is found, with the finger
     and the way that led to it; where another mesh is needed it is given once more. `rough` is given the answers that a
@@ -218,11 +217,11 @@ def _refined(
         for answer in found.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-        again = {i for together, miss in zip(surfaces, contrasts, strict=True) if miss > 1.0 for i in together}
-        again |= {i for i, miss in enumerate(missed) if miss > 1.0}
-        if kind == "finite":
-            pressed = {scenes[i].pressed for i in again}
-            todo = [i for i in todo if scenes[i].pressed in pressed]
+        again = {i for i, miss in enumerate(missed) if miss > 1.0}
+        for together, miss in zip(surfaces, contrasts, strict=True):
+            if miss > 1.0 or (miss > 0.0 and again.intersection(together)):  # what is compared shares a mesh
+                again.update(together)
+        todo = sorted(again)
         fineness = min(fineness * min(max(SAFETY * sqrt(worst), GROWTH[0]), GROWTH[1]), FINEST[kind])
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, found, first, on_mesh)
