@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from daq_app.accuracy_page.tables import Table
+from solver.verification.marked_page import filled
 
 PAGES: Mapping[str, tuple[str, ...]] = {
     "benchmarks.md": ("targets", "estimates", "machine"),
@@ -12,20 +13,6 @@ PAGES: Mapping[str, tuple[str, ...]] = {
     "benchmarks/hard-cases-small.md": ("hard-small",),
     "benchmarks/hard-cases-finite.md": ("hard-finite",),
 }
-
-
-def filled(text: str, name: str, made: str) -> str:
-    r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
-
-    >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
-    'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
-    """
-    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
-    head, _, rest = text.partition(begin)
-    _, found, tail = rest.partition(end)
-    if not found:
-        raise ValueError(f"The page has no marks for {name}.")
-    return f"{head}{begin}\n{made}\n{end}{tail}"
 
 
 def fill(docs: Path, made: Mapping[str, Table]) -> None:

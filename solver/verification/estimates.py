@@ -12,11 +12,12 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.scene.scene import Scene, Solve
+from solver.scene.scene import Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
+from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
-from solver.verification.random_scenes import random_scene
-from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known, overkill
+from solver.verification.random_scenes import FAMILIES, random_scene
+from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known
 
 TOLERANCES = (0.01, 0.003, 0.001)
 SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
@@ -36,6 +37,8 @@ class Estimate:
     estimate: float  # relative
     error: float  # relative
     doubt: float  # of the truth, relative
+    corrected: float | None = None  # error of the value on the nested mesh, relative
+    towards: bool = False  # whether that lies on the truth's side of the value
 
     @property
     def above(self) -> bool | None:
@@ -111,9 +114,12 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
 
     def rows_of(number: int) -> Iterator[Estimate]:
         nonlocal refused
-        scene = random_scene(number, kinematics)
-        (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=TOLERANCES[0]))])
-        truth = _truth(scene)
+        scene = random_scene(list(FAMILIES)[number % len(FAMILIES)], number, kinematics)
+        (answer,) = solve_many([replace(scene, solve=replace(scene.solve, tolerance=TOLERANCES[0]))])
+        try:
+            truth = judged(fine_numbers([scene])[:, 0])
+        except SolveFailure:
+            truth = None
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1
         else:
@@ -124,22 +130,20 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 
 
-def _truth(scene: Scene) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the true numbers (3,) of a scene and their doubts (3,), relative; None where a mesh has no state."""
-    try:
-        solves, _ = overkill(scene, quick=True)(scene)
-    except SolveFailure:
-        return None
-    return judged(solves)
-
-
 def compared(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
     """Return the estimates of an answer's numbers beside their errors against `truth` (3,) of relative `doubt` (3,)."""
-    numbers = (answer.sed_ending, answer.normal_force, abs(answer.tangential_force))
+    values = np.abs((answer.sed_ending, answer.normal_force, answer.tangential_force))
     estimates = (answer.error_estimate, answer.normal_force_error, answer.tangential_force_error)
-    kinematics, title = answer.scene.solve.kinematics, answer.scene.title
-    return [
-        Estimate(kinematics, title, name, tolerance, answer.dofs, estimate, abs(value / true - 1.0), float(far))
-        for name, value, estimate, true, far in zip(NUMBERS, numbers, estimates, truth.tolist(), doubt, strict=True)
-        if estimate is not None and true > 0.0
-    ]
+    nested = None if answer.nested is None else np.abs(answer.nested.numbers)
+    rows: list[Estimate] = []
+    for place, (name, estimate, true) in enumerate(zip(NUMBERS, estimates, truth.tolist(), strict=True)):
+        if estimate is None or not true > 0.0:
+            continue
+        error = float(values[place] / true - 1.0)
+        off = None if nested is None else float(nested[place] / true - 1.0)
+        row = Estimate(
+            answer.scene.solve.kinematics, answer.scene.title, name, tolerance, answer.dofs, estimate, abs(error),
+            float(doubt[place]), off and abs(off), off is not None and error * (error - off) > 0.0,
+        )  # fmt: skip
+        rows.append(row)
+    return rows

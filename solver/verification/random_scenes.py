@@ -1,183 +1,201 @@
-"""Seeded random scenes: a family and a number draw the same scene always.
+"""Seeded random scenes: a set and a number draw the same scene always, but for its kinematics.
 
-| family | scenes |
+| set | scenes |
 | --- | --- |
-| published | depth 0.5 to 2 mm, mu 0 to 0.7, angle 30 to 75 degrees, stiffness within 30 %, bounds in half of them |
-| bounded | the same at finite strain, with mu of 0.15 at least and a bound of 0.003 to 0.012 MPa |
-| fingers | the published family on fingers with another outline, receptor and bone |
-| steep | depth 0.01 to 2 mm, mu 1.2 to 1000, a bound of 0.002 to 0.02 MPa, evenly by their logarithms |
-| stiff | epidermis and dermis 8 to 100 times as stiff as fat, or Ogden's law with an exponent of 3 to 14 |
-| point | the published family with an ending of 0.001 to 0.1 by 0.001 to 0.2 mm anywhere in the skin |
+| axis | a published surface with one number of finger, tissues, friction, loading or receptor drawn anew |
+| fingers | all lengths within 30 % of the published ones, or drawn freely (tip radius 3.5 to 8 mm) in every other |
+| extreme | tissues 1e-3 to 1e6 times as stiff as fat, layers of 2 to 60 % of the tip |
+| edge | a receptor in the epidermis beneath an edge of contact |
+| bounds | a bound of 1 to 10 kPa on the traction |
+| forces | a normal force given, and a drag in half of them |
+| courses | a slide that turns round, a press with friction, or a history of relaxing tissues |
+| stiff | skin 8 to 100 times as stiff as fat, or at finite strain Ogden's law with an exponent of 3 to 14 |
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from solver.scene.scene import Finger, Friction, Loading, Material, Materials, Receptor, Scene, SceneError, Solve
+from solver.scene.published import scenes
+from solver.scene.scene import (
+    Finger,
+    Friction,
+    Loading,
+    Material,
+    Materials,
+    Receptor,
+    Relaxation,
+    Scene,
+    SceneError,
+    Solve,
+)
 from solver.verification.methods import Kinematics
 
-CLOSE = 0.06  # of every other set of surfaces, how far the coefficients lie from the first at most
+CLOSE = 0.06  # how far the coefficients of every other set of surfaces lie from the first, at most
+Draw = np.random.Generator
 
 
-def random_scene(number: int, kinematics: Kinematics = "small") -> Scene:
-    """Return a scene of the published finger; every other one has a bound of 0.003 to 0.06 MPa on its traction."""
-    draw = np.random.default_rng([2026, number])
-    usual = Materials()
-    softer = draw.uniform(0.7, 1.3, 3).tolist()
-    tissues = (usual.epidermis, usual.dermis, usual.fat)
-    depth, mu, angle = draw.uniform(0.5, 2.0), draw.uniform(0.0, 0.7), draw.uniform(30.0, 75.0)
-    slide = _slide(draw)
-    bound = _by_logarithm(draw, 0.003, 0.06) if number % 2 else None
-    return Scene(
-        title=f"random {number}",
-        finger=Finger(contact_angle=float(angle)),
-        materials=Materials(*(Material(t.E * s, t.nu) for t, s in zip(tissues, softer, strict=True))),
-        friction=Friction(float(mu), bound),
-        loading=Loading(float(depth), slide),
-        solve=Solve(kinematics),
-    )
-
-
-def _finite_scene(number: int, *, bounded: bool) -> Scene:
-    """Return a scene at finite strain; half of them have a bound of 0.005 to 0.05 MPa, which acts in few."""
-    draw = np.random.default_rng([number, 28])
-    tissues = _tissues(draw)
-    found = Scene(
-        title=f"random {number}",
-        finger=Finger(contact_angle=draw.uniform(30.0, 75.0)),
-        materials=tissues,
-        friction=Friction(draw.uniform(0.0, 0.7), None if draw.random() < 0.5 else draw.uniform(0.005, 0.05)),
-        loading=Loading(draw.uniform(0.5, 2.0), _slide(draw), 20.0),
-        solve=Solve("finite"),
-    )
-    bound = _by_logarithm(draw, 0.003, 0.012)
-    return replace(found, friction=Friction(max(found.friction.mu, 0.15), bound)) if bounded else found
-
-
-def _published(number: int, kinematics: Kinematics) -> Scene:
-    return random_scene(number) if kinematics == "small" else _finite_scene(number, bounded=False)
-
-
-def _fingers(number: int, kinematics: Kinematics) -> Scene:
-    """Return a scene on another finger: lengths within 30 % of the published ones, or drawn freely in every other pair.
-
-    Freely means tip radius 3.5 to 8 mm, epidermis 0.3 to 1.2, dermis 0.5 to 1.8 and bone radius 0.8 to 2. Indentation
-    and bone grow with the tip. Outlines that are none are drawn again.
-    """
-    scene = _published(number, kinematics)
-    draw = np.random.default_rng([2027, number])
-    usual = Finger()
+def random_scene(family: str, number: int, kinematics: Kinematics) -> Scene:
+    """Return a scene of one of the `FAMILIES`."""
+    draw = np.random.default_rng([number, *family.encode()])
     while True:
-        part = draw.uniform(0.7, 1.3, 7)
-        names = ("tip_radius", "epidermis", "dermis", "shaft_length", "bone_radius")
-        lengths = {name: float(getattr(usual, name) * p) for name, p in zip(names, part, strict=False)}
-        if number % 4 > 1:
-            wide = {"tip_radius": (3.5, 8.0), "epidermis": (0.3, 1.2), "dermis": (0.5, 1.8), "bone_radius": (0.8, 2.0)}
-            lengths |= {name: float(draw.uniform(*ends)) for name, ends in wide.items()}
-        growth = lengths["tip_radius"] / usual.tip_radius
-        x, y = usual.bone_centre
-        centre = (float(x * part[5]) * growth, float(y * part[6]) * growth)
-        skin = lengths["epidermis"] + lengths["dermis"]
         try:
-            return replace(
-                scene,
-                finger=replace(usual, contact_angle=scene.finger.contact_angle, bone_centre=centre, **lengths),
-                receptor=Receptor(float(draw.uniform(0.5, 0.9)) * skin, (0.1 * skin, float(draw.uniform(0.5, 2.0)))),
-                loading=replace(scene.loading, indentation=scene.loading.depth * growth),
-            )
-        except SceneError:
+            drawn = FAMILIES[family](draw, number, kinematics)
+        except SceneError:  # of an outline that is none, or without room for the receptor
             continue
+        return replace(drawn, title=f"{family} {number}", solve=replace(drawn.solve, kinematics=kinematics))
 
 
-def _steep(number: int, kinematics: Kinematics) -> Scene:
-    draw = np.random.default_rng([number, 99])
-    depth, mu, bound = (_by_logarithm(draw, *ends) for ends in ((0.01, 2.0), (1.2, 1e3), (2e-3, 2e-2)))
+def _common(draw: Draw, most: float = 0.7) -> Scene:
+    """Return the published finger with drawn angle, stiffnesses and load; half of them have a bound."""
+    bound = None if draw.random() < 0.5 else _by_logarithm(draw, 0.003, 0.06)
     return Scene(
-        title=f"random {number}",
-        friction=Friction(mu, bound),
-        loading=Loading(depth, _slide(draw)),
-        solve=Solve(kinematics),
+        finger=Finger(contact_angle=draw.uniform(30.0, 75.0)),
+        materials=_tissues(draw),
+        friction=Friction(draw.uniform(0.02, most), bound),
+        loading=Loading(draw.uniform(0.5, 2.0), _slide(draw)),
     )
 
 
-def _stiff(number: int, kinematics: Kinematics) -> Scene:
-    draw = np.random.default_rng([number, 98])
-    usual = Materials()
+def _axis(draw: Draw, number: int, _: Kinematics) -> Scene:
+    base = scenes()[number % 10]
+    finger, tissues, rubs, loads = base.finger, base.materials, base.friction, base.loading
+
+    def with_tissue(name: str) -> Materials:
+        tissue = tissues.of(name)
+        other = Material(tissue.E * _by_logarithm(draw, 0.4, 2.5), draw.uniform(0.3, 0.499))
+        return replace(tissues, **{name: other})
+
+    changes: Sequence[Callable[[], dict[str, object]]] = (
+        lambda: {"loading": replace(loads, indentation=draw.uniform(0.2, 2.2))},
+        lambda: {"friction": replace(rubs, mu=draw.uniform(0.0, 0.7))},
+        lambda: {"friction": replace(rubs, tau_max=_by_logarithm(draw, 1e-3, 0.1))},
+        lambda: {"finger": replace(finger, contact_angle=draw.uniform(25.0, 80.0))},
+        lambda: {"materials": with_tissue("epidermis")},
+        lambda: {"materials": with_tissue("dermis")},
+        lambda: {"materials": with_tissue("fat")},
+        lambda: {"receptor": Receptor(draw.uniform(0.3, 1.85))},
+        lambda: {"receptor": Receptor(ending=(draw.uniform(0.05, 0.2), draw.uniform(0.2, 3.0)))},
+        lambda: {"finger": replace(finger, tip_radius=draw.uniform(4.5, 8.0))},
+        lambda: {"finger": replace(finger, epidermis=draw.uniform(0.4, 1.0)), "receptor": Receptor(1.4)},
+        lambda: {"finger": replace(finger, shaft_length=draw.uniform(8.0, 25.0))},
+        lambda: {"finger": replace(finger, bone_radius=draw.uniform(0.8, 2.0))},
+    )
+    return replace(base, **changes[int(draw.integers(len(changes)))]())
+
+
+def _fingers(draw: Draw, number: int, _: Kinematics) -> Scene:
+    scene, usual = _common(draw), Finger()
+    part = draw.uniform(0.7, 1.3, 7)
+    names = ("tip_radius", "epidermis", "dermis", "shaft_length", "bone_radius")
+    lengths = {name: float(getattr(usual, name) * p) for name, p in zip(names, part, strict=False)}
     if number % 2:
+        wide = {"tip_radius": (3.5, 8.0), "epidermis": (0.3, 1.2), "dermis": (0.5, 1.8), "bone_radius": (0.8, 2.0)}
+        lengths |= {name: float(draw.uniform(*ends)) for name, ends in wide.items()}
+    growth = lengths["tip_radius"] / usual.tip_radius
+    x, y = usual.bone_centre
+    centre = (float(x * part[5]) * growth, float(y * part[6]) * growth)
+    skin = lengths["epidermis"] + lengths["dermis"]
+    return replace(
+        scene,
+        finger=replace(scene.finger, bone_centre=centre, **lengths),
+        receptor=Receptor(draw.uniform(0.5, 0.9) * skin, (0.1 * skin, draw.uniform(0.5, 2.0))),
+        loading=replace(scene.loading, indentation=scene.loading.depth * growth),
+    )
+
+
+def _extreme(draw: Draw, _: int, __: Kinematics) -> Scene:
+    epidermis, dermis = (_by_logarithm(draw, 0.02, 0.6) * 5.0 for _ in range(2))
+    bone, angle = draw.uniform(0.3, 1.5), draw.uniform(30.0, 75.0)
+    finger = Finger(5.0, epidermis, dermis, bone_radius=bone, bone_centre=(-1.0, 0.0), contact_angle=angle)
+    fat, skin = Materials().fat, epidermis + dermis
+    stiff = [Material(fat.E * _by_logarithm(draw, 1e-3, 1e6), 0.48) for _ in range(2)]
+    return Scene(
+        finger=finger,
+        materials=Materials(stiff[0], stiff[1], fat),
+        friction=Friction(draw.uniform(0.0, 0.6)),
+        loading=Loading(draw.uniform(0.03, 0.3) * finger.pulp_thickness(), _slide(draw)),
+        receptor=Receptor(draw.uniform(0.1, 0.9) * skin, (0.05 * skin, draw.uniform(0.3, 1.5))),
+    )
+
+
+def _edge(draw: Draw, _: int, __: Kinematics) -> Scene:
+    scene = _common(draw)
+    along = _by_logarithm(draw, 0.3, 3.0)
+    touched = draw.uniform(0.5, 2.0) * (along / 2.0) ** 2 / (2.0 * scene.finger.tip_radius)  # ends near the ending's
+    receptor = Receptor(draw.uniform(0.1, 0.7), (0.05, along))
+    return replace(scene, receptor=receptor, loading=replace(scene.loading, indentation=touched))
+
+
+def _bounds(draw: Draw, _: int, __: Kinematics) -> Scene:
+    return replace(_common(draw), friction=Friction(draw.uniform(0.15, 0.8), _by_logarithm(draw, 1e-3, 1e-2)))
+
+
+def _forces(draw: Draw, number: int, _: Kinematics) -> Scene:
+    scene = _common(draw, 0.6)
+    force = _by_logarithm(draw, 0.01, 0.15)
+    friction = Friction(scene.friction.mu)
+    drag = draw.uniform(0.2, 0.9) * friction.mu * force if number % 2 else None
+    loading = Loading(slide=scene.loading.slide, normal_force=force, tangential_force=drag)
+    return replace(scene, friction=friction, loading=loading)
+
+
+def _courses(draw: Draw, number: int, _: Kinematics) -> Scene:
+    scene = _common(draw, 0.6)
+    loading = replace(scene.loading, slide=(("+x", "-x"), "none", scene.loading.slide)[number % 3])
+    scene = replace(scene, loading=loading)
+    if number % 3 < 2:
+        return scene
+    prony = (Relaxation(draw.uniform(0.1, 0.5), _by_logarithm(draw, 0.03, 3.0)),)
+    mine = scene.materials
+    tissues = Materials(*(replace(one, prony=prony) for one in (mine.epidermis, mine.dermis, mine.fat)))
+    return replace(scene, materials=tissues, solve=Solve(course="history"))
+
+
+def _stiff(draw: Draw, number: int, kinematics: Kinematics) -> Scene:
+    usual = Materials()
+    if number % 2 or kinematics == "small":
         skin = [Material(usual.fat.E * _by_logarithm(draw, 8.0, 100.0), 0.48) for _ in range(2)]
     else:
-        exponent = float(draw.uniform(3.0, 14.0))
+        exponent = draw.uniform(3.0, 14.0)
         skin = [replace(one, law="ogden", stiffening=exponent) for one in (usual.epidermis, usual.dermis)]
-    return Scene(
-        title=f"random {number}",
-        finger=Finger(contact_angle=float(draw.uniform(30.0, 75.0))),
-        materials=replace(usual, epidermis=skin[0], dermis=skin[1]),
-        friction=Friction(float(draw.uniform(0.1, 0.5))),
-        loading=Loading(float(draw.uniform(1.0, 2.0)), _slide(draw)),
-        solve=Solve(kinematics),
-    )
+    scene = replace(_common(draw, 0.5), solve=Solve(kinematics), materials=Materials(skin[0], skin[1], usual.fat))
+    return replace(scene, friction=Friction(scene.friction.mu))
 
 
-def _point(number: int, kinematics: Kinematics) -> Scene:
-    draw = np.random.default_rng([number, 97])
-    usual = random_scene(number, kinematics)
-    across, along = (_by_logarithm(draw, *ends) for ends in ((1e-3, 0.1), (1e-3, 0.2)))
-    skin = usual.finger.epidermis + usual.finger.dermis
-    depth = float(draw.uniform(0.6 * across, skin - 0.6 * across))
-    friction = usual.friction if kinematics == "small" else replace(usual.friction, mu=usual.friction.mu / 2.0)
-    return replace(usual, receptor=Receptor(depth, (across, along)), friction=friction)
-
-
-FAMILIES: Mapping[str, Callable[[int, Kinematics], Scene]] = {
-    "published": _published,
-    "bounded": lambda number, _: _finite_scene(number, bounded=True),
-    "fingers": _fingers,
-    "steep": _steep,
-    "stiff": _stiff,
-    "point": _point,
+FAMILIES: Mapping[str, Callable[[Draw, int, Kinematics], Scene]] = {
+    draw.__name__[1:]: draw for draw in (_axis, _fingers, _extreme, _edge, _bounds, _forces, _courses, _stiff)
 }
-HARD = ("bounded", "steep", "stiff", "point")  # where a plain mesh is not good enough for a truth
 
 
 def surface_set(number: int, kinematics: Kinematics) -> list[Scene]:
     """Return three surfaces on one finger, at one indentation and in one direction.
 
-    Their mu is 0.05 to 0.7 (finite strain: 0.6), in every other set within 0.06 of the first. Each has even odds of a
-    bound of 0.004 to 0.05 MPa.
+    Their mu is 0.05 to 0.6, in every other set within 0.06 of the first. Each has even odds of a bound of 0.004 to
+    0.05 MPa.
     """
-    draw = np.random.default_rng([number, 71 if kinematics == "small" else 72])
-    tissues = _tissues(draw)
-    most = 0.7 if kinematics == "small" else 0.6
-    first = draw.uniform(0.05, most)
-    if number % 2:
-        mus = [first, *(min(max(first + draw.uniform(-CLOSE, CLOSE), 0.02), most) for _ in range(2))]
-    else:
-        mus = [draw.uniform(0.05, most) for _ in range(3)]
-    bounds = [None if draw.random() < 0.5 else _by_logarithm(draw, 0.004, 0.05) for _ in range(3)]
-    base = Scene(
-        finger=Finger(contact_angle=draw.uniform(30.0, 75.0)),
-        materials=tissues,
-        loading=Loading(draw.uniform(0.5, 2.0), _slide(draw)),
-        friction=Friction(0.0),
-        solve=Solve(kinematics),
-    )
-    return [replace(base, friction=Friction(float(mu), bound)) for mu, bound in zip(mus, bounds, strict=True)]
+    draw = np.random.default_rng([number, 71])
+    base = replace(_common(draw), title=f"surfaces {number}", solve=Solve(kinematics))
+    first = draw.uniform(0.05, 0.6)
+    near = (max(first - CLOSE, 0.02), first + CLOSE) if number % 2 else (0.05, 0.6)
+    mus = [first, *draw.uniform(*near, 2).tolist()]
+    bounds = [None if draw.random() < 0.5 else _by_logarithm(draw, 0.004, 0.05) for _ in mus]
+    return [replace(base, friction=Friction(mu, bound)) for mu, bound in zip(mus, bounds, strict=True)]
 
 
-def _tissues(draw: np.random.Generator) -> Materials:
+def _tissues(draw: Draw) -> Materials:
     usual = Materials()
     return Materials(
         *(Material(t.E * draw.uniform(0.7, 1.3), 0.48) for t in (usual.epidermis, usual.dermis, usual.fat))
     )
 
 
-def _by_logarithm(draw: np.random.Generator, low: float, high: float) -> float:
+def _by_logarithm(draw: Draw, low: float, high: float) -> float:
     return math.exp(draw.uniform(math.log(low), math.log(high)))
 
 
-def _slide(draw: np.random.Generator) -> Literal["+x", "-x"]:
+def _slide(draw: Draw) -> Literal["+x", "-x"]:
     return "+x" if draw.random() < 0.5 else "-x"

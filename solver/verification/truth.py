@@ -6,7 +6,7 @@ shipped and nothing comes from elsewhere, so the truth is never older than the s
 sliding the solver's refusal stands instead.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from solver.response.solution import solve_many
 from solver.scene.published import scenes
 from solver.scene.scene import Scene, Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock
-from solver.verification.methods import MESHED, Kinematics
+from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
 
 KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
@@ -29,7 +29,6 @@ SHIFTED_QUICK = {
     "small": ((18.0, False), (18.0, True), (16.0, False)),
     "finite": ((13.0, False), (13.0, True), (11.0, False)),
 }
-Solves = Callable[[Scene], tuple[np.ndarray, tuple[int, ...]]]  # numbers (3 meshes, 3), and unknowns of the meshes
 # "slip 0-100 and stick 0": what speeds are asked at
 JUDGED = ("slipperiness 0", "slipperiness 20", "slipperiness 55", "slipperiness 75", "slipperiness 100", "stickiness 0")
 
@@ -60,17 +59,6 @@ def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
         yield from _truths(asked, kinematics, chosen)
 
 
-def overkill(deepest: Scene, *, quick: bool) -> Solves:
-    """Return what solves scenes of one finger, none deeper than `deepest`, on the three meshes of a truth."""
-    kind = deepest.solve.kinematics
-    meshes = [MESHED[kind](deepest, *mesh) for mesh in (SHIFTED_QUICK if quick else SHIFTED)[kind]]
-
-    def solves(scene: Scene) -> tuple[np.ndarray, tuple[int, ...]]:
-        return np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes]), tuple(mesh.dofs for mesh in meshes)
-
-    return solves
-
-
 def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and doubt (3,) of the numbers found on three meshes (3, 3)."""
     mean = solves.mean(axis=0)
@@ -81,7 +69,8 @@ def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterat
     refused, todo = _sorted_out(kinematics, chosen)
     yield from refused
     begun = clock()
-    solves = overkill(max(chosen, key=lambda scene: scene.loading.depth), quick=asked.quick)
+    deepest = max(chosen, key=lambda scene: scene.loading.depth)
+    meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if asked.quick else SHIFTED)[kinematics]]
     shared = (clock() - begun) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
         if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
@@ -89,17 +78,17 @@ def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterat
                 f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
             )
             return
-        yield _truth(kinematics, scene, solves, shared)
+        yield _truth(scene, meshes, shared)
 
 
-def _truth(kinematics: Kinematics, scene: Scene, overkill: Solves, shared: float) -> Truth:
-    begun = clock()
+def _truth(scene: Scene, meshes: Sequence[SmallMeshed | FiniteMeshed], shared: float) -> Truth:
+    begun, kinematics = clock(), scene.solve.kinematics
     try:
-        solves, dofs = overkill(scene)
+        solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
     except SolveFailure as failure:
         return Truth(kinematics, scene.title, (), (), (), clock() - begun, f"On an overkill mesh: {failure}")
     mean, doubt = judged(solves)
-    took = clock() - begun + shared
+    took, dofs = clock() - begun + shared, tuple(mesh.dofs for mesh in meshes)
     return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, took, "")
 
 

@@ -212,9 +212,9 @@ def test_a_cell_of_the_docs_ends_in_an_ellipsis_where_it_has_more_than_25_words(
 
 
 def test_random_scenes_are_the_same_every_time_and_differ_from_each_other():
-    assert random_scene(3) == random_scene(3)
-    assert random_scene(3) != random_scene(5)
-    assert random_scene(3, "finite").loading == random_scene(3).loading
+    assert random_scene("axis", 3, "small") == random_scene("axis", 3, "small")
+    assert random_scene("axis", 3, "small") != random_scene("axis", 5, "small")
+    assert random_scene("axis", 3, "finite").loading == random_scene("axis", 3, "small").loading
 
 
 def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():

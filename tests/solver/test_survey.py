@@ -9,22 +9,21 @@ import pytest
 from solver.failures import SolveFailure
 from solver.response.solution import solve_many
 from solver.verification.estimates import Estimate
-from solver.verification.random_scenes import FAMILIES, surface_set
-from solver.verification.survey import answers, contrasts
-from solver.verification.survey.__main__ import SURVEYS, main, rows
-from solver.verification.survey.statistics import shares
+from solver.verification.random_scenes import FAMILIES, random_scene, surface_set
+from solver.verification.survey import answers
+from solver.verification.survey.__main__ import main, rows
+from solver.verification.survey.statistics import HEADER, judgement, misses
 from solver.verification.truth import NUMBERS
 
 
-def estimate(value, error, doubt=0.0, tolerance=0.01):
-    return Estimate("small", "random 7", NUMBERS[0], tolerance, 900, value, error, doubt)
+def estimate(value, error, doubt=0.0, tolerance=0.01, **corrected):
+    return Estimate("small", "axis 7", NUMBERS[0], tolerance, 900, value, error, doubt, **corrected)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_family_draws_the_same_scene_for_the_same_number_and_another_for_another(family):
-    draw = FAMILIES[family]
-    assert draw(3, "finite") == draw(3, "finite")
-    assert draw(3, "finite") != draw(4, "finite")
+    assert random_scene(family, 3, "finite") == random_scene(family, 3, "finite")
+    assert random_scene(family, 3, "finite") != random_scene(family, 4, "finite")
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
@@ -34,48 +33,65 @@ def test_the_surfaces_of_a_set_differ_in_friction_alone(kinematics):
     assert {replace(scene, friction=one.friction) for scene in others} == {one}
 
 
-def test_an_estimate_below_the_true_error_is_counted_and_named_as_the_worst():
-    (line,) = shares([estimate(0.02, 0.01), estimate(0.001, 0.004), estimate(0.001, 0.004, doubt=0.002)])
-    assert "above 1 of 2" in line
-    assert "worst 4.00: 0.4 % estimated at 0.1 % in random 7" in line
+def cells(*rows):
+    return dict(zip(HEADER, judgement("axis", "small", rows), strict=True))
+
+
+def test_an_estimate_below_the_true_error_is_counted_and_named_and_one_in_doubt_is_not():
+    rows = [estimate(0.02, 0.01), estimate(0.001, 0.004), estimate(0.001, 0.004, doubt=0.002)]
+    assert cells(*rows)["SED above"] == "50 %"
+    assert list(misses(rows)) == ["axis 7, small strain, 1 %: SED of the ending 0.004 told 0.001"]
+
+
+def test_a_tolerance_that_is_said_to_be_met_and_is_not_counts_as_missed_unsaid():
+    assert cells(estimate(0.009, 0.02), estimate(0.009, 0.003), estimate(0.02, 0.03))["missed unsaid"] == "1 of 2"
+
+
+def test_ratio_and_rank_are_those_of_estimates_by_errors():
+    found = cells(estimate(0.02, 0.01), estimate(0.03, 0.02), estimate(0.12, 0.03))
+    assert (found["ratio"], found["rank"]) == ("2.0", "1.00")
+    assert cells(estimate(0.02, 0.01), estimate(0.03, 0.005), estimate(0.04, 0.001))["rank"] == "-1.00"
+
+
+def test_a_corrected_value_counts_by_its_side_and_by_its_error():
+    found = cells(
+        estimate(0.02, 0.01, corrected=0.002, towards=True), estimate(0.02, 0.01, corrected=0.02, towards=False)
+    )
+    assert (found["sign"], found["corrected"]) == ("50 %", "1.10")
+
+
+TRUE = np.array([1.0, 2.0, 3.0])
 
 
 def test_a_common_error_of_all_surfaces_falls_out_of_their_differences():
-    true = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 3.5], [3.0, 6.0, 4.0]])
-    assert contrasts.errors(true + 0.3, np.array([true, true, true])) == pytest.approx([0.0, 0.0, 0.0], abs=1e-15)
+    assert answers.apart(TRUE + 0.3, np.array([TRUE, TRUE, TRUE])) == pytest.approx((0.0, 0.0), abs=1e-15)
 
 
-def test_a_difference_that_is_off_is_told_by_the_range_and_not_where_the_truth_is_in_doubt():
-    true = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 3.5], [3.0, 6.0, 4.0]])
-    found, doubtful = true.copy(), true.copy()
-    found[0, 0] += 0.2
-    doubtful[0, 2] += 0.1
-    off = contrasts.errors(found, np.array([true, true, doubtful]))
-    assert off[:2] == pytest.approx([0.1, 0.0], abs=1e-15)
-    assert np.isnan(off[2])
+def test_a_difference_that_is_off_is_told_by_the_range_and_so_is_the_doubt_of_the_truth():
+    first = np.array([1.0, 0.0, 0.0])
+    doubtful = TRUE + 0.3 * first
+    error, doubt = answers.apart(TRUE + 0.2 * first, np.array([TRUE, TRUE, doubtful]))
+    assert error == pytest.approx(0.1 / 1.9, rel=1e-12)
+    assert doubt == pytest.approx(0.2 / 1.9, rel=1e-12)
 
 
 def test_a_survey_of_answers_holds_every_estimate_of_the_program_against_fine_meshes():
-    row = answers.solve("published", 0, "small")
-    (answer,) = solve_many([FAMILIES["published"](0, "small")])
+    row = answers.solve("axis", 0, "small")
+    (answer,) = solve_many([random_scene("axis", 0, "small")])
     assert not isinstance(answer, SolveFailure)
     assert row.estimates[0].estimate == answer.error_estimate
     assert len(row.estimates) == 9
     assert all(one.above for one in row.estimates)
 
 
-def test_what_a_file_keeps_is_not_solved_again(tmp_path, monkeypatch, capsys):
-    keep = tmp_path / "kept.json"
-    first = contrasts.Row("published", 0, "small", refusal="There is none.")
-    survey = replace(SURVEYS["contrasts"], solve=lambda *_: first)
-    assert list(rows(survey, [("published", 0, "small")], keep)) == [first]
-    monkeypatch.setattr(sys, "argv", ["survey", "contrasts", "--scenes", "1", "--keep", str(keep)])
+def test_what_a_file_keeps_is_not_solved_again_and_stands_in_the_page(tmp_path, monkeypatch, capsys):
+    keep, page = tmp_path / "kept.json", tmp_path / "page.md"
+    page.write_text("Before.\n<!-- judged: begin -->\n<!-- judged: end -->\nAfter.\n")
+    first = answers.Row("axis", 0, "small", (estimate(0.02, 0.01),))
+    assert list(rows([("axis", 0, "small")], keep, lambda *_: first)) == [first]
+    monkeypatch.setattr(sys, "argv", ["survey", "--scenes", "1", "--keep", str(keep), "--page", str(page)])
     main()
-    assert capsys.readouterr().out == "set 0: There is none.\n"
-
-
-def test_a_family_of_finite_strain_is_refused_at_small_strain_with_a_sentence(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["survey", "answers", "--family", "stiff"])
-    with pytest.raises(SystemExit):
-        main()
-    assert "add --kinematics finite" in capsys.readouterr().err
+    line = "| axis | small | 1 | 100 % |"
+    assert line in capsys.readouterr().out
+    assert line in page.read_text()
+    assert page.read_text().endswith("After.\n")

@@ -5,54 +5,96 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from solver.accuracy.contrasts import off
+from solver.arrays import Array
 from solver.failures import SolveFailure
+from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.verification.asked import clock
+from solver.scene.scene import Scene
 from solver.verification.estimates import Estimate, compared
+from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
-from solver.verification.random_scenes import FAMILIES, HARD
-from solver.verification.survey.fine_meshes import fine_numbers
-from solver.verification.survey.statistics import ASKED, shares, times, wanted
-from solver.verification.truth import judged
+from solver.verification.random_scenes import random_scene, surface_set
+from solver.verification.survey.statistics import ASKED, HEADER, judgement, misses
+from solver.verification.truth import NUMBERS, judged
+
+SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are judged by their range
+BY_TOLERANCE = 5.0  # tolerance of a difference by that of a number
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """What one scene gives."""
+    """What one scene, or set of surfaces, gives."""
 
     family: str
     number: int
     kinematics: Kinematics
     estimates: tuple[Estimate, ...] = ()  # of the answers; those without a tolerance have 0
-    took_s: tuple[float, ...] = ()  # by tolerance
     refusals: tuple[str, ...] = ()  # of the answers, or of the truth
 
 
 def solve(family: str, number: int, kinematics: Kinematics) -> Row:
     """Return the answers of one scene with their estimates and true errors."""
-    scene = FAMILIES[family](number, kinematics)
+    together = family == SURFACES
+    scenes = surface_set(number, kinematics) if together else [random_scene(family, number, kinematics)]
     estimates: list[Estimate] = []
-    took: list[float] = []
     refusals: list[str] = []
     try:
-        truth, doubt = judged(fine_numbers(scene, hard=family in HARD))
+        truth = fine_numbers(scenes)
     except SolveFailure as failure:
-        truth, doubt = np.zeros(3), np.zeros(3)
-        refusals.append(f"no truth: {failure}")
+        return Row(family, number, kinematics, refusals=(f"no truth: {failure}",))
     for tolerance in ASKED:
-        begun = clock()
-        (answer,) = solve_many([replace(scene, solve=replace(scene.solve, tolerance=tolerance))])
-        took.append(clock() - begun)
-        if isinstance(answer, SolveFailure):
-            refusals.append(str(answer))
-        else:
-            estimates += compared(answer, tolerance or 0.0, truth, doubt)
-    return Row(family, number, kinematics, tuple(estimates), tuple(took), tuple(dict.fromkeys(refusals)))
+        found = solve_many([_asked(scene, tolerance, together=together) for scene in scenes])
+        refusals += [str(answer) for answer in found if isinstance(answer, SolveFailure)]
+        good = [answer for answer in found if isinstance(answer, Prediction)]
+        if together and len(good) == len(scenes):
+            estimates.append(_difference(good, BY_TOLERANCE * (tolerance or 0.0), truth))
+        elif good:
+            estimates += compared(good[0], tolerance or 0.0, *judged(truth[:, 0]))
+    return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
+
+
+def _asked(scene: Scene, tolerance: float | None, *, together: bool) -> Scene:
+    solve = replace(scene.solve, evidence="estimated")
+    if together:
+        return replace(scene, solve=replace(solve, contrast_tolerance=tolerance and BY_TOLERANCE * tolerance))
+    return replace(scene, solve=replace(solve, tolerance=tolerance))
+
+
+def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) -> Estimate:
+    """Return how far differences in SED may be off, and are, by the range of the truth, `solves` (3, n, 3)."""
+    sed = np.array([answer.sed_ending for answer in answers])
+    error, doubt = apart(sed, solves[:, :, 0])
+    first = answers[0]
+    title, estimate = first.scene.title, off(answers).share
+    return Estimate(first.scene.solve.kinematics, title, NUMBERS[0], tolerance, first.dofs, estimate, error, doubt)
+
+
+def apart(numbers: Array, solves: Array) -> tuple[float, float]:
+    """Return the worst error of a difference between numbers (n,), and the truth's doubt, by the range of the truth.
+
+    `solves` (m, n) are the same on m fine meshes.
+    """
+    truth = solves.mean(axis=0)
+    span = float(np.ptp(truth))
+    return float(np.ptp(numbers - truth)) / span, float(np.ptp(solves - truth, axis=1).max()) / span
 
 
 def report(rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the refusals, and the shares of estimates by tolerance."""
-    yield from (f"scene {row.number}: {sentence}" for row in rows for sentence in row.refusals)
-    for place, tolerance in enumerate(ASKED):
-        yield f"{wanted(tolerance)}: {times([row.took_s[place] for row in rows])}"
-        yield from shares([one for row in rows for one in row.estimates if one.tolerance == (tolerance or 0.0)])
+    """Yield the refusals, the misses, and a table with a row a set and kinematics."""
+    yield from (f"{row.family} {row.number}: {sentence}" for row in rows for sentence in row.refusals)
+    yield from misses(one for row in rows for one in row.estimates)
+    yield from table(rows)
+
+
+def table(rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the lines of a Markdown table with a row a set and kinematics."""
+    yield _line(HEADER)
+    yield _line(["---"] * len(HEADER))
+    for kinematics, family in dict.fromkeys((row.kinematics, row.family) for row in rows):
+        mine = [row for row in rows if (row.kinematics, row.family) == (kinematics, family)]
+        yield _line(judgement(family, kinematics, (one for row in mine for one in row.estimates)))
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

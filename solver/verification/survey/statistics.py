@@ -1,46 +1,59 @@
-"""How many estimates are safe, and how many are near."""
+"""How many estimates are safe, how many are near, and how much the corrected value is worth."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
+
+import numpy as np
 
 from solver.verification.estimates import Estimate
 from solver.verification.truth import NUMBERS
 
 ASKED = (None, 0.01, 0.003)  # tolerances of answers
+EXACT = 1e-12  # error below which a number follows from what is given alone, and nothing is judged [-]
+HEADER = (
+    "set", "strain", "answers", "SED above", "force above", "drag above", "near", "missed unsaid", "ratio", "rank",
+    "sign", "corrected",
+)  # fmt: skip
 
 
-def wanted(tolerance: float | None) -> str:
-    """Return a tolerance as a heading."""
-    return "no tolerance" if tolerance is None else f"{100 * tolerance:g} %"
+def judgement(name: str, kinematics: str, rows: Iterable[Estimate]) -> tuple[str, ...]:
+    """Return the cells under `HEADER` of one set of scenes.
+
+    Near, ratio (estimate by error, median), rank (Spearman's, of estimate and error), sign (whether the nested value
+    lies on the truth's side) and corrected (its error by the answer's, median) are those of the SED.
+    """
+    known = [row for row in rows if row.above is not None and row.error > EXACT]
+    by_number = [[row for row in known if row.number == number] for number in NUMBERS]
+    sed = by_number[0]
+    claimed = [row for row in sed if row.met is not None and row.tolerance and row.estimate <= row.tolerance]
+    true = [row for row in sed if row.corrected is not None and row.doubt <= row.error / 3.0]
+    ratios = [row.estimate / row.error for row in sed]
+    halves = [row.corrected / row.error for row in true if row.corrected is not None]
+    return (
+        name,
+        kinematics,
+        str(len(sed)),
+        *(_share([bool(row.above) for row in mine]) for mine in by_number),
+        _share([row.near for row in sed if row.near is not None]),
+        f"{sum(not row.met for row in claimed)} of {len(claimed)}",
+        f"{median(ratios):.1f}" if ratios else "–",
+        f"{_rank_correlation([row.estimate for row in sed], [row.error for row in sed]):.2f}" if len(sed) > 2 else "–",
+        _share([bool(row.towards) for row in true]),
+        f"{median(halves):.2f}" if halves else "–",
+    )
 
 
-def times(took_s: Sequence[float]) -> str:
-    """Return what solves took, in words."""
-    return f"{median(took_s):.2f} s in the median, {max(took_s):.1f} s at most"
+def _share(verdicts: Sequence[bool]) -> str:
+    return f"{100.0 * sum(verdicts) / len(verdicts):.0f} %" if verdicts else "–"
 
 
-def shares(rows: Sequence[Estimate]) -> Iterator[str]:
-    """Yield a line a number: estimates above the true error, below ten times it, and the worst."""
-    for name in NUMBERS:
-        mine = [row for row in rows if row.number == name]
-        if not mine:
-            continue
-        parts: list[str] = []
-        for word, verdicts in (
-            ("above", [row.above for row in mine]),
-            ("near", [row.near for row in mine]),
-            ("within the tolerance", [row.met for row in mine if row.tolerance and name == NUMBERS[0]]),
-        ):
-            known = [verdict for verdict in verdicts if verdict is not None]
-            if verdicts:
-                parts.append(f"{word} {sum(known)} of {len(known)}")
-        errors = [row.error for row in mine]
-        tail = ""
-        if judged := [row for row in mine if row.above is not None]:
-            worst = max(judged, key=lambda row: row.error / row.estimate)
-            part, estimate = worst.error / worst.estimate, 100 * worst.estimate
-            tail = f"; worst {part:.2f}: {100 * worst.error:.2g} % estimated at {estimate:.2g} % in {worst.case}"
-        yield (
-            f"  {name}: {', '.join(parts)}; error {100 * median(errors):.2g} % in the median, "
-            f"{100 * max(errors):.2g} % at most{tail}"
-        )
+def _rank_correlation(one: Sequence[float], other: Sequence[float]) -> float:
+    ranks = [np.argsort(np.argsort(values)) for values in (one, other)]
+    return 1.0 - 6.0 * float(np.sum((ranks[0] - ranks[1]) ** 2)) / (len(one) * (len(one) ** 2 - 1))
+
+
+def misses(rows: Iterable[Estimate]) -> Iterator[str]:
+    """Yield a line for every number whose error lies above its estimate."""
+    for row in rows:
+        if row.above is False and row.error > EXACT:
+            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {row.number} {row.error:.2g} told {row.estimate:.2g}"

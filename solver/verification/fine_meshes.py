@@ -1,0 +1,81 @@
+"""The truth of a random scene: its numbers on three meshes far finer than an answer's, whose nodes lie elsewhere."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
+from solver.accuracy.finite_ends import end as finite_end
+from solver.accuracy.finite_ends import relaxes
+from solver.arrays import Array
+from solver.continuation import small_states
+from solver.continuation.wedging import WIDE
+from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.load_stepping import never
+from solver.failures import NotConverged, SolveFailure
+from solver.mesh.mesher import Sizing
+from solver.scene.scene import Scene
+from solver.verification.methods import Kinematics
+
+# fineness, whether moved along the skin by half an element, and times the usual load steps: the first that have a state
+MESHES: dict[tuple[Kinematics, bool], Sequence[tuple[float, bool, int]]] = {  # by whether the end depends on its way
+    ("small", False): ((26.0, False, 1), (26.0, True, 1), (23.0, False, 1), (23.0, True, 1), (29.0, False, 1)),
+    ("small", True): ((16.0, False, 12), (16.0, True, 14), (14.0, False, 16), (14.0, True, 13)),
+    ("finite", False): ((15.0, False, 1), (15.0, True, 1), (13.0, False, 1), (13.0, True, 1), (17.0, False, 1)),
+    ("finite", True): ((10.0, False, 4), (10.0, True, 5), (9.0, False, 6), (9.0, True, 4)),
+}
+ENOUGH = 3  # meshes
+
+
+def fine_numbers(scenes: Sequence[Scene]) -> Array:
+    """Return SED [MPa], normal force and drag [N/mm] (3, n, 3) of scenes of one finger on three meshes.
+
+    Raises SolveFailure where fewer have a state.
+    """
+    solves: list[Array] = []
+    for mesh in MESHES[scenes[0].solve.kinematics, any(map(depends_on_way, scenes))]:
+        with suppress(SolveFailure):
+            solves.append(numbers_on_mesh(scenes, *mesh))
+        if len(solves) == ENOUGH:
+            return np.array(solves)
+    raise NotConverged("Fewer than three fine meshes have a state.")
+
+
+def depends_on_way(scene: Scene) -> bool:
+    """Return whether the end of a scene may depend on its load steps."""
+    return scene.loading.direction == 0 or scene.loading.dragged
+
+
+def numbers_on_mesh(scenes: Sequence[Scene], fineness: float, shift: bool, times: int = 1) -> Array:
+    """Return SED [MPa], normal force and drag [N/mm] (n, 3) of surfaces on one mesh, in `times` the usual steps."""
+    on_mesh = _finite if scenes[0].solve.kinematics == "finite" else _small
+    return np.array(list(on_mesh(scenes, fineness, shift, times)))
+
+
+def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
+    depth = max(expected_depth(scene) for scene in scenes)
+    finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE))
+    for scene in scenes:
+        marched = relaxes(scene) and depends_on_way(scene)
+        state = (small_states.end if marched else small_states.settled)(scene, finger, times)
+        if finger.reaches_out(state, finger.displacement(state), state.load.depth):
+            raise NotConverged("Contact reaches out of the skin that is looked at.")
+        yield np.abs(finger.numbers([state])[0])
+
+
+def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
+    meshes, depth = Meshes(), max(expected_depth(scene) for scene in scenes)
+    for scene in scenes:
+        low = coarse_solution(scene, depth, COARSE, never, meshes)
+        sizing = replace(low.sizing, fineness=fineness, shift=shift)
+        if relaxes(scene) and depends_on_way(scene):
+            finger = meshes.finger(scene, replace(sizing, margin=WIDER))
+            yield np.abs(finger.numbers([finite_end(finger, scene, never, times)])[0])
+            continue
+        top = solution_on(scene, sizing, low, never, meshes, times)
+        if top.finger.runs_out(top.shape):
+            top = solution_on(scene, replace(sizing, margin=WIDER), low, never, meshes, times)
+        yield np.abs(top.finger.numbers([top.shape])[0])

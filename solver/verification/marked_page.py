@@ -1,0 +1,15 @@
+"""Pages of the docs with tables that are made and not typed, each between its marks."""
+
+
+def filled(text: str, name: str, made: str) -> str:
+    r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
+
+    >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
+    'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
+    """
+    begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
+    head, _, rest = text.partition(begin)
+    _, found, tail = rest.partition(end)
+    if not found:
+        raise ValueError(f"The page has no marks for {name}.")
+    return f"{head}{begin}\n{made}\n{end}{tail}"

@@ -1,0 +1,123 @@
+"""Bodies handed in as meshes: any mesh can be halved, and the change says how far its numbers are off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.accuracy.own_bodies import estimated
+from solver.body.finite import FiniteBody
+from solver.body.linear import LinearBody, edge_load
+from solver.body.stiffness import Elastic
+from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive.linear import Hooke
+from solver.equilibrium.full_slip import settled, slide_under
+from solver.equilibrium.march import march
+from solver.equilibrium.newton import FiniteNewton, Given, LoadState, Newton
+from solver.equilibrium.step_error import PARTS
+from solver.mesh.halving import HalvedMesh
+from solver.mesh.mesh import block, quality
+
+SLIDES = LoadState(0.15, 0.3, sense=-1)
+
+
+def foot(columns, rows=None):
+    """A round block of 4 x 2 mm, so many elements long."""
+    return block(np.linspace(-2.0, 2.0, columns + 1), np.linspace(0.0, 2.0, (rows or columns // 2) + 1), 8.0)
+
+
+def small(mesh):
+    return Newton(LinearBody.of(mesh, [Hooke(0.08, 0.48)]).condensed)
+
+
+def finite(mesh):
+    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+
+
+def force(_, state):
+    return state.force
+
+
+def test_a_halved_mesh_is_the_same_body_and_has_what_the_coarse_one_could_do():
+    mesh = replace(block(np.array([-2.0, -1.0, 2.0]), np.array([0.0, 0.5, 2.0])), region=np.array([0, 1, 0, 1]))
+    halved = HalvedMesh.of(mesh)
+    laws = [Hooke(0.08, 0.0), Hooke(0.3, 0.0)]  # without pressure modes, which the finer mesh has more of
+    moved = np.random.default_rng(1).normal(size=mesh.nodes.shape)
+    energies = []
+    for one, u in ((mesh, moved), (halved.mesh, halved.between(moved))):
+        local = u[one.elements].reshape(len(one.elements), 18)
+        energies.append(np.einsum("ei,eij,ej->", local, Elastic.of(one, laws).stiffness, local))
+    assert energies[1] == pytest.approx(energies[0], rel=1e-12)
+    assert quality(halved.mesh)["jacobian_ratio"] == pytest.approx(1.0)
+    assert len(halved.mesh.nodes) == 81
+    assert np.array_equal(halved.mesh.nodes[: len(mesh.nodes)], mesh.nodes)
+
+
+def test_what_is_held_rolls_and_may_touch_stays_so_on_every_new_node_between():
+    mesh = foot(6)
+    middle = np.flatnonzero(np.abs(mesh.nodes[:, 0]) < 1e-9)
+    rolls = replace(mesh, held=mesh.held[:0], held_y=mesh.held, held_x=middle)
+    halved = HalvedMesh.of(rolls)
+    driven, nodes = halved.mesh.driven, halved.mesh.nodes
+    assert np.array_equal(driven[:, 1], nodes[:, 1] == 2.0)
+    assert np.array_equal(driven[:, 0], np.abs(nodes[:, 0]) < 1e-9)
+    skin = nodes[halved.mesh.skin]
+    assert len(skin) == 2 * len(mesh.skin) - 1
+    assert np.all(np.diff(skin[:, 0]) > 0.0)
+
+
+def test_a_pressure_along_a_chain_of_edges_amounts_to_the_same_force_on_both_meshes():
+    mesh = foot(6)
+    halved = HalvedMesh.of(mesh)
+    forces = [
+        edge_load(one, chain, np.ones((len(chain), 2))).sum(axis=0)
+        for one, chain in ((mesh, mesh.skin), (halved.mesh, halved.chain(mesh.skin)))
+    ]
+    assert forces[1] == pytest.approx(forces[0], rel=1e-4)  # the length of a curved edge, by quadrature
+
+
+@pytest.mark.parametrize("made", [small, finite])
+@pytest.mark.parametrize("columns", [10, 12, 16, 20])
+def test_errors_of_the_forces_on_a_round_foot_lie_above_the_true_ones_and_below_ten_times_them(made, columns):
+    fine = [settled(made(foot(n)), SLIDES).force for n in (64, 72)]
+    mesh = foot(columns)
+    newton, nested = made(mesh), made(HalvedMesh.of(mesh).mesh)
+    found = estimated(force, newton, settled(newton, SLIDES), (nested, settled(nested, SLIDES)))
+    true = np.abs(found.value - fine[1])
+    assert np.all(np.abs(fine[1] - fine[0]) < found.error / 3.0)
+    assert np.all(true <= found.error)
+    assert np.all(found.error < 10.0 * np.maximum(true, 2e-4 * np.abs(fine[1])))
+
+
+def test_under_a_given_force_the_depth_has_an_error():
+    mesh = foot(12)
+    newton, nested = small(mesh), small(HalvedMesh.of(mesh).mesh)
+    states = [slide_under(one, LoadState(0.0, 0.3, sense=-1), 0.02) for one in (newton, nested, small(foot(72)))]
+
+    def depth(_, state):
+        return np.array([state.load.depth])
+
+    found = estimated(depth, newton, states[0], (nested, states[1]), Given(0.02, None))
+    assert abs(found.value - states[2].load.depth) <= found.error
+    assert found.error < 0.02 * found.value
+
+
+def test_a_press_with_friction_errs_by_its_load_steps_too():
+    def pressed(newton, steps):
+        *_, last = march(newton, [LoadState(0.2 * (n + 1) / steps, 0.5) for n in range(steps)])
+        return last
+
+    def drag_of_half(_, state):  # of the right half: by symmetry the whole has none
+        return np.array([state.reaction[len(state.reaction) // 2 + 1 :, 0].sum()])
+
+    mesh = foot(12)
+    newton, nested = small(mesh), small(HalvedMesh.of(mesh).mesh)
+    usual, finer = pressed(newton, 25), pressed(nested, 25)
+    true = drag_of_half(None, pressed(small(foot(48)), 400))
+    fewer = [pressed(newton, round(25 * part)) for part in PARTS]
+    found = estimated(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
+    without = estimated(drag_of_half, newton, usual, (nested, finer))
+    assert abs(found.value - true) <= found.error
+    assert found.error > without.error
+    with pytest.raises(ValueError, match="fewer has 1 states"):
+        estimated(drag_of_half, newton, usual, (nested, finer), fewer=fewer[:1])
