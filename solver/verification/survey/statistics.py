@@ -56,4 +56,5 @@ def misses(rows: Iterable[Estimate]) -> Iterator[str]:
     """Yield a line for every number whose error lies above its estimate."""
     for row in rows:
         if row.above is False and row.error > EXACT:
-            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {row.number} {row.error:.2g} told {row.estimate:.2g}"
+            told = f"{row.number} {row.error:.2g} told {row.estimate:.2g}"
+            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {told}"
