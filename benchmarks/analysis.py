@@ -15,7 +15,7 @@ from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.strokes import analyse
-from sessions.strokes.bootstrap import intervals_of
+from sessions.strokes.bootstrap import stroke_intervals
 
 RUNS = 9
 
@@ -27,14 +27,13 @@ def main() -> None:
         recording = Recording.open(folder)
         analysis = analyse(recording)  # what is loaded once is loaded now
         strokes = analysis.strokes
-        intervals_of(strokes)
         prediction = predict(
             analysis, recording.plan, PredictionOptions(course="steady", intervals=True, beside="small")
         )
         carried = with_intervals(analysis, prediction)
         with_alternatives(carried)
         alone = _taken(lambda: analyse(Recording.open(folder)))
-        drawn = _taken(lambda: intervals_of(strokes))
+        drawn = _taken(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
         solved = _taken(lambda: predict(analysis, recording.plan, prediction.options))
         told = _taken(lambda: with_intervals(analysis, prediction))
         beside = _taken(lambda: with_alternatives(carried))

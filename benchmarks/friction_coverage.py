@@ -20,7 +20,6 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import Analysis, analyse_blocks
-from sessions.strokes.bootstrap import drawn_from, stroke_intervals
 from sessions.strokes.settings import AnalysisSettings
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
 from simulators.subject import SimulatedSubject
@@ -187,11 +186,10 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
     peaks: list[bool] = []
     for seed in seeds:
         analysis, truths = Visit(seed, trouble).strokes()
-        settings = drawn_from(analysis.settings, analysis.tilt)
         at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
         for number, truth in enumerate(truths, 1):
             at, stroke = at_trial.get(number, (0, None))
-            found = None if stroke is None else stroke_intervals(stroke, at, settings)
+            found = None if stroke is None else analysis.intervals[at]
             peaks.append(stroke is not None and stroke.mu_static is not None)
             for name in NUMBERS:
                 ends = None if found is None else getattr(found, name)

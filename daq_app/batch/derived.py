@@ -22,7 +22,7 @@ from sessions.recording.unblinding import revealed
 from sessions.recording.verification import differences, told, why
 from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
-from sessions.strokes.bootstrap import BootstrapSettings, drawn_from, intervals_of
+from sessions.strokes.bootstrap import BootstrapSettings, intervals_document, stroke_intervals
 from sessions.strokes.contact_area import AreaLaw
 from sessions.strokes.decisions import Decisions
 from sessions.strokes.stored import check_analysis
@@ -207,11 +207,12 @@ def _predict(
 
 
 def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = None) -> dict[str, Any]:
-    """Return an analysis with its bootstrap intervals, as it is kept and printed."""
-    return {
-        **analysis.to_dict(),
-        "bootstrap": intervals_of(analysis.strokes, bootstrap or drawn_from(analysis.settings, analysis.tilt)),
-    }
+    """Return an analysis with its intervals, drawn anew where `bootstrap` is another, as it is kept and printed."""
+    settings, intervals = analysis.bootstrap, analysis.intervals
+    if bootstrap is not None and bootstrap != settings:
+        settings = bootstrap
+        intervals = tuple(stroke_intervals(one, at, settings) for at, one in enumerate(analysis.strokes))
+    return {**analysis.to_dict(), "bootstrap": intervals_document(settings, intervals)}
 
 
 def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:

@@ -26,7 +26,7 @@ from sessions.prediction import (
 )
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.strokes import Analysis
-from sessions.strokes.bootstrap import BootstrapSettings, FrictionDraws, drawn_from, friction_draws
+from sessions.strokes.bootstrap import BootstrapSettings, FrictionDraws, friction_draws
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -71,7 +71,7 @@ def draws_of(
     analysis: Analysis, prediction: SessionPrediction, settings: BootstrapSettings | None = None
 ) -> list[Drawn]:
     """Return for each trial what its friction may have been in each repeat, or why that is not known."""
-    settings = settings or drawn_from(analysis.settings, analysis.tilt)
+    settings = settings or analysis.bootstrap
     return [_draws(analysis, row, settings) for row in prediction.trials]
 
 

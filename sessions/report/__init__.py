@@ -32,7 +32,6 @@ from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Seds
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
 from sessions.strokes import Analysis
-from sessions.strokes.bootstrap import drawn_from
 
 __all__ = [
     "Answers",
@@ -124,8 +123,8 @@ def findings(
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,
-        interval_kind=drawn_from(analysis.settings, analysis.tilt).kind,
-        interval_kinds=dict(drawn_from(analysis.settings, analysis.tilt).kinds),
+        interval_kind=analysis.bootstrap.kind,
+        interval_kinds=dict(analysis.bootstrap.kinds),
         afferent=more.afferent,
         afferent_quantity=SED.name if more.firing_settings is None else more.firing_settings.quantity,
     )

@@ -15,7 +15,6 @@ from sessions.report.contents import Fact, StrokeFinding
 from sessions.statistics.grading import grading
 from sessions.statistics.scores import ScoreTable, reversed_subjects
 from sessions.strokes.analysis import Analysis
-from sessions.strokes.bootstrap import drawn_from
 from sessions.strokes.settings import AnalysisSettings
 
 _ORIGIN: dict[Origin, str] = {"measured": "measured", "set": "set", "default": "default: nobody set it"}
@@ -82,7 +81,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         ),
         Fact("tilt of the face", *_tilt(analysis)),
         Fact("filter", analysis.filtered),
-        Fact("interval of µ", drawn_from(analysis.settings, analysis.tilt).kind),
+        Fact("interval of µ", analysis.bootstrap.kind),
     ]
     factor = clock.get("factor", 1.0)
     if factor != 1.0:

@@ -5,7 +5,7 @@ Statist. 17:1217). Every repeat also draws how wrong calibration, lean of the fa
 window may have begun and ended; the interval lies between two quantiles of what the repeats give.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
@@ -16,7 +16,7 @@ from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, sl
 from sessions.strokes.friction import Rule
 from sessions.strokes.onset import DetectorSettings
 from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings, SystematicSettings
-from sessions.strokes.sliding import strays
+from sessions.strokes.sliding import mean_inflation
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 from sessions.strokes.systematic import SystematicDraws, drag_direction
 from sessions.strokes.tilt import Tilt
@@ -104,7 +104,7 @@ class BootstrapSettings:
         }
 
 
-def drawn_from(settings: AnalysisSettings, tilt: Tilt | None) -> BootstrapSettings:
+def bootstrap_settings(settings: AnalysisSettings, tilt: Tilt | None) -> BootstrapSettings:
     """Return what the intervals of an analysis are drawn from; `tilt` is what its presses tell, None without any."""
     drawn = BootstrapSettings(seed=settings.bootstrap_seed, cross_talk=settings.cross_talk_uncertainty)
     if settings.gain_error is not None:
@@ -172,11 +172,10 @@ def _agreeing(stroke: Stroke, found: Mapping[str, Array]) -> float | None:
     return float(np.mean(stroke.direction * np.cos(np.radians(found["heading"])) >= 0.5))
 
 
-def intervals_of(strokes: Sequence[Stroke], settings: BootstrapSettings | None = None) -> dict[str, Any]:
-    """Return the intervals of all strokes as plain data, with what they are and the settings they were drawn with."""
-    chosen = settings or BootstrapSettings()
-    found = [stroke_intervals(stroke, at, chosen).to_dict() for at, stroke in enumerate(strokes)]
-    return {"kind": chosen.kind, "kinds": dict(chosen.kinds), "settings": asdict(chosen), "strokes": found}
+def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
+    """Return intervals as plain data, with what they are and the settings they were drawn with."""
+    rows = [one.to_dict() for one in intervals]
+    return {"kind": settings.kind, "kinds": dict(settings.kinds), "settings": asdict(settings), "strokes": rows}
 
 
 class FrictionDraws(NamedTuple):
@@ -300,7 +299,7 @@ class _Repeats:
         total = weight.sum(axis=1)
         means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
         # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
-        further, free = strays(blocks[:, 0])
+        further, free = mean_inflation(blocks[:, 0])
         further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
         lightness = float(blocks[:, 1].mean())
         mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further

@@ -53,7 +53,7 @@ class Climb(NamedTuple):
         by_bend = np.zeros_like(time)
         by_bend[inside] = -(left[inside] ** self.bend) * np.log(left[inside])
         done, above = _parts(self, time).T
-        share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _fallen(self, time)
+        share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
         columns = np.zeros((len(time), 7))
         columns[:, 0], columns[:, 1] = share * by_left * left, share * by_left * (1.0 - left)
         columns[:, 2] = share * by_bend
@@ -73,15 +73,15 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     share of the level (`stick_rise`).
     """
     held = np.isfinite(ratio)
-    t, y = few(time[held]), few(ratio[held])
-    fit = climb(t, y, settings.filter.block, peaked=peaked)
+    t, y = thin(time[held]), thin(ratio[held])
+    fit = fit_climb(t, y, settings.filter.block, peaked=peaked)
     if fit is None:
         return None
     climbing = fit.rise + fit.peak >= settings.ratio.stick_rise * (fit.rest + fit.rise) > 0.0
-    return fit.meets if climbing and _left(fit, t, y) <= settings.ratio.stick_left * float(y.var()) else None
+    return fit.meets if climbing and _mean_square(fit, t, y) <= settings.ratio.stick_left * float(y.var()) else None
 
 
-def climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:
+def fit_climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:
     """Return the climb that T/N `y` (n,) [-] at `t` (n,) [s] has had; None of too few readings.
 
     A straight one, unless it surely leaves more than one that bends; readings are alike over `block` [s]. `peaked` lets
@@ -90,26 +90,28 @@ def climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:
     if len(t) < 2 * _FEWEST + 1:
         return None
     falls = _FALLS if peaked else (0.0,)
-    at = _first(t, y)
-    straight = min((settled(_guess(at, t, y, 1.0, fall), t, y) for fall in falls), key=lambda one: _left(one, t, y))
+    at = _straight_climb(t, y)
+    straight = min(
+        (refine(_guess(at, t, y, 1.0, fall), t, y) for fall in falls), key=lambda one: _mean_square(one, t, y)
+    )
     starts = [_guess(at, t, y, bend, straight.fall) for bend in _BENDS]
-    bent = min((settled(one, t, y, bends=True) for one in starts), key=lambda one: _left(one, t, y))
+    bent = min((refine(one, t, y, bends=True) for one in starts), key=lambda one: _mean_square(one, t, y))
     free = max((float(t[-1]) - float(t[0])) / block - 5.0, 1.0)
-    surely = (_left(straight, t, y) - _left(bent, t, y)) * free > _SURELY * _left(bent, t, y)
+    surely = (_mean_square(straight, t, y) - _mean_square(bent, t, y)) * free > _SURELY * _mean_square(bent, t, y)
     return bent if surely else straight
 
 
-def settled(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
+def refine(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
     """Return the fit that leaves least of `y` (n,) at `t` (n,) near a first one (Levenberg 1944, Marquardt 1963)."""
-    least, damping = _left(fit, t, y), 1e-3
+    least, damping = _mean_square(fit, t, y), 1e-3
     for _ in range(_STEPS):
-        free = movable(fit, t, bends=bends)
+        free = free_numbers(fit, t, bends=bends)
         slopes = fit.slopes(t)[:, free]
         normal, right = slopes.T @ slopes, slopes.T @ (y - fit.at(t))
         moved = np.array(fit)
         moved[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
-        new = _allowed(moved, t)
-        left = _left(new, t, y)
+        new = _bounded(moved, t)
+        left = _mean_square(new, t, y)
         if left < least:
             gained, fit, least, damping = least - left, new, left, damping / 10.0
             if gained < _STILL * left:
@@ -119,7 +121,7 @@ def settled(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
     return fit
 
 
-def movable(fit: Climb, t: Array, *, bends: bool) -> list[int]:
+def free_numbers(fit: Climb, t: Array, *, bends: bool) -> list[int]:
     """Return which of the seven numbers of a climb readings at `t` (n,) [s] tell."""
     free = [1, 4, 5]
     free += [0] if fit.begins > t[0] else []
@@ -127,13 +129,13 @@ def movable(fit: Climb, t: Array, *, bends: bool) -> list[int]:
     return sorted(free + ([3, 6] if fit.fall > 0.0 else []))
 
 
-def few(column: Array) -> Array:
+def thin(column: Array) -> Array:
     """Return readings, or where there are many of them, means of as many neighbours each."""
     edges = np.arange(0, len(column), -(-len(column) // _FEW))
     return np.add.reduceat(column, edges) / np.diff(np.append(edges, len(column))) if len(column) else column
 
 
-def _first(t: Array, y: Array) -> tuple[float, float]:
+def _straight_climb(t: Array, y: Array) -> tuple[float, float]:
     """Return the instants between which a straight climb fits best, among all pairs of some."""
     at = np.linspace(float(t[0]), float(t[-_FEWEST - 1]), _CANDIDATES)
     begins, meets = (at[index] for index in np.triu_indices(_CANDIDATES, 1))
@@ -155,7 +157,7 @@ def _guess(at: tuple[float, float], t: Array, y: Array, bend: float, fall: float
     return Climb(*kind[:4], *heights, *([] if fall > 0.0 else [0.0]))
 
 
-def _allowed(numbers: Array, t: Array) -> Climb:
+def _bounded(numbers: Array, t: Array) -> Climb:
     """Return the climb of seven numbers, brought to where it can be fitted."""
     begins, meets, bend, fall, rest, rise, peak = numbers.tolist()
     meets = float(np.clip(meets, t[_FEWEST], t[-_FEWEST - 1]))
@@ -165,16 +167,16 @@ def _allowed(numbers: Array, t: Array) -> Climb:
     return Climb(begins, meets, float(np.clip(bend, low, high)), fall, rest, max(rise, 0.0), max(peak, 0.0))
 
 
-def _left(fit: Climb, t: Array, y: Array) -> float:
+def _mean_square(fit: Climb, t: Array, y: Array) -> float:
     return float(((y - fit.at(t)) ** 2).mean())
 
 
 def _parts(fit: Climb, t: Array) -> Array:
     """Return how much of the climb is done, and of the peak there (n, 2) [-]."""
     done = 1.0 - np.clip((fit.meets - t) / (fit.meets - fit.begins), 0.0, 1.0) ** fit.bend
-    return np.column_stack([done, done * _fallen(fit, t)])
+    return np.column_stack([done, done * _peak_decay(fit, t)])
 
 
-def _fallen(fit: Climb, t: Array) -> Array:
+def _peak_decay(fit: Climb, t: Array) -> Array:
     """Return what is left of the peak (n,) [-]: 1 up to it."""
     return np.exp(-np.maximum(t - fit.meets, 0.0) / fit.fall) if fit.fall > 0.0 else np.zeros_like(t)

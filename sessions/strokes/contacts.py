@@ -23,11 +23,11 @@ class Contact:
     onset: float | None  # [s, device time]; None where the recording begins in contact
     lift: float | None  # [s, device time]; None where it ends in contact
     valleys: tuple[int, ...] = ()  # readings of least force that tell it from neighbours it was not lifted from
-    turns: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
-    around: tuple[int, int] | None = None  # first reading and past the last of the contact that turns cut it out of
+    reversals: tuple[int, ...] = ()  # readings at which the finger turned, where that is its beginning or end
+    uncut: tuple[int, int] | None = None  # first reading and past the last of the contact that turns cut it out of
 
 
-def contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
+def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: AnalysisSettings) -> tuple[Contact, ...]:
     """Return the contacts in readings, time (n,) [s] and normal force (n,) [N, not zeroed], for a known zero."""
     if not len(time):
         return ()
@@ -93,7 +93,7 @@ def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, 
     return Contact(start, stop, onset, lift, valleys)
 
 
-class _Way(NamedTuple):
+class _DragRun(NamedTuple):
     """Readings in which the drag points one way, or turns slowly."""
 
     first: int
@@ -119,11 +119,11 @@ def split_at_reversals(
     as in circles, is not cut.
     """
     part = wrench[contact.start : contact.stop]
-    ways = _ways(part, time[contact.start : contact.stop], unsure, settings)
-    turns = [contact.start + _turn(part, one, other) for one, other in pairwise(ways)]
-    if not turns:
+    ways = _drag_runs(part, time[contact.start : contact.stop], unsure, settings)
+    reversals = [contact.start + _reversal(part, one, other) for one, other in pairwise(ways)]
+    if not reversals:
         return (contact,)
-    bounds = [contact.start, *turns, contact.stop]
+    bounds = [contact.start, *reversals, contact.stop]
     return tuple(
         replace(
             contact,
@@ -131,14 +131,14 @@ def split_at_reversals(
             stop=stop,
             onset=contact.onset if start == contact.start else float(time[start]),
             lift=contact.lift if stop == contact.stop else float(time[stop]),
-            turns=tuple(turn for turn in turns if turn in (start, stop)),
-            around=(contact.start, contact.stop),
+            reversals=tuple(turn for turn in reversals if turn in (start, stop)),
+            uncut=(contact.start, contact.stop),
         )
         for start, stop in pairwise(bounds)
     )
 
 
-def _ways(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_Way]:
+def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_DragRun]:
     """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
     normal = -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
@@ -163,19 +163,21 @@ def _ways(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings)
             runs[-1].append(block)
         else:
             runs.append([block])
-    found = [_Way(int(held[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs]
+    found = [
+        _DragRun(int(held[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs
+    ]
     greatest = max((way.drag for way in found), default=0.0)
     longest = max((float(time[way.last] - time[way.first]) for way in found), default=0.0)
     shortest = max(
         settings.contact.shortest_stroke - settings.contact.turn_block, settings.contact.turn_shortest * longest
     )
-    ways: list[_Way] = []
+    ways: list[_DragRun] = []
     dropped = False  # since the last way
     for way in found:
         if time[way.last] - time[way.first] < shortest or way.drag < settings.contact.light_share * greatest:
             dropped = True
         elif ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
-            ways[-1] = _Way(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
+            ways[-1] = _DragRun(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
             dropped = False
         else:
             ways.append(way)
@@ -183,7 +185,7 @@ def _ways(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings)
     return ways
 
 
-def _turn(wrench: Array, one: _Way, other: _Way) -> int:
+def _reversal(wrench: Array, one: _DragRun, other: _DragRun) -> int:
     """Return the reading of a wrench (n, 6) from which on the drag points the `other` way."""
     across = other.push / np.hypot(*other.push) - one.push / np.hypot(*one.push)
     between = wrench[one.first : other.last + 1, :2] @ across

@@ -10,7 +10,7 @@ from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.stroke import Stroke
 
 
-def with_old(analysis: Analysis, decision: Decision) -> Decision:
+def with_present(analysis: Analysis, decision: Decision) -> Decision:
     """Return a decision with what stands in its place now. Raises DecisionError where there is no such stroke."""
     if decision.undoes is not None:
         return decision
@@ -27,7 +27,7 @@ def with_old(analysis: Analysis, decision: Decision) -> Decision:
     raise DecisionError(f"there is no {decision.of}: {there}")
 
 
-def tried(recording: Recording, decision: Decision, before: Decisions, now: Analysis) -> Analysis:
+def preview(recording: Recording, decision: Decision, before: Decisions, now: Analysis) -> Analysis:
     """Return the analysis as it would be with a decision more; `now` is that without it.
 
     Raises DecisionError where the decision cannot be, or would change nothing.

@@ -4,16 +4,19 @@ Readings stay as they are. A decision sets one thing of one stroke (or of a tria
 it, when and why, and what stood there before; undoing it is a line of its own. What is in force follows from all lines.
 """
 
-import json
 import os
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
+
+import msgspec
+from msgspec import Meta
 
 from sessions.file_access import remedy
+from sessions.json_document import converted, json_object
 from sessions.recording.derived import bytes_of
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import json_text
@@ -27,21 +30,39 @@ DECISIONS = "decisions.jsonl"  # in a session's folder
 Span = tuple[float, float]
 Value = float | int | bool | Span | None
 
-# What can be decided, and what its value is. Times are on the device's clock.
-OF_STROKE: Mapping[str, str] = {
-    "onset": "an instant [s]",
-    "lift": "an instant [s]",
-    "steady": "two instants [s]: where the mean of T/N and the speed are taken",
-    "stick": "two instants [s]: the stick phase, whose greatest T/N is mu_static and whose end the break-away",
-    "slide_onset": "an instant [s]: from which the contact slides; a static peak is looked for up to then",
-    "direction": "1 (proximal to distal) or -1 (distal to proximal)",
-    "kept": "true, or false where the stroke is left out",
+_Instant = Annotated[float, Meta(gt=-1e9, lt=1e9)]
+_Angle = Annotated[float, Meta(ge=-MOST_TILT, le=MOST_TILT)]
+_Count = Annotated[int, Meta(ge=1)]
+
+
+class Kind(NamedTuple):
+    """What the value of a decision is."""
+
+    form: Any  # the type that msgspec holds it against
+    sentence: str  # the same, for people
+
+
+# What can be decided. Times are on the device's clock.
+OF_STROKE: Mapping[str, Kind] = {
+    "onset": Kind(_Instant, "an instant [s]"),
+    "lift": Kind(_Instant, "an instant [s]"),
+    "steady": Kind(tuple[_Instant, _Instant], "two instants [s]: where the mean of T/N and the speed are taken"),
+    "stick": Kind(
+        tuple[_Instant, _Instant],
+        "two instants [s]: the stick phase, whose greatest T/N is mu_static and whose end the break-away",
+    ),
+    "slide_onset": Kind(
+        _Instant, "an instant [s]: from which the contact slides; a static peak is looked for up to then"
+    ),
+    "direction": Kind(Literal[1, -1], "1 (proximal to distal) or -1 (distal to proximal)"),
+    "kept": Kind(bool, "true, or false where the stroke is left out"),
 }
-OF_TRIAL: Mapping[str, str] = {"choice": "the number of the stroke that the model gets, from 1"}
-
-
-OF_SESSION: Mapping[str, str] = {
-    "tilt": "two angles [degrees]: how far the face's normal leans to +x and to +y, which is levelled"
+OF_TRIAL: Mapping[str, Kind] = {"choice": Kind(_Count, "the number of the stroke that the model gets, from 1")}
+OF_SESSION: Mapping[str, Kind] = {
+    "tilt": Kind(
+        tuple[_Angle, _Angle],
+        "two angles [degrees]: how far the face's normal leans to +x and to +y, which is levelled",
+    )
 }
 
 
@@ -91,7 +112,7 @@ class Decision:
             return f"{head}decision {self.undoes} is undone: {self.why}"
         if self.what == "kept":
             return f"{head}{self.of} is {'kept' if self.new else 'left out'}: {self.why}"
-        return f"{head}{self.what} of {self.of} is {told(self.new)} (it was {told(self.old)}): {self.why}"
+        return f"{head}{self.what} of {self.of} is {value_text(self.new)} (it was {value_text(self.old)}): {self.why}"
 
     @property
     def leaves_out(self) -> bool:
@@ -106,7 +127,7 @@ class Decision:
         return {**head, "undoes": undoes} if undoes is not None else {**head, **document}
 
 
-def told(value: Value) -> str:
+def value_text(value: Value) -> str:
     """Return a value for people."""
     if isinstance(value, tuple):
         return " and ".join(f"{part:.6g}" for part in value)
@@ -114,7 +135,7 @@ def told(value: Value) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Decided:
+class StrokeDecisions:
     """What is in force of one stroke."""
 
     of: Mapping[str, Decision]  # by what
@@ -176,10 +197,10 @@ class Decisions:
                     undone.add(decision.undoes)
         return tuple(reversed(kept))
 
-    def of_stroke(self, trial: int | None, stroke: int) -> Decided:
+    def of_stroke(self, trial: int | None, stroke: int) -> StrokeDecisions:
         """Return what is in force of a stroke, its number counted within the trial from 1."""
         found = [one for one in self.in_force if (one.trial, one.stroke) == (trial, stroke)]
-        return Decided({decision.what: decision for decision in found})
+        return StrokeDecisions({decision.what: decision for decision in found})
 
     def choice(self, trial: int | None) -> Decision | None:
         """Return the decision which stroke of a trial the model gets, None where nobody decided."""
@@ -212,7 +233,7 @@ def read(folder: Path) -> Decisions:
 
     A line that is torn or damaged is left out and named. Raises RecordingError where the file cannot be read.
     """
-    return parsed(content_of(folder))
+    return parse(content_of(folder))
 
 
 def content_of(folder: Path) -> bytes:
@@ -220,7 +241,7 @@ def content_of(folder: Path) -> bytes:
     return bytes_of(folder / DECISIONS)
 
 
-def parsed(content: bytes) -> Decisions:
+def parse(content: bytes) -> Decisions:
     """Return the decisions in the bytes of a file."""
     lines: list[Decision] = []
     problems: list[str] = []
@@ -248,7 +269,7 @@ def append(recording: "Recording", decision: Decision) -> Decision:
     """
     path = recording.folder / DECISIONS
     content = content_of(recording.folder)
-    before = parsed(content)
+    before = parse(content)
     _check(decision, before)
     try:
         torn = bool(content) and not content.endswith(b"\n")
@@ -276,17 +297,16 @@ def _decision(line: bytes) -> Decision | str | None:
     if not line.strip():
         return None
     try:
-        document = json.loads(line)
+        document = json_object(line)
         crc = document.pop("crc32")
         if zlib.crc32(json_text(document).encode()) != crc:
             return "its CRC-32 is not that of its text, which was changed or damaged"
         document.pop("SIMULATED", None)
-        for name in ("old", "new"):
-            if isinstance(document.get(name), list):
-                document[name] = tuple(document[name])
-        return Decision(**document)
-    except (ValueError, KeyError, TypeError, AttributeError):
+        decision = converted(document, Decision)
+    except (ValueError, KeyError):
         return "it holds no decision"
+    known = document.keys() <= asdict(decision).keys()
+    return decision if known else "it holds no decision"
 
 
 def _check(decision: Decision, before: Decisions) -> None:
@@ -300,44 +320,15 @@ def _check(decision: Decision, before: Decisions) -> None:
     allowed = OF_STROKE if decision.stroke is not None else OF_SESSION if decision.trial is None else OF_TRIAL
     if decision.what not in allowed:
         raise DecisionError(f"nobody decides {decision.what!r} of {decision.of}: give one of {', '.join(allowed)}")
-    if not _FITS[decision.what](decision.new):
-        raise DecisionError(f"{decision.what} of {decision.of} cannot be {decision.new!r}: {allowed[decision.what]}")
+    kind = allowed[decision.what]
+    if not _fits(decision.new, kind.form):
+        raise DecisionError(f"{decision.what} of {decision.of} cannot be {decision.new!r}: {kind.sentence}")
 
 
-def _number(value: object) -> bool:
-    return isinstance(value, float | int) and not isinstance(value, bool) and -1e9 < value < 1e9
-
-
-def _span(value: object) -> bool:
-    parts = cast("Sequence[object]", value) if isinstance(value, tuple) else ()
-    return len(parts) == 2 and all(map(_number, parts)) and cast("float", parts[0]) < cast("float", parts[1])
-
-
-def _angles(value: object) -> bool:
-    parts = cast("Sequence[object]", value) if isinstance(value, tuple) else ()
-    return len(parts) == 2 and all(map(_number, parts)) and all(abs(cast("float", part)) <= MOST_TILT for part in parts)
-
-
-def _count(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 1
-
-
-def _way(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and abs(value) == 1
-
-
-def _flag(value: object) -> bool:
-    return isinstance(value, bool)
-
-
-_FITS: Mapping[str, Callable[[object], bool]] = {
-    "onset": _number,
-    "lift": _number,
-    "steady": _span,
-    "stick": _span,
-    "slide_onset": _number,
-    "direction": _way,
-    "kept": _flag,
-    "choice": _count,
-    "tilt": _angles,
-}
+def _fits(value: Value, form: object) -> bool:
+    """Say whether a value is of the kind that is decided; two instants must come one after the other."""
+    try:
+        msgspec.convert(value, form)
+    except msgspec.ValidationError:
+        return False
+    return form != tuple[_Instant, _Instant] or (isinstance(value, tuple) and value[0] < value[1])

@@ -10,7 +10,7 @@ speed, at which it is told, that decides.
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.break_away import climb, few, movable, settled
+from sessions.strokes.break_away import fit_climb, free_numbers, refine, thin
 from sessions.strokes.onset import DetectorSettings, onset_threshold
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def break_away_draws(
     last = float(columns[0][-1])
     held = np.isfinite(columns[1])
     time, ratio, normal = (column[held] for column in columns)
-    whole = climb(few(time), few(ratio), block, peaked=peaked)
+    whole = fit_climb(thin(time), thin(ratio), block, peaked=peaked)
     if whole is None:
         return None
     bends = whole.bend != 1.0
@@ -81,8 +81,8 @@ def break_away_draws(
     parts = np.array_split(np.arange(len(zero[0])), _ENDS)
     for number, part in enumerate(parts):
         inside = time <= last + (shortest - last) * number / (_ENDS - 1)
-        t, y, n = few(time[inside]), few(ratio[inside]), few(normal[inside])
-        fit = settled(whole, t, y, bends=bends)
+        t, y, n = thin(time[inside]), thin(ratio[inside]), thin(normal[inside])
+        fit = refine(whole, t, y, bends=bends)
         if fit.rise <= 0.0:
             return None
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / block), prepend=-1.0))
@@ -91,7 +91,7 @@ def break_away_draws(
         free = max(climbing - 2.0 - bends, 1.0)
         wild = np.sqrt(max(climbing, 1.0) / draw.chisquare(free, len(part)))[:, None]
         factors = wild * draw.standard_normal((len(part), len(edges)))
-        numbers = movable(fit, t, bends=bends)
+        numbers = free_numbers(fit, t, bends=bends)
         moves = np.linalg.pinv(fit.slopes(t)[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
         by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
         wrong_t, wrong_n = (each[part] for each in zero)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def low_passed(values: Array, cut_off: float, rate: float, padding: int) -> Array:
+def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     """Return values (n, k) through a second-order Butterworth low-pass, forwards and then backwards.
 
     One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are

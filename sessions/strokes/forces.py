@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import Frame
-from sessions.strokes.filters import low_passed
+from sessions.strokes.filters import low_pass
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ class Filter:
             f"{self.cut_off:g} Hz; forces were filtered before the ratio was formed, and never across a gap"
         )
 
-    def applied(self, values: Array, rate: float, segments: list[slice]) -> Array:
+    def apply(self, values: Array, rate: float, segments: list[slice]) -> Array:
         """Return values (n, k) filtered within each segment [positions]; nan outside them and in the shortest ones."""
         filtered = np.full_like(values, np.nan)
         # The bilinear transform bends frequencies as the tangent does: the factor belongs to the bent ones.
@@ -39,7 +39,7 @@ class Filter:
             length = segment.stop - segment.start
             if length >= self.shortest_segment:
                 padding = min(length - 1, int(np.ceil(3.0 * rate / self.cut_off)))
-                filtered[segment] = low_passed(values[segment], design, rate, padding)
+                filtered[segment] = low_pass(values[segment], design, rate, padding)
         return filtered
 
     def fits(self, rate: float) -> bool:
@@ -62,7 +62,7 @@ def in_face_frame(wrench: Array, frame: Frame) -> Array:
     return np.hstack([wrench[:, order] * signs, wrench[:, [3 + i for i in order]] * signs])
 
 
-def levelled(wrench: Array, lean: tuple[float, float]) -> Array:
+def level(wrench: Array, lean: tuple[float, float]) -> Array:
     """Return a wrench (n, 6) of the face frame turned so that +z is the normal of a face that leans [degrees].
 
     A rotation by the shortest way, so torques turn along.

@@ -100,7 +100,7 @@ def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 
-def strays(blocks: Array) -> tuple[float, float]:
+def mean_inflation(blocks: Array) -> tuple[float, float]:
     """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
 
     Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent

@@ -10,7 +10,7 @@ from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.flaws import FlawName
-from sessions.strokes.forces import Filter, in_face_frame, levelled
+from sessions.strokes.forces import Filter, in_face_frame, level
 from sessions.strokes.onset import NORMAL_STEP
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.signal_quality import SignalQuality
@@ -41,7 +41,7 @@ def span_of(
     """Return the sound readings of a block."""
     good = sound.good
     time = block.time[good]
-    wrench = levelled(in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame), settings.tilt)
+    wrench = level(in_face_frame(calibration.wrench(block.raw[good], np.zeros(6)), frame), settings.tilt)
     place = np.concatenate([[0], np.cumsum(good)])
     segments = [slice(int(place[s.start]), int(place[s.stop])) for s in sound.segments]
     smoother = Filter(settings.filter.cut_off, settings.filter.shortest_segment)
@@ -50,7 +50,7 @@ def span_of(
     elif not smoother.fits(sound.rate):
         smooth, filtered = wrench, f"not filtered: {sound.rate:.3g} readings a second are too few for it"
     else:
-        smooth, filtered = smoother.applied(wrench, sound.rate, segments), smoother.sentence
+        smooth, filtered = smoother.apply(wrench, sound.rate, segments), smoother.sentence
     return Span(
         time,
         wrench,
@@ -75,7 +75,7 @@ def _least_step(torques: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ZeroInForce:
+class StrokeZero:
     """The zero that a stroke is measured from."""
 
     level: Array  # (6,) face frame [N, N mm]
@@ -89,7 +89,7 @@ class ZeroInForce:
     flaw: FlawName | None
 
 
-def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSettings) -> ZeroInForce | None:
+def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSettings) -> StrokeZero | None:
     """Return the zero for a stroke from the unloaded stretches around it; None where there is none.
 
     `idle` (n,) marks the readings in which nothing presses.
@@ -106,17 +106,17 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
         error = np.sqrt(noise / 4.0 + np.maximum(drift**2 - noise, 0.0) / 12.0)
         origin = f"half-way from unloaded before contact, {before.when}, to after it, {after.when}"
         unsure = _unsure(span, contact, idle, level, drift, settings)
-        return ZeroInForce(level, before.noise, *_filtered(span, before), error, origin, drift, unsure, None)
+        return StrokeZero(level, before.noise, *_filtered(span, before), error, origin, drift, unsure, None)
     if before is not None:
         origin = f"unloaded before contact, {before.when}"
         unsure = _unsure(span, contact, idle, before.level, None, settings)
-        return ZeroInForce(
+        return StrokeZero(
             before.level, before.noise, *_filtered(span, before), before.error, origin, None, unsure, None
         )
     if after is not None:
         origin = f"unloaded after contact, {after.when}"
         unsure = _unsure(span, contact, idle, after.level, None, settings)
-        return ZeroInForce(
+        return StrokeZero(
             after.level,
             after.noise,
             *_filtered(span, after),
@@ -151,10 +151,10 @@ def _unsure(
     return max((s for s, _ in seen), default=0.0), max((n for _, n in seen), default=0.0)
 
 
-def recorded_zero(span: Span, *, stated: bool) -> ZeroInForce:
+def recorded_zero(span: Span, *, stated: bool) -> StrokeZero:
     """Return the recording's own zero, which counts only where somebody stated that nothing touched when it was set."""
     steps = np.abs(np.diff(span.wrench, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0) if len(steps) else np.zeros(6)
     origin = "as recorded, stated to be true" if stated else "as recorded, unknown"
     flaw = None if stated else FlawName.NO_UNLOADED_STRETCH
-    return ZeroInForce(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, None, (0.0, 0.0), flaw)
+    return StrokeZero(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, None, (0.0, 0.0), flaw)

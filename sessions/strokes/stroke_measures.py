@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.break_away import break_away
 from sessions.strokes.contacts import Contact
-from sessions.strokes.decisions import Decided
+from sessions.strokes.decisions import StrokeDecisions
 from sessions.strokes.flaws import Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.sliding import slide
-from sessions.strokes.span import Span, ZeroInForce
+from sessions.strokes.span import Span, StrokeZero
 from sessions.strokes.stick_slip import power_of_normal_force, stick_slip
 from sessions.strokes.stroke import Stroke
 from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
-from sessions.strokes.track import Track, curve_of, felt_forces, mean_vector, noise_of_ratio, track_of
+from sessions.strokes.track import Track, curve_of, mean_vector, noise_of_ratio, track_of, unfiltered_forces
 
 Array = NDArray[np.float64]
 
@@ -25,22 +25,22 @@ _NO_PEAK = "no static peak stands out"
 _STICK_WITHOUT = (_NO_PEAK, FlawName.NO_STEADY_SLIDING, FlawName.RATIO_ABOVE_ONE)  # a stick phase needs none of these
 
 
-def measured(
+def measure_stroke(
     span: Span,
     contact: Contact,
-    zero: ZeroInForce,
+    zero: StrokeZero,
     plan: SessionPlan,
     settings: AnalysisSettings,
     trial: Trial | None = None,
     number: int = 1,
-    decided: Decided | None = None,
+    decided: StrokeDecisions | None = None,
 ) -> tuple[Stroke, tuple[Flaw, ...]]:
     """Return a contact's stroke and its flaws; `plan` tells the face's frame and the area that tau_max is of.
 
     `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
     """
     found, frame, missed = Findings(), plan.frame, None
-    decided = decided or Decided({})
+    decided = decided or StrokeDecisions({})
     track = track_of(span, contact, zero, frame.height, settings)
     _judge_ends(found, contact, track, settings)
     _judge_zero(found, zero, track)
@@ -48,15 +48,15 @@ def measured(
         _judge_gaps(found, span, contact, settings)
         _judge_loads(found, track, plan.contact_area, settings)
         whole = None
-        if contact.around is not None:
-            first, last = contact.around
+        if contact.uncut is not None:
+            first, last = contact.uncut
             whole = track_of(span, replace(contact, start=first, stop=last), zero, frame.height, settings)
         window = slide(found, span, track, frame, settings, decided.span("steady"), whole)
         _take_slide_onset(found, decided)
         if window is not None:
             missed = _stick_slip(found, span, contact, track, window, zero, plan.contact_area, settings)
             _friction(found, track, window)
-            _static_peak(found, track, window, zero, settings, turned=contact.start in contact.turns)
+            _static_peak(found, track, window, zero, settings, turned=contact.start in contact.reversals)
             _break_away(found, track, window, settings)
             _judge_way(found, track, window, settings)
         _take_decided(found, track, decided)
@@ -89,13 +89,13 @@ def _judge_ends(found: Findings, contact: Contact, track: Track, settings: Analy
         found.flaw(FlawName.BEGINS_IN_CONTACT, sentence, "doubtful")
     if contact.lift is None:
         found.flaw(FlawName.ENDS_IN_CONTACT, "The recording ends in contact: no lift.", "doubtful")
-    if contact.valleys and len(contact.turns) < 2:
+    if contact.valleys and len(contact.reversals) < 2:
         sentence = (
             "The force did not return to zero between this stroke and its neighbour: there it begins or ends where a "
             "fifth of its peak is left."
         )
         found.flaw(FlawName.NOT_LIFTED, sentence, "doubtful")
-    if contact.turns:
+    if contact.reversals:
         sentence = (
             "The finger turned without lifting: this stroke begins or ends at the turn, where the drag changes its "
             "sign, and its neighbour goes the other way."
@@ -111,7 +111,7 @@ def _judge_ends(found: Findings, contact: Contact, track: Track, settings: Analy
         found.flaw(FlawName.SLOW_ONSET, sentence, "doubtful")
 
 
-def _judge_zero(found: Findings, zero: ZeroInForce, track: Track) -> None:
+def _judge_zero(found: Findings, zero: StrokeZero, track: Track) -> None:
     if zero.flaw is FlawName.NO_UNLOADED_STRETCH:
         sentence = (
             f"From {track.time[0]:.2f} to {track.time[-1]:.2f} s the recorded force lies beyond a fifth of its peak, "
@@ -241,12 +241,12 @@ def _stick_slip(
     contact: Contact,
     track: Track,
     window: slice,
-    zero: ZeroInForce,
+    zero: StrokeZero,
     planned: float,
     settings: AnalysisSettings,
 ) -> float | None:
     """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
-    dragging, normal = felt_forces(span, slice(contact.start, contact.stop), zero)
+    dragging, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
     with np.errstate(invalid="ignore"):
         ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
     level, pressing = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
@@ -266,7 +266,7 @@ def _stick_slip(
     return missed
 
 
-def _judge_drift(found: Findings, zero: ZeroInForce, settings: AnalysisSettings) -> None:
+def _judge_drift(found: Findings, zero: StrokeZero, settings: AnalysisSettings) -> None:
     """Say how far a zero that moves may have changed mu, and withhold the numbers where that is too much."""
     sideways, pressing = zero.unsure
     tangential = found.numbers.get("tangential_force", found.numbers["peak_tangential"])
@@ -292,7 +292,7 @@ def _judge_task(found: Findings, trial: Trial) -> None:
 
 
 def _static_peak(
-    found: Findings, track: Track, window: slice, zero: ZeroInForce, settings: AnalysisSettings, *, turned: bool
+    found: Findings, track: Track, window: slice, zero: StrokeZero, settings: AnalysisSettings, *, turned: bool
 ) -> None:
     """Give the static peak where one stands out of what follows it by its noise and by a share.
 
@@ -334,14 +334,14 @@ def _break_away(found: Findings, track: Track, window: slice, settings: Analysis
         found.reasons["break_away"] = _SLIDES_BEFORE
 
 
-def _take_slide_onset(found: Findings, decided: Decided) -> None:
+def _take_slide_onset(found: Findings, decided: StrokeDecisions) -> None:
     """Give the instant from which the contact slides, where a person decided it."""
     onset = decided.instant("slide_onset")
     if onset is not None:
         found.numbers["slide_onset"] = onset
 
 
-def _take_decided(found: Findings, track: Track, decided: Decided) -> None:
+def _take_decided(found: Findings, track: Track, decided: StrokeDecisions) -> None:
     """Give the stick phase and the direction that a person decided."""
     stick = decided.span("stick")
     if stick is not None:

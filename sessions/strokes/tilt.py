@@ -16,7 +16,7 @@ from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.sliding import block_means, displacement
-from sessions.strokes.span import Span, ZeroInForce
+from sessions.strokes.span import Span, StrokeZero
 from sessions.strokes.track import track_of
 
 Pair = tuple[float, float]
@@ -54,7 +54,7 @@ class Tilt:
 
 
 def press_of(
-    span: Span, contact: Contact, zero: ZeroInForce, frame: Frame, trial: int | None, settings: AnalysisSettings
+    span: Span, contact: Contact, zero: StrokeZero, frame: Frame, trial: int | None, settings: AnalysisSettings
 ) -> Press | None:
     """Return the press in a contact; None where it slides, is short, or drags more than a press does."""
     track = track_of(span, contact, zero, frame.height, settings)

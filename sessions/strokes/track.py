@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sessions.strokes.contacts import Contact
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.span import Span, ZeroInForce
+from sessions.strokes.span import Span, StrokeZero
 from sessions.strokes.stroke import StrokeCurve
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Track:
     rate: float  # [Hz]
 
 
-def track_of(span: Span, contact: Contact, zero: ZeroInForce, height: float, settings: AnalysisSettings) -> Track:
+def track_of(span: Span, contact: Contact, zero: StrokeZero, height: float, settings: AnalysisSettings) -> Track:
     """Return the readings of a contact, zeroed, with what follows from them."""
     part = slice(contact.start, contact.stop)
     wrench = span.smooth[part] - zero.level
@@ -66,19 +66,19 @@ def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings)
         part = slice(int(start), int(stop))
         path = position[part]
         if span.quality.even and smoother.fits(span.rate):
-            path = smoother.applied(path, span.rate, [slice(0, len(path))])
+            path = smoother.apply(path, span.rate, [slice(0, len(path))])
         velocity = np.gradient(path, time[part], axis=0)
         speed[part] = np.hypot(velocity[:, 0], velocity[:, 1])
     return speed
 
 
-def felt_forces(span: Span, part: slice, zero: ZeroInForce) -> tuple[Array, Array]:
+def unfiltered_forces(span: Span, part: slice, zero: StrokeZero) -> tuple[Array, Array]:
     """Return the tangential and the normal force (n,) [N] of a part, zeroed and unfiltered."""
     wrench = span.wrench[part] - zero.level
     return np.hypot(wrench[:, 0], wrench[:, 1]), -wrench[:, 2]
 
 
-def noise_of_ratio(zero: ZeroInForce, level: float, normal: float) -> float:
+def noise_of_ratio(zero: StrokeZero, level: float, normal: float) -> float:
     """Return the standard deviation [-] of unfiltered T/N about `level` under a normal force [N]."""
     sideways = float(np.hypot(*zero.noise[:2])) / np.sqrt(2.0)
     return float(np.hypot(sideways, level * float(zero.noise[2]))) / normal
@@ -87,7 +87,7 @@ def noise_of_ratio(zero: ZeroInForce, level: float, normal: float) -> float:
 def curve_of(
     span: Span,
     contact: Contact,
-    zero: ZeroInForce,
+    zero: StrokeZero,
     height: float,
     settings: AnalysisSettings,
     missed: float | None = None,
@@ -100,7 +100,7 @@ def curve_of(
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
     force = shown.wrench[:, :2]
-    dragging, felt = felt_forces(span, slice(first, last), zero)
+    dragging, felt = unfiltered_forces(span, slice(first, last), zero)
     columns = (shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, shown.position, shown.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)

@@ -17,8 +17,8 @@ from sessions.recording import Recording
 from sessions.recording.archive import problems, seal
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.bootstrap import stroke_intervals
-from sessions.strokes.decision_preview import with_old
-from sessions.strokes.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parsed, read
+from sessions.strokes.decision_preview import with_present
+from sessions.strokes.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parse, read
 
 WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5, 2.5))
 
@@ -112,12 +112,12 @@ def test_a_line_that_was_changed_or_taken_away_is_named(recording):
     for end in (2.5, 2.6, 2.7):
         append(recording, replace(WINDOW, new=(1.5, end)))
     whole = lines(recording)
-    changed = parsed(whole.replace(b"2.6]", b"2.4]"))
+    changed = parse(whole.replace(b"2.6]", b"2.4]"))
     assert "CRC-32" in changed.problems[0]
     assert [line.number for line in changed.lines] == [1, 3]
     first, _, third = whole.splitlines(keepends=True)
-    assert "lacks decision 2" in parsed(first + third).problems[0]
-    assert "comes before" in parsed(third + first).problems[0]
+    assert "lacks decision 2" in parse(first + third).problems[0]
+    assert "comes before" in parse(third + first).problems[0]
 
 
 # Undoing: every step is either a decision about one of two strokes, or undoes one of the lines before it.
@@ -165,7 +165,7 @@ def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_
             content = grown
             assert {one.stroke: one.new for one in read(Path(room)).in_force} == worked_out(done)
         torn = content[: cut % (len(content) + 1)]
-        found = parsed(torn)
+        found = parse(torn)
         assert {one.stroke: one.new for one in found.in_force} == worked_out(done[: torn.count(b"\n")])
         assert bool(found.problems) == (torn != b"" and not torn.endswith(b"\n"))
 
@@ -284,12 +284,12 @@ def test_a_decision_about_no_stroke_that_is_there_is_named():
     found = decided(replace(WINDOW, stroke=4), Decision("E02", "w", "lift", 9, 1, None, 2.0))
     assert [flaw.name for flaw in found.flaws] == ["decision", "decision"]
     with pytest.raises(DecisionError, match="there is no stroke 4 of trial 1: it has 1"):
-        with_old(found, replace(WINDOW, stroke=4))
+        with_present(found, replace(WINDOW, stroke=4))
 
 
 def test_a_decision_is_told_what_stands_before_it():
     found = decided()
     (one,) = found.strokes
-    assert with_old(found, replace(WINDOW, old=None)).old == one.steady
-    assert with_old(found, Decision("E02", "w", "choice", 1, None, None, 1)).old == 1
-    assert with_old(found, Decision("E02", "w", "kept", 1, 1, None, new=False)).old is True
+    assert with_present(found, replace(WINDOW, old=None)).old == one.steady
+    assert with_present(found, Decision("E02", "w", "choice", 1, None, None, 1)).old == 1
+    assert with_present(found, Decision("E02", "w", "kept", 1, 1, None, new=False)).old is True

@@ -22,7 +22,7 @@ def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(n, cut_off,
     values = np.random.default_rng(1).normal(size=(n, 6)).cumsum(axis=0) + 5.0
     sections = signal.butter(2, cut_off, fs=rate, output="sos")
     expected = signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
-    assert signals.low_passed(values, cut_off, rate, padding) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+    assert signals.low_pass(values, cut_off, rate, padding) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 @pytest.mark.usefixtures("either")

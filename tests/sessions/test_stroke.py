@@ -202,19 +202,19 @@ def test_the_ratio_means_nothing_below_the_floor():
 def test_the_filter_is_down_three_decibels_at_its_cut_off_without_delay():
     t = times(10.0)
     wave = np.cos(2 * np.pi * 20.0 * (t - 5.0))[:, None]
-    out = Filter(20.0, 12).applied(wave, 200.0, [slice(0, len(t))])[:, 0]
+    out = Filter(20.0, 12).apply(wave, 200.0, [slice(0, len(t))])[:, 0]
     assert out[1000] == pytest.approx(1 / np.sqrt(2), rel=2e-3)  # the crest stays where it was
     assert np.argmax(out[995:1006]) == 5
 
 
 def test_the_filter_keeps_a_constant_and_never_reaches_across_a_gap():
     values = np.concatenate([np.zeros(100), np.ones(100)])[:, None]
-    out = Filter(20.0, 12).applied(values, 200.0, [slice(0, 100), slice(100, 200)])
+    out = Filter(20.0, 12).apply(values, 200.0, [slice(0, 100), slice(100, 200)])
     assert np.allclose(out, values, atol=1e-12)
 
 
 def test_too_short_a_stretch_has_no_filtered_value():
-    assert np.isnan(Filter(20.0, 12).applied(np.ones((8, 1)), 200.0, [slice(0, 8)])).all()
+    assert np.isnan(Filter(20.0, 12).apply(np.ones((8, 1)), 200.0, [slice(0, 8)])).all()
 
 
 # Steady windows, means and speed

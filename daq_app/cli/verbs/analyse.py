@@ -12,7 +12,7 @@ from daq_app.cli.analysis_options import add_analysis, area_law, calibration_err
 from daq_app.cli.options import add_session, within
 from daq_app.console import DONE, FLAWED, Console, number, span, table
 from sessions.recording import Recording
-from sessions.strokes.bootstrap import StrokeIntervals, drawn_from
+from sessions.strokes.bootstrap import StrokeIntervals
 from sessions.strokes.tilt import Tilt
 
 EXAMPLE = "daq-app analyse recordings/P07 --json"
@@ -41,8 +41,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=calibration_error(options)
     )
     console.note(outdated_prediction(recording, analysis.settings))
-    chosen = drawn_from(analysis.settings, analysis.tilt)
-    console.result(analysis_document(analysis, chosen))
+    console.result(analysis_document(analysis))
     console.say(recording.simulated_sentence)
     rows = [
         [
@@ -62,10 +61,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.say(*(f"* {decision.sentence}" for decision in analysis.decisions))
     rows, courses = [_row(one) for one in analysis.intervals], [_course(one) for one in analysis.intervals]
     if any(end != "–" for row in (*rows, *courses) for end in row[1:]):
-        console.say(f"\n{chosen.kind}:", table(rows, head=INTERVALS))
+        console.say(f"\n{analysis.bootstrap.kind}:", table(rows, head=INTERVALS))
         console.say("\nof the same repeats; same way: share of them with the direction told:")
         console.say(table(courses, head=COURSES))
-        console.say(*(f"  {name.replace('_', ' ')}: {kind}" for name, kind in chosen.kinds.items()))
+        console.say(*(f"  {name.replace('_', ' ')}: {kind}" for name, kind in analysis.bootstrap.kinds.items()))
     if analysis.tilt is not None:
         console.say(_leaning(analysis.tilt, analysis.settings.tilt))
     for flaw in analysis.flaws:

@@ -15,7 +15,7 @@ from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.strokes import Analysis, Stroke, analyse
-from sessions.strokes.decision_preview import tried, with_old
+from sessions.strokes.decision_preview import preview, with_present
 from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
@@ -67,8 +67,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
     asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
-    decision = with_old(analysis, asked)
-    after = tried(recording, decision, before, analysis)
+    decision = with_present(analysis, asked)
+    after = preview(recording, decision, before, analysis)
     line = append(recording, decision)
     if stored is not None:
         analyse_session(recording, console)

@@ -20,7 +20,6 @@ from sessions.recording.unblinding import revealed
 from sessions.statistics.multiverse import Seds, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
-from sessions.strokes.bootstrap import drawn_from
 from sessions.strokes.contact_area import FIXED, AreaLaw
 
 FORM = 11  # raised when a row holds something else: what was stored before is then computed anew
@@ -153,7 +152,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         sha256=file_sha256(known.folder / LIVE_FILE),
         sealed="" if prediction is None else _sealed(known, prediction),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
-        calibration=drawn_from(analysis.settings, analysis.tilt).calibration,
+        calibration=analysis.bootstrap.calibration,
         model=tuple(fact for fact in model_facts(prediction) if fact[0] != "audits"),
     )
 
