@@ -22,7 +22,8 @@ from sessions.recording.unblinding import revealed
 from sessions.recording.verification import differences, told, why
 from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
-from sessions.strokes.bootstrap import BootstrapSettings, intervals_document, stroke_intervals
+from sessions.strokes.bootstrap import intervals_document, stroke_intervals
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.contact_area import AreaLaw
 from sessions.strokes.decisions import Decisions
 from sessions.strokes.stored import check_analysis

@@ -26,7 +26,8 @@ from sessions.prediction import (
 )
 from sessions.prediction.sed_interval import Ends, SedInterval
 from sessions.strokes import Analysis
-from sessions.strokes.bootstrap import BootstrapSettings, FrictionDraws, friction_draws
+from sessions.strokes.bootstrap import FrictionDraws, friction_draws
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

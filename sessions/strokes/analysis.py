@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes.bootstrap import BootstrapSettings, StrokeIntervals, bootstrap_settings, stroke_intervals
+from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.contacts import Contact, find_contacts, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import OF_SESSION, Decision, Decisions, StrokeDecisions, Value, read
 from sessions.strokes.flaws import Flaw, FlawName
@@ -57,7 +58,7 @@ class Analysis:
     @property
     def bootstrap(self) -> BootstrapSettings:
         """Return what the intervals are drawn from."""
-        return bootstrap_settings(self.settings, self.tilt)
+        return BootstrapSettings.of(self.settings, self.tilt)
 
     @property
     def flawed(self) -> bool:
@@ -253,9 +254,9 @@ def _common_zero(span: Span, context: _Context) -> StrokeZero | None:
 
 def _pull(span: Span, zero: StrokeZero, context: _Context) -> Flaw | None:
     """Return the flaw of a normal axis along which the recording pulls rather than presses."""
-    axis = context.plan.frame.normal
+    axis, settings = context.plan.frame.normal, context.settings
     low, high = np.percentile(zero.level[2] - span.wrench[:, 2], [0.5, 99.5])
-    if -low <= max(0.5 * high, onset_threshold(float(zero.noise[2]), context.settings.detector)):
+    if -low <= max(settings.contact.pull_share * high, onset_threshold(float(zero.noise[2]), settings.detector)):
         return None
     sentence = (
         f"Along {axis} the recording reaches {high:.3g} N pressing but {-low:.3g} N pulling, and a finger does not "

@@ -6,116 +6,21 @@ window may have begun and ended; the interval lies between two quantiles of what
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
 from sessions.strokes.friction import Rule
-from sessions.strokes.onset import DetectorSettings
-from sessions.strokes.settings import ASSUMED_GAIN_ERROR, AnalysisSettings, SystematicSettings
-from sessions.strokes.sliding import mean_inflation
 from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
 from sessions.strokes.systematic import SystematicDraws, drag_direction
-from sessions.strokes.tilt import Tilt
 
 Array = NDArray[np.float64]
 
-NUMBERS = (  # of a stroke that have an interval
-    "mu_static",
-    "mu_dynamic",
-    "mu_max",
-    "tau_max",
-    "speed",
-    "normal_force",
-    "tangential_force",
-    "peak_normal",
-    "peak_tangential",
-    "heading",
-    "onset",
-    "break_away",
-    "slide_onset",
-)
 _RANGES = ("onset", "slide_onset")
-_PRIOR = SystematicSettings().tilt_prior
-
-
-@dataclass(frozen=True, slots=True)
-class BootstrapSettings:
-    """What every repeat draws from; stored with the intervals."""
-
-    repeats: int = 1000
-    seed: int = 0
-    block: float = 0.1  # [s]
-    inwards: float = 0.2  # the steady window may begin or end so much of its length further inwards [-]
-    slide_share: tuple[float, float] = (0.1, 0.3)  # of the steady speed: at any between them the slide has begun [-]
-    gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
-    gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
-    cross_talk: float = ASSUMED_GAIN_ERROR  # standard uncertainty of what each force shows of another [-]
-    tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is not levelled [degrees]
-    tilt_error: tuple[float, float] = (_PRIOR, _PRIOR)  # its standard uncertainty [degrees]
-    tilt_origin: str = "assumed: too few presses tell it"
-    confidence: float = 0.95
-    fewest_blocks: int = 4  # of which a spread is told
-    fewest_quiet: int = 10  # readings before the onset of which noise is told ...
-    quiet_before: float = 0.02  # ... which end so long before it: later ones may be the touch's already [s]
-    top_share: float = 0.97  # readings above this share of the peak may be the peak [-]
-
-    @property
-    def kind(self) -> str:
-        """What an interval is, for people."""
-        return (
-            f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
-            f"{self.block:g} s, neighbours being alike allowed for, seed {self.seed}): sensor noise, zero and its "
-            f"drift, calibration ({self.calibration}; cross-talk {100 * self.cross_talk:g} % of each other force), "
-            f"lean of the face ({self.leaning}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
-        )
-
-    @property
-    def leaning(self) -> str:
-        """The lean of the face that is not levelled, and its standard uncertainty, for people."""
-        x, y = (f"{a:.2g} ± {error:.2g}°" for a, error in zip(self.tilt, self.tilt_error, strict=True))
-        return f"{x} to +x and {y} to +y, {self.tilt_origin}"
-
-    @property
-    def calibration(self) -> str:
-        """The calibration's uncertainty, for people: 0.3 % of each axis, set."""
-        return f"{100 * self.gain_error:g} % of each axis, {self.gain_error_origin}"
-
-    @property
-    def kinds(self) -> Mapping[str, str]:
-        """What the intervals hold of the numbers that are no plain means, for people."""
-        low, high = (100 * share for share in self.slide_share)
-        return {
-            "normal_force": "zero and its drift, calibration, choice of window; that the force changes along the "
-            "stroke is no uncertainty of its mean; of the tangential force likewise",
-            "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
-            "turned; with it the share of repeats whose direction is the one told",
-            "onset": "the detector's rule repeated (a force that climbs as steeply crosses three standard deviations "
-            "of its noise between two readings, noise drawn anew), zero; a gain moves no instant; none where a person "
-            "decided it",
-            "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
-            "and where the fit ends; a gain moves no instant; none where a person decided it",
-            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with "
-            "noise and unevenness of the speed; where the finger slid as fast when its speed was first known, any "
-            "instant since the contact; none where a person decided it",
-        }
-
-
-def bootstrap_settings(settings: AnalysisSettings, tilt: Tilt | None) -> BootstrapSettings:
-    """Return what the intervals of an analysis are drawn from; `tilt` is what its presses tell, None without any."""
-    drawn = BootstrapSettings(seed=settings.bootstrap_seed, cross_talk=settings.cross_talk_uncertainty)
-    if settings.gain_error is not None:
-        drawn = replace(drawn, gain_error=settings.gain_error, gain_error_origin="set")
-    if tilt is None or len(tilt.presses) < settings.press.press_fewest:  # of fewer, the hand's own push is not known
-        prior = settings.systematic.tilt_prior
-        return replace(drawn, tilt_error=(prior, prior))
-    left = (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
-    return replace(
-        drawn, tilt=left, tilt_error=tilt.error(settings.confidence), tilt_origin=f"by {len(tilt.presses)} presses"
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,38 +49,50 @@ class StrokeIntervals:
         return asdict(self)
 
 
+# The numbers of a stroke that have an interval.
+NUMBERS = tuple(
+    column.name for column in fields(StrokeIntervals) if column.name not in ("stroke", "trial", "direction_agrees")
+)
+
+
 def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | None = None) -> StrokeIntervals:
     """Return the intervals of the stroke at position `number`; the same stroke and seed give the same bits."""
-    chosen = settings or BootstrapSettings()
-    found: Mapping[str, Array] = {}
-    if stroke.curve is not None and len(stroke.curve.time) > 2:
-        found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+    settings = settings or BootstrapSettings()
+    repeats = _repeats(stroke, number, settings)
+    ends = (1 - settings.confidence) / 2, (1 + settings.confidence) / 2
 
     def interval(name: str) -> Interval | None:
-        if name not in found or getattr(stroke, name) is None:
+        value = getattr(stroke, name)
+        if name not in repeats or value is None:
             return None
-        low, high = np.quantile(found[name], [(1 - chosen.confidence) / 2, (1 + chosen.confidence) / 2]).tolist()
-        told = getattr(stroke, name)
+        low, high = np.quantile(repeats[name], ends).tolist()
         # An instant told at the end of the stretch in which it may lie, as by the first reading after it, is one too.
         # A lean that is known and was not levelled moves the truth away from the number told: it lies within as well.
-        within = name in _RANGES or chosen.tilt != (0.0, 0.0)
-        return (min(low, told), max(high, told)) if within else (low, high)
+        within = name in _RANGES or settings.tilt != (0.0, 0.0)
+        return (min(low, value), max(high, value)) if within else (low, high)
 
-    told = {name: interval(name) for name in NUMBERS}
-    return StrokeIntervals(number, stroke.trial, **told, direction_agrees=_agreeing(stroke, found))
-
-
-def _agreeing(stroke: Stroke, found: Mapping[str, Array]) -> float | None:
-    """Return the share of repeats whose heading lies within 60 degrees of the direction told, as the analysis asks."""
-    if stroke.direction is None or "heading" not in found:
-        return None
-    return float(np.mean(stroke.direction * np.cos(np.radians(found["heading"])) >= 0.5))
+    intervals = {name: interval(name) for name in NUMBERS}
+    return StrokeIntervals(number, stroke.trial, **intervals, direction_agrees=_agreement(stroke, repeats))
 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
     """Return intervals as plain data, with what they are and the settings they were drawn with."""
     rows = [one.to_dict() for one in intervals]
     return {"kind": settings.kind, "kinds": dict(settings.kinds), "settings": asdict(settings), "strokes": rows}
+
+
+def _repeats(stroke: Stroke, number: int, settings: BootstrapSettings) -> Mapping[str, Array]:
+    """Return the numbers (repeats,) of the stroke at position `number`, by name; none of a curve that is too short."""
+    if stroke.curve is None or len(stroke.curve.time) < 3:
+        return {}
+    return _Repeats(stroke, stroke.curve, settings, np.random.default_rng([settings.seed, number])).all()
+
+
+def _agreement(stroke: Stroke, repeats: Mapping[str, Array]) -> float | None:
+    """Return the share of repeats whose heading lies within 60 degrees of the direction told, as the analysis asks."""
+    if stroke.direction is None or "heading" not in repeats:
+        return None
+    return float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))
 
 
 class FrictionDraws(NamedTuple):
@@ -193,14 +110,29 @@ def friction_draws(
 
     They are the draws that `stroke_intervals` takes its quantiles from; an error of calibration moves both alike.
     """
-    chosen = settings or BootstrapSettings()
-    if stroke.curve is None or len(stroke.curve.time) < 3:
-        return None
-    found = _Repeats(stroke, stroke.curve, chosen, np.random.default_rng([chosen.seed, number])).all()
+    repeats = _repeats(stroke, number, settings or BootstrapSettings())
     name = "mu_max" if rule == "maximum" else "mu_dynamic"
-    if name not in found or "tau_max" not in found:
+    if name not in repeats or "tau_max" not in repeats:
         return None
-    return FrictionDraws(found[name], found["tau_max"], found.get("normal_force"))
+    return FrictionDraws(repeats[name], repeats["tau_max"], repeats.get("normal_force"))
+
+
+def mean_inflation(blocks: Array, settings: BootstrapSettings) -> tuple[float, float]:
+    """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
+
+    Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
+    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Found in n blocks about their own mean, r comes out too
+    small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
+    """
+    n = len(blocks)
+    off = blocks - blocks.mean()
+    squares = float(off @ off)
+    lag_one = 0.0 if squares == 0.0 else float(off[1:] @ off[:-1]) / squares
+    alike = settings.most_alike
+    if n > 4:
+        alike = min(max((lag_one + 1.0 / n) / (1.0 - 4.0 / n), 0.0), alike)
+    further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
+    return further, max(n / further**2 - 1.0, settings.least_free)
 
 
 class _Repeats:
@@ -254,15 +186,16 @@ class _Repeats:
     def _crest(self, force: Array) -> Array:
         """Return how far the true greatest unfiltered force may lie from the one told (repeats,) [N]."""
         missed = self._curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
-        return self._top(force, self._curve.crest_noise, alike=0.0) + missed
+        return self._top(force, self._curve.crest_noise, filtered=False) + missed
 
-    def _top(self, force: Array, noise: float, alike: float = 0.25) -> Array:
+    def _top(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
         """Return how far the true greatest force may lie from the one told (repeats,) [N].
 
         Noise has raised the one told about as far as noise drawn once more raises that on average.
         """
         high = force[force >= self._settings.top_share * np.nanmax(force)]
-        every = max(1, round(alike * self._settings.block / self._step))  # filtered readings nearer than it are alike
+        alike = self._settings.top_alike * self._settings.block if filtered else 0.0
+        every = max(1, round(alike / self._step))
         high = high[::every]
         tops = (high + noise * self._draw.standard_normal((self._settings.repeats, len(high)))).max(axis=1)
         return tops - 2.0 * tops.mean() + high.max()
@@ -299,7 +232,7 @@ class _Repeats:
         total = weight.sum(axis=1)
         means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
         # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
-        further, free = mean_inflation(blocks[:, 0])
+        further, free = mean_inflation(blocks[:, 0], settings)
         further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
         lightness = float(blocks[:, 1].mean())
         mu = self._stroke.mu_dynamic + (means[:, 0] - blocks[:, 0].mean()) * further
@@ -342,7 +275,7 @@ class _Repeats:
             shortest = stroke.steady[1] - self._settings.inwards * (stroke.steady[1] - stroke.steady[0])
             zero = (self._zero_t, self._zero_n)
             peaked = stroke.mu_static is not None
-            draws = break_away_draws(columns, shortest, self._settings.block, zero, self._draw, peaked=peaked)
+            draws = break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
             found |= {} if draws is None else {"break_away": draws}
         if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
@@ -357,15 +290,15 @@ class _Repeats:
         onset, curve = self._stroke.onset, self._curve
         if onset is None or "onset" in self._stroke.decided:
             return {}
-        quiet = curve.felt[curve.time < onset - self._settings.quiet_before]
+        quiet = curve.unfiltered[curve.time < onset - self._settings.quiet_before]
         quiet = quiet[np.isfinite(quiet)]
         if len(quiet) < self._settings.fewest_quiet:
             return {}
         noise = float(quiet.std())
         # How large the noise is, and with it the threshold, is told from these readings too.
-        band = DetectorSettings().leave_noise * noise / np.sqrt(2.0 * len(quiet))
+        band = self._settings.detector.leave_noise * noise / np.sqrt(2.0 * len(quiet))
         wrong = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
-        draws = onset_draws((curve.time, curve.felt), onset, noise, wrong, self._draw)
+        draws = onset_draws((curve.time, curve.unfiltered), onset, noise, wrong, self._settings, self._draw)
         return {} if draws is None else {"onset": draws}
 
     def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:

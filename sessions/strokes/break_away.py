@@ -7,25 +7,15 @@ where the contact's edge slips before its middle: by a power of the time that is
 (Mindlin and Deresiewicz 1953, J. Appl. Mech. 20:327).
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import AnalysisSettings, ClimbSettings
 
 Array = NDArray[np.float64]
-
-_BENDS = (1.0, 2.0)  # from which the power of a climb is sought [-] ...
-_FALLS = (0.05, 0.15)  # ... and in which a static peak falls to 1/e [s]
-_LIMITS = ((0.5, 4.0), (0.005, 1.0))  # of both
-_FEWEST = 5  # readings of the climb, and of the level
-_FEW = 400  # at most so many means stand for the readings
-_CANDIDATES = 41  # instants at which rest or level may meet the climb
-_SHORTEST = 1e-3  # a climb takes so long [s]
-_STEPS = 60  # of Levenberg's and Marquardt's method at most
-_STILL = 1e-10  # of the squares: a fit that gains no more has settled
-_SURELY = 6.6  # ratio of variances (F) from which a climb is not straight: once in a hundred by chance
 
 
 class Climb(NamedTuple):
@@ -72,103 +62,107 @@ def break_away(time: Array, ratio: Array, settings: AnalysisSettings, *, peaked:
     where a static peak was found. A climb counts where it explains most of what a level alone leaves, and rises by a
     share of the level (`stick_rise`).
     """
-    held = np.isfinite(ratio)
-    t, y = thin(time[held]), thin(ratio[held])
-    fit = fit_climb(t, y, settings.filter.block, peaked=peaked)
-    if fit is None:
+    finite = np.isfinite(ratio)
+    most = settings.climb.climb_most
+    readings = ClimbReadings(thin(time[finite], most), thin(ratio[finite], most), settings.climb)
+    climb = readings.fit(settings.filter.block, peaked=peaked)
+    if climb is None or climb.rise + climb.peak < settings.ratio.stick_rise * (climb.rest + climb.rise):
         return None
-    climbing = fit.rise + fit.peak >= settings.ratio.stick_rise * (fit.rest + fit.rise) > 0.0
-    return fit.meets if climbing and _mean_square(fit, t, y) <= settings.ratio.stick_left * float(y.var()) else None
+    explained = readings.mean_square(climb) <= settings.ratio.stick_left * float(readings.ratio.var())
+    return climb.meets if explained and climb.rest + climb.rise > 0.0 else None
 
 
-def fit_climb(t: Array, y: Array, block: float, *, peaked: bool) -> Climb | None:
-    """Return the climb that T/N `y` (n,) [-] at `t` (n,) [s] has had; None of too few readings.
-
-    A straight one, unless it surely leaves more than one that bends; readings are alike over `block` [s]. `peaked` lets
-    what is above the level fall.
-    """
-    if len(t) < 2 * _FEWEST + 1:
-        return None
-    falls = _FALLS if peaked else (0.0,)
-    at = _straight_climb(t, y)
-    straight = min(
-        (refine(_guess(at, t, y, 1.0, fall), t, y) for fall in falls), key=lambda one: _mean_square(one, t, y)
-    )
-    starts = [_guess(at, t, y, bend, straight.fall) for bend in _BENDS]
-    bent = min((refine(one, t, y, bends=True) for one in starts), key=lambda one: _mean_square(one, t, y))
-    free = max((float(t[-1]) - float(t[0])) / block - 5.0, 1.0)
-    surely = (_mean_square(straight, t, y) - _mean_square(bent, t, y)) * free > _SURELY * _mean_square(bent, t, y)
-    return bent if surely else straight
-
-
-def refine(fit: Climb, t: Array, y: Array, *, bends: bool = False) -> Climb:
-    """Return the fit that leaves least of `y` (n,) at `t` (n,) near a first one (Levenberg 1944, Marquardt 1963)."""
-    least, damping = _mean_square(fit, t, y), 1e-3
-    for _ in range(_STEPS):
-        free = free_numbers(fit, t, bends=bends)
-        slopes = fit.slopes(t)[:, free]
-        normal, right = slopes.T @ slopes, slopes.T @ (y - fit.at(t))
-        moved = np.array(fit)
-        moved[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
-        new = _bounded(moved, t)
-        left = _mean_square(new, t, y)
-        if left < least:
-            gained, fit, least, damping = least - left, new, left, damping / 10.0
-            if gained < _STILL * left:
-                break
-        elif (damping := damping * 10.0) > 1e9:
-            break
-    return fit
-
-
-def free_numbers(fit: Climb, t: Array, *, bends: bool) -> list[int]:
-    """Return which of the seven numbers of a climb readings at `t` (n,) [s] tell."""
-    free = [1, 4, 5]
-    free += [0] if fit.begins > t[0] else []
-    free += [2] if bends else []
-    return sorted(free + ([3, 6] if fit.fall > 0.0 else []))
-
-
-def thin(column: Array) -> Array:
-    """Return readings, or where there are many of them, means of as many neighbours each."""
-    edges = np.arange(0, len(column), -(-len(column) // _FEW))
+def thin(column: Array, most: int) -> Array:
+    """Return readings, or where there are more than `most` of them, means of as many neighbours each."""
+    edges = np.arange(0, len(column), -(-len(column) // most))
     return np.add.reduceat(column, edges) / np.diff(np.append(edges, len(column))) if len(column) else column
 
 
-def _straight_climb(t: Array, y: Array) -> tuple[float, float]:
-    """Return the instants between which a straight climb fits best, among all pairs of some."""
-    at = np.linspace(float(t[0]), float(t[-_FEWEST - 1]), _CANDIDATES)
-    begins, meets = (at[index] for index in np.triu_indices(_CANDIDATES, 1))
-    late = meets >= t[_FEWEST]
-    begins, meets = begins[late], meets[late]
-    done = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
-    done -= done.mean(axis=1)[:, None]
-    explained = np.maximum(done @ (y - y.mean()), 0.0) ** 2 / (done**2).sum(axis=1)
-    best = int(np.argmax(explained))
-    return float(begins[best]), float(meets[best])
+@dataclass(frozen=True, slots=True, eq=False)
+class ClimbReadings:
+    """Readings to which a climb is fitted; n of them."""
 
+    time: Array  # (n,) [s]
+    ratio: Array  # (n,) T/N [-]
+    settings: ClimbSettings
 
-def _guess(at: tuple[float, float], t: Array, y: Array, bend: float, fall: float) -> Climb:
-    """Return a climb of a kind between two instants, its heights fitted."""
-    begins, meets = at[0], min(at[1] + (bend - 1.0) * (at[1] - at[0]), float(t[-_FEWEST - 1]))
-    kind = Climb(begins, meets, bend, fall, 0.0, 1.0, 0.0)
-    columns = kind.slopes(t)[:, [4, 5, 6] if fall > 0.0 else [4, 5]]
-    heights = np.linalg.lstsq(columns, y, rcond=None)[0].tolist()
-    return Climb(*kind[:4], *heights, *([] if fall > 0.0 else [0.0]))
+    def fit(self, block: float, *, peaked: bool) -> Climb | None:
+        """Return the climb that the readings have had; None of too few readings.
 
+        A straight one, unless it surely leaves more than one that bends; readings are alike over `block` [s]. `peaked`
+        lets what is above the level fall.
+        """
+        if len(self.time) < 2 * self.settings.climb_fewest + 1:
+            return None
+        ends = self._straight()
+        falls = self.settings.climb_falls if peaked else (0.0,)
+        straight = min((self.refine(self._guess(ends, 1.0, fall)) for fall in falls), key=self.mean_square)
+        guesses = [self._guess(ends, bend, straight.fall) for bend in self.settings.climb_bends]
+        bent = min((self.refine(guess, bends=True) for guess in guesses), key=self.mean_square)
+        free = max((float(self.time[-1]) - float(self.time[0])) / block - 5.0, 1.0)
+        least, gain = self.mean_square(bent), self.mean_square(straight) - self.mean_square(bent)
+        return bent if gain * free > self.settings.climb_bends_surely * least else straight
 
-def _bounded(numbers: Array, t: Array) -> Climb:
-    """Return the climb of seven numbers, brought to where it can be fitted."""
-    begins, meets, bend, fall, rest, rise, peak = numbers.tolist()
-    meets = float(np.clip(meets, t[_FEWEST], t[-_FEWEST - 1]))
-    begins = float(np.clip(begins, t[0], meets - _SHORTEST))
-    (low, high), (shortest, longest) = _LIMITS
-    fall = float(np.clip(fall, shortest, longest)) if fall != 0.0 else 0.0
-    return Climb(begins, meets, float(np.clip(bend, low, high)), fall, rest, max(rise, 0.0), max(peak, 0.0))
+    def refine(self, climb: Climb, *, bends: bool = False) -> Climb:
+        """Return the climb near a first one that leaves least of the readings (Levenberg 1944, Marquardt 1963)."""
+        least, damping = self.mean_square(climb), 1e-3
+        for _ in range(self.settings.climb_steps):
+            free = self.free_numbers(climb, bends=bends)
+            slopes = climb.slopes(self.time)[:, free]
+            normal, right = slopes.T @ slopes, slopes.T @ (self.ratio - climb.at(self.time))
+            numbers = np.array(climb)
+            numbers[free] += np.linalg.lstsq(normal + damping * np.diag(np.diag(normal)), right, rcond=None)[0]
+            new = self._bounded(numbers)
+            left = self.mean_square(new)
+            if left < least:
+                gain, climb, least, damping = least - left, new, left, damping / 10.0
+                if gain < self.settings.climb_still * left:
+                    break
+            elif (damping := damping * 10.0) > 1e9:
+                break
+        return climb
 
+    def free_numbers(self, climb: Climb, *, bends: bool) -> list[int]:
+        """Return the positions of the numbers of a climb that the readings can move."""
+        free = [1, 4, 5]
+        free += [0] if climb.begins > self.time[0] else []
+        free += [2] if bends else []
+        return sorted(free + ([3, 6] if climb.fall > 0.0 else []))
 
-def _mean_square(fit: Climb, t: Array, y: Array) -> float:
-    return float(((y - fit.at(t)) ** 2).mean())
+    def mean_square(self, climb: Climb) -> float:
+        """Return the mean square of what a climb leaves of T/N [-]."""
+        return float(((self.ratio - climb.at(self.time)) ** 2).mean())
+
+    def _straight(self) -> tuple[float, float]:
+        """Return the instants between which a straight climb fits best, among all pairs of a grid."""
+        few, count, t, y = self.settings.climb_fewest, self.settings.climb_candidates, self.time, self.ratio
+        grid = np.linspace(float(t[0]), float(t[-few - 1]), count)
+        begins, meets = (grid[index] for index in np.triu_indices(count, 1))
+        late = meets >= t[few]
+        begins, meets = begins[late], meets[late]
+        done = 1.0 - np.clip((meets[:, None] - t) / (meets - begins)[:, None], 0.0, 1.0)
+        done -= done.mean(axis=1)[:, None]
+        explained = np.maximum(done @ (y - y.mean()), 0.0) ** 2 / (done**2).sum(axis=1)
+        best = int(np.argmax(explained))
+        return float(begins[best]), float(meets[best])
+
+    def _guess(self, ends: tuple[float, float], bend: float, fall: float) -> Climb:
+        """Return a climb of a kind between two instants, its heights fitted."""
+        last = float(self.time[-self.settings.climb_fewest - 1])
+        kind = Climb(ends[0], min(ends[1] + (bend - 1.0) * (ends[1] - ends[0]), last), bend, fall, 0.0, 1.0, 0.0)
+        columns = kind.slopes(self.time)[:, [4, 5, 6] if fall > 0.0 else [4, 5]]
+        heights = np.linalg.lstsq(columns, self.ratio, rcond=None)[0].tolist()
+        return Climb(*kind[:4], *heights, *([] if fall > 0.0 else [0.0]))
+
+    def _bounded(self, numbers: Array) -> Climb:
+        """Return the climb of seven numbers, brought to where it can be fitted."""
+        begins, meets, bend, fall, rest, rise, peak = numbers.tolist()
+        few, t = self.settings.climb_fewest, self.time
+        meets = float(np.clip(meets, t[few], t[-few - 1]))
+        begins = float(np.clip(begins, t[0], meets - self.settings.climb_shortest))
+        fall = float(np.clip(fall, *self.settings.climb_fall_limits)) if fall != 0.0 else 0.0
+        bend = float(np.clip(bend, *self.settings.climb_bend_limits))
+        return Climb(begins, meets, bend, fall, rest, max(rise, 0.0), max(peak, 0.0))
 
 
 def _parts(fit: Climb, t: Array) -> Array:

@@ -10,21 +10,20 @@ speed, at which it is told, that decides.
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.break_away import fit_climb, free_numbers, refine, thin
-from sessions.strokes.onset import DetectorSettings, onset_threshold
+from sessions.strokes.bootstrap_settings import BootstrapSettings
+from sessions.strokes.break_away import ClimbReadings, thin
+from sessions.strokes.onset import onset_threshold
 
 Array = NDArray[np.float64]
 
-_DETECTOR = DetectorSettings()
-_ENDS = 5  # of the fit, from that of the steady window inwards
-_FEWEST = 3  # readings that tell how steeply the force climbs
-_MOST = 400  # readings about the crossing in which noise is drawn
-_LEAST_STEEP = 0.2  # of its mean steepness, to which a force that bends may be told to have climbed there
-_REACH = 4.0  # standard deviations of the noise within which it may move the crossing
-
 
 def onset_draws(
-    columns: tuple[Array, Array], onset: float, noise: float, zero: Array, draw: np.random.Generator
+    columns: tuple[Array, Array],
+    onset: float,
+    noise: float,
+    zero: Array,
+    settings: BootstrapSettings,
+    draw: np.random.Generator,
 ) -> Array | None:
     """Return where the force may have left its noise (repeats,) [s]; None where it had left it before the onset.
 
@@ -32,19 +31,20 @@ def onset_draws(
     N [N] (n,) from before the contact on, `noise` that of N and `zero` how wrong its zero may be (repeats,) [N].
     """
     time, force = columns
+    fewest, detector = settings.onset_fewest, settings.detector
     at = int(np.searchsorted(time, onset))
-    if at == 0 or len(time) < at + _FEWEST or force[at - 1] > onset_threshold(noise, _DETECTOR):
+    if at == 0 or len(time) < at + fewest or force[at - 1] > onset_threshold(noise, detector):
         return None
-    climbing = force[at:] < 2.0 * max(_DETECTOR.leave_noise * noise, float(force[at]))
-    held = slice(at - 1, at + max(_FEWEST, int(np.argmin(climbing)) + 1))
+    climbing = force[at:] < 2.0 * max(detector.leave_noise * noise, float(force[at]))
+    held = slice(at - 1, at + max(fewest, int(np.argmin(climbing)) + 1))
     step = float(np.median(np.diff(time[held])))
     # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
     bend, slope, _ = np.polyfit(time[held] - (onset - step / 2.0), force[held], 2).tolist()
     whole = float(np.polyfit(time[held], force[held], 1)[0])
-    slope = max(slope if bend > 0.0 else whole, _LEAST_STEEP * whole)
+    slope = max(slope if bend > 0.0 else whole, settings.onset_steep * whole)
     if slope <= 0.0:
         return None
-    reach = min(_REACH * noise / slope, _MOST * step / 2.0)
+    reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
     places = np.arange(-reach, reach + step, step)
     # Readings of each repeat, told from the crossing: the first lies anywhere within a step.
     since = places + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
@@ -57,8 +57,8 @@ def onset_draws(
 def break_away_draws(
     columns: tuple[Array, Array, Array],
     shortest: float,
-    block: float,
     zero: tuple[Array, Array],
+    settings: BootstrapSettings,
     draw: np.random.Generator,
     *,
     peaked: bool,
@@ -67,36 +67,40 @@ def break_away_draws(
 
     `columns` are time [s], T/N [-] and N [N] (n,) from the contact to the end of the steady window; the fit ends at one
     of some instants from there back to `shortest` [s]. `zero` is how wrong the zero of T and of N may be (repeats,)
-    [N]; `block` [s] is how long neighbours are alike. `peaked` where a static peak was found. Each repeat moves the
-    break-away as its deviations move the fit, to first order.
+    [N]. `peaked` where a static peak was found. Each repeat moves the break-away as its deviations move the fit, to
+    first order.
     """
     last = float(columns[0][-1])
     held = np.isfinite(columns[1])
     time, ratio, normal = (column[held] for column in columns)
-    whole = fit_climb(thin(time), thin(ratio), block, peaked=peaked)
+
+    def readings(until: float) -> tuple[ClimbReadings, Array]:
+        t, y, n = (thin(column[time <= until], settings.climb.climb_most) for column in (time, ratio, normal))
+        return ClimbReadings(t, y, settings.climb), n
+
+    whole = readings(last)[0].fit(settings.block, peaked=peaked)
     if whole is None:
         return None
     bends = whole.bend != 1.0
-    found: list[Array] = []
-    parts = np.array_split(np.arange(len(zero[0])), _ENDS)
-    for number, part in enumerate(parts):
-        inside = time <= last + (shortest - last) * number / (_ENDS - 1)
-        t, y, n = thin(time[inside]), thin(ratio[inside]), thin(normal[inside])
-        fit = refine(whole, t, y, bends=bends)
+    draws: list[Array] = []
+    for number, part in enumerate(np.array_split(np.arange(len(zero[0])), settings.climb_ends)):
+        series, n = readings(last + (shortest - last) * number / (settings.climb_ends - 1))
+        t, y = series.time, series.ratio
+        fit = series.refine(whole, bends=bends)
         if fit.rise <= 0.0:
             return None
-        edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / block), prepend=-1.0))
-        climbing = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
+        edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
+        blocks = float(np.searchsorted(t[edges], fit.meets) - np.searchsorted(t[edges], fit.begins))
         # Two or three numbers were fitted to the climb's few blocks: what is left is less, and tells little of itself.
-        free = max(climbing - 2.0 - bends, 1.0)
-        wild = np.sqrt(max(climbing, 1.0) / draw.chisquare(free, len(part)))[:, None]
-        factors = wild * draw.standard_normal((len(part), len(edges)))
-        numbers = free_numbers(fit, t, bends=bends)
+        free = max(blocks - 2.0 - bends, 1.0)
+        scale = np.sqrt(max(blocks, 1.0) / draw.chisquare(free, len(part)))[:, None]
+        factors = scale * draw.standard_normal((len(part), len(edges)))
+        numbers = series.free_numbers(fit, bends=bends)
         moves = np.linalg.pinv(fit.slopes(t)[:, numbers])[numbers.index(1)]  # (n,) [s] by T/N
         by_blocks = np.add.reduceat(moves * (y - fit.at(t)), edges)
-        wrong_t, wrong_n = (each[part] for each in zero)
-        found.append(fit.meets + factors @ by_blocks + wrong_t * (moves @ (1.0 / n)) - wrong_n * (moves @ (y / n)))
-    return np.concatenate(found)
+        zero_t, zero_n = (each[part] for each in zero)
+        draws.append(fit.meets + factors @ by_blocks + zero_t * (moves @ (1.0 / n)) - zero_n * (moves @ (y / n)))
+    return np.concatenate(draws)
 
 
 def slide_onset_draws(time: Array, speed: Array, told: Array, noise: Array, draw: np.random.Generator) -> Array | None:

@@ -67,7 +67,7 @@ def level(wrench: Array, lean: tuple[float, float]) -> Array:
 
     A rotation by the shortest way, so torques turn along.
 
-    >>> (levelled(np.array([[-1.0, 0, 0, 0, 0, 0]]), (90.0, 0.0)).round(9) + 0.0).tolist()
+    >>> (level(np.array([[-1.0, 0, 0, 0, 0, 0]]), (90.0, 0.0)).round(9) + 0.0).tolist()
     [[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]]
     """
     if lean == (0.0, 0.0):

@@ -26,6 +26,7 @@ class DetectorSettings:
     lift_hold: float = 0.020  # ... for so long [s]
     baseline: float = 0.3  # unloaded stretch that gives zero and noise [s]
     baseline_readings: int = 12  # and the fewest readings it may have
+    baseline_parts: int = 6  # in which it is renewed
     quiet_noise: float = 2.0  # it is unloaded when its spread stays within so many times the noise [-] ...
     quiet_floor: float = 0.02  # ... or within this, for readings that were smoothed before they came [N]
 
@@ -69,9 +70,8 @@ class ContactDetector:
         """Start with nothing known, or with a baseline measured elsewhere, which then stays as given."""
         self._settings = settings or DetectorSettings()
         self._follows = baseline is None
-        self._bins: deque[list[float]] = deque(
-            maxlen=_BINS + 1
-        )  # finished ones; the newest may hold a touch's first part
+        # Finished ones; the newest may hold a touch's first part.
+        self._bins: deque[list[float]] = deque(maxlen=self._settings.baseline_parts + 1)
         self._bin: list[float] = []
         self._bin_start: float | None = None
         self._touching = False
@@ -159,7 +159,7 @@ class ContactDetector:
         """Keep the readings of the last stretch in bins, and take zero and noise from them when they are quiet."""
         if self._bin_start is None:
             self._bin_start = t
-        if t - self._bin_start >= self._settings.baseline / _BINS - _ROUNDING:
+        if t - self._bin_start >= self._settings.baseline / self._settings.baseline_parts - _ROUNDING:
             self._bins.append(self._bin)
             self._bin, self._bin_start = [], t
             if len(self._bins) == self._bins.maxlen:
@@ -176,7 +176,6 @@ class ContactDetector:
         self._lift = self._settings.lift_fraction * self._threshold
 
 
-_BINS = 6  # parts of the unloaded stretch
 _ROUNDING = 1e-9  # times are sums of ticks [s]
 
 

@@ -10,6 +10,7 @@ from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.onset import DetectorSettings
 
 ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where nobody stated the transducer's own [-]
+TILT_PRIOR = 1.0  # standard uncertainty of the lean about an axis: 1 mm under one end of a sample 60 mm long [degrees]
 
 WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
 
@@ -61,6 +62,7 @@ class ZeroSettings:
     # ... and torques spread by less than this times the range of N: a standard deviation of 1 mm in 0.3 s is a centre
     # of pressure that moves at 11.5 mm/s, slower than the slowest published stroke (13 mm/s) [mm]
     quiet_moves: float = 1.0
+    quiet_hops: int = 6  # windows start at every sixth of their length
     quiet_gap: float = 1.5  # a window that takes so many times its length holds a gap [-]
     zero_stretch: float = 0.6  # most of the unloaded stretch that gives the zero [s]
     near: float = 1.0  # unloaded forces so near a stroke tell how far its zero can be trusted [s]
@@ -85,6 +87,9 @@ class ContactSettings:
     gap_beside: float = 2.5  # readings: a contact so near to unsound ones may go on in them
     slow_onset: float = 0.5  # from onset to a fifth of the peak; a finger takes a tenth of it [s]
     greatest_force: float = 200.0  # a greater normal force is no finger's [N]
+    pull_share: float = 0.5  # a recording that pulls so much of what it presses has another normal axis [-]
+    curve_before: float = 0.25  # a stroke's curve begins so long before its onset [s] ...
+    curve_after: float = 0.15  # ... and ends so long after its lift [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +104,7 @@ class SteadySettings:
     steady_shortest: float = 0.05  # ... in time [s] ...
     steady_readings: int = 5  # ... and in readings
     steady_held: float = 0.95  # share of a window's readings that must have a ratio [-]
+    steady_edges: int = 121  # windows begin and end on a grid of so many instants
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +140,7 @@ class RatioSettings:
     static_noise: float = 3.0  # ... and so many standard deviations of the noise of T/N [-] ...
     static_after: float = 0.2  # ... that follows it for so long [s]; ...
     static_late: float = 0.1  # ... it may come so long after the slide began [s]
+    law_fewest: int = 5  # block means of which a power of N and its error are told
     law_steepest: float = -1.0 / 3.0  # power by which mu may follow N unseen: T as the area of a Hertz contact [-]
     slip_within: float = 0.02  # a slip drops T/N within so long: a fifth of a period at 10 Hz [s] ...
     slip_share: float = 0.05  # ... by this share of its level, as a static peak stands out [-] ...
@@ -142,6 +149,23 @@ class RatioSettings:
     slips_upwards: float = 1.0 / 3.0  # climbs as sudden, for each slip, at most: hum has one for each [-]
     stick_rise: float = 0.1  # a stick phase: T/N climbs by this share of its level before it stays there [-] ...
     stick_left: float = 0.5  # ... and the climb leaves no more than this share of its variance [-]
+
+
+@dataclass(frozen=True, slots=True)
+class ClimbSettings:
+    """How the climb of T/N before the break-away is fitted."""
+
+    climb_bends: tuple[float, float] = (1.0, 2.0)  # from which the power of a climb is sought [-] ...
+    climb_bend_limits: tuple[float, float] = (0.5, 4.0)  # ... and between which it stays [-]
+    climb_falls: tuple[float, float] = (0.05, 0.15)  # from which the fall of a static peak to 1/e is sought [s] ...
+    climb_fall_limits: tuple[float, float] = (0.005, 1.0)  # ... and between which it stays [s]
+    climb_fewest: int = 5  # readings of the climb, and of the level
+    climb_most: int = 400  # at most so many means stand for the readings
+    climb_candidates: int = 41  # instants at which rest or level may meet the climb
+    climb_shortest: float = 1e-3  # a climb takes so long [s]
+    climb_steps: int = 60  # of Levenberg's and Marquardt's method at most
+    climb_still: float = 1e-10  # a fit that gains no more than this share of the squares has settled [-]
+    climb_bends_surely: float = 6.6  # ratio of variances from which a climb is not straight: 1 in 100 by chance [-]
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +186,7 @@ class SystematicSettings:
     # Standard uncertainty of what each force shows of another [-]; None: that of a gain. A certificate states one error
     # of an axis in per cent of full scale, whatever is loaded, so it holds for gain and cross-talk alike.
     cross_talk: float | None = None
-    tilt_prior: float = 1.0  # of the lean about each axis: 1 mm under one end of a sample 60 mm long [degrees]
+    tilt_prior: float = TILT_PRIOR  # of the lean about each axis [degrees]
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +201,7 @@ class AnalysisSettings:
     steady: SteadySettings = field(default_factory=SteadySettings)
     slide: SlideSettings = field(default_factory=SlideSettings)
     ratio: RatioSettings = field(default_factory=RatioSettings)
+    climb: ClimbSettings = field(default_factory=ClimbSettings)
     press: PressSettings = field(default_factory=PressSettings)
     systematic: SystematicSettings = field(default_factory=SystematicSettings)
     area: AreaLaw = FIXED  # by which tau_max is told

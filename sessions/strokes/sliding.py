@@ -16,10 +16,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Places = NDArray[np.int64]
 
-_EDGES = 121  # windows begin and end on a grid of so many instants
 _QUARTERS = 4
-_ALIKE = 0.8  # most that neighbours may be alike: more cannot be told from so few
-_LEAST_FREE = 2.0  # degrees of freedom, likewise
 _ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
 
 
@@ -46,9 +43,8 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
         return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
     if not steady.any():
         return None
-    best = _least(
-        length, variance, steady, max(settings.steady.steady_seed * np.isfinite(ratio).sum(), shortest), len(ratio)
-    )
+    seed = max(settings.steady.steady_seed * np.isfinite(ratio).sum(), shortest)
+    best = _least(length, variance, steady, seed, len(ratio) / (settings.steady.steady_edges - 1))
     if settings.steady.steady_rule == "least variance":
         return slice(int(first[best]), int(last[best]))
     around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
@@ -58,7 +54,7 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
 
 def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tuple[Places, Places, Array, Mask]:
     """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
-    edges = np.unique(np.linspace(0, len(ratio), _EDGES).round().astype(int))
+    edges = np.unique(np.linspace(0, len(ratio), settings.steady.steady_edges).round().astype(int))
     held = np.isfinite(ratio)
     value = np.where(held, ratio, 0.0)
     count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (held, value, value**2))
@@ -82,11 +78,14 @@ def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tup
     return first, last, variance, steady
 
 
-def _least(length: Places, variance: Array, steady: Mask, wanted: float, readings: int) -> int:
-    """Return which steady stretch of the wanted length varies least; of the longest, where all are shorter."""
-    enough = length[steady & (length >= wanted)]
+def _least(length: Places, variance: Array, steady: Mask, shortest: float, grid: float) -> int:
+    """Return which steady stretch of about the `shortest` length varies least; of the longest, where none is as long.
+
+    Lengths within a step of the `grid` are alike.
+    """
+    enough = length[steady & (length >= shortest)]
     least = int(enough.min()) if len(enough) else int(length[steady].max())
-    alike = np.flatnonzero(steady & (length >= least) & (length <= least + readings / (_EDGES - 1)))
+    alike = np.flatnonzero(steady & (length >= least) & (length <= least + grid))
     return int(alike[np.argmin(variance[alike])])
 
 
@@ -98,22 +97,6 @@ def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     with np.errstate(invalid="ignore"):
         inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
-
-
-def mean_inflation(blocks: Array) -> tuple[float, float]:
-    """Return how much further than that of independent blocks (k,) their mean strays, and its degrees of freedom.
-
-    Neighbours that are alike count for fewer: of a first-order autoregression n (1 - r) / (1 + r) are independent
-    (Bayley and Hammersley 1946, Suppl. J. R. Stat. Soc. 8:184). Found in n blocks about their own mean, r comes out too
-    small by (1 + 4 r) / n (Marriott and Pope 1954, Biometrika 41:390; Kendall 1954, 41:403), which is put right here.
-    """
-    n = len(blocks)
-    off = blocks - blocks.mean()
-    squares = float(off @ off)
-    found = 0.0 if squares == 0.0 else float(off[1:] @ off[:-1]) / squares
-    alike = min(max((found + 1.0 / n) / (1.0 - 4.0 / n), 0.0), _ALIKE) if n > 4 else _ALIKE
-    further = ((1.0 + alike) / (1.0 - alike)) ** 0.5
-    return further, max(n / further**2 - 1.0, _LEAST_FREE)
 
 
 @dataclass(frozen=True, slots=True)

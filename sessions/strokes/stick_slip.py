@@ -12,8 +12,6 @@ from sessions.strokes.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
 
-_FEWEST = 5  # block means of which a power and its error are told
-
 
 @dataclass(frozen=True, slots=True)
 class StickSlip:
@@ -61,7 +59,7 @@ def power_of_normal_force(normal: Array, ratio: Array, length: int, settings: An
     with np.errstate(invalid="ignore"):
         held = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
     whole = np.count_nonzero(held) // length
-    if whole < _FEWEST:
+    if whole < settings.ratio.law_fewest:
         return steepest
     means = np.column_stack([np.log(normal[held]), np.log(ratio[held])])[: whole * length]
     x, y = means.reshape(whole, length, 2).mean(axis=1).T

@@ -6,15 +6,22 @@ from typing import Any
 import msgspec
 
 from sessions.json_document import complete
-from sessions.strokes.bootstrap import BootstrapSettings, StrokeIntervals
+from sessions.strokes.bootstrap import StrokeIntervals
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.decisions import Decision
 from sessions.strokes.flaws import Flaw
 from sessions.strokes.friction import FrictionParameters
 from sessions.strokes.stroke import Stroke
 from sessions.toml_file import SettingsError, from_table
 
-# What programs before 2026-11-23 did not draw, and their documents lack. Once no such document is read, this goes.
-_NOT_DRAWN = {name: getattr(BootstrapSettings(), name) for name in ("cross_talk", "tilt", "tilt_error", "tilt_origin")}
+# What documents of older programs lack: before 2026-11-23 the first four were not drawn, before 2026-11-25 the others
+# were not stored. Once no such document is read, this goes.
+_NEWER = (
+    *("cross_talk", "tilt", "tilt_error", "tilt_origin"),
+    *("top_alike", "most_alike", "least_free", "climb_ends", "detector", "climb"),
+    *("onset_fewest", "onset_most", "onset_steep", "onset_reach"),
+)
+_DEFAULTS = {name: getattr(BootstrapSettings(), name) for name in _NEWER}
 
 
 class _Intervals(msgspec.Struct):
@@ -47,6 +54,6 @@ def check_analysis(document: Mapping[str, Any]) -> None:
     beyond = [row.stroke for row in held.friction if not 0 <= row.stroke < len(held.strokes)]
     if beyond:
         raise SettingsError(f"it tells the friction of stroke {beyond[0]}, which it does not hold")
-    settings = {**_NOT_DRAWN, **held.bootstrap.settings}
+    settings = {**_DEFAULTS, **held.bootstrap.settings}
     complete({"settings": settings}, _Settings)
     from_table(settings, BootstrapSettings, "bootstrap")

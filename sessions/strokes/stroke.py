@@ -17,7 +17,7 @@ class StrokeCurve:
 
     time: Array  # (n,) [s, device time]
     normal: Array  # (n,) filtered normal force [N]
-    felt: Array  # (n,) the same as it was felt, not filtered: by it the contact's onset is told [N]
+    unfiltered: Array  # (n,) the same as it was felt, not filtered: by it the contact's onset is told [N]
     tangential: Array  # (n,) filtered tangential force [N]
     force: Array  # (n, 2) filtered force along x and y of the face [N]
     ratio: Array  # (n,) T/N [-]

@@ -13,8 +13,6 @@ from sessions.strokes.stroke import StrokeCurve
 
 Array = NDArray[np.float64]
 
-_AROUND = (0.25, 0.15)  # shown before onset and after lift [s]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
@@ -96,12 +94,12 @@ def curve_of(
 
     `missed` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
     """
-    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - _AROUND[0]))
-    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + _AROUND[1]))
+    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - settings.contact.curve_before))
+    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + settings.contact.curve_after))
     shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
     force = shown.wrench[:, :2]
-    dragging, felt = unfiltered_forces(span, slice(first, last), zero)
-    columns = (shown.time, shown.normal, felt, shown.tangential, force, shown.ratio, shown.position, shown.speed)
+    dragging, unfiltered = unfiltered_forces(span, slice(first, last), zero)
+    columns = (shown.time, shown.normal, unfiltered, shown.tangential, force, shown.ratio, shown.position, shown.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
     if missed is None:

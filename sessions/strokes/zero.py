@@ -10,7 +10,6 @@ from sessions.strokes.settings import AnalysisSettings
 
 Array = NDArray[np.float64]
 
-_HOPS = 6  # windows start at every sixth of their length
 _FORCES = slice(0, 3)
 _TORQUES = slice(3, 5)  # about x and y: those that tell the centre of pressure
 
@@ -74,7 +73,7 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
     """Return the bounds (k, 2) of the quiet, unloaded windows of so many readings."""
     if len(wrench) < length:
         return np.empty((0, 2), np.int64)
-    starts = np.arange(0, len(wrench) - length + 1, max(1, length // _HOPS))
+    starts = np.arange(0, len(wrench) - length + 1, max(1, length // settings.zero.quiet_hops))
     spread, noise = _spread(wrench[:, _FORCES], starts, length)
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
     floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))

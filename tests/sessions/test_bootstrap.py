@@ -116,7 +116,7 @@ def test_an_instant_that_a_person_decided_has_no_interval(strokes):
 def test_of_a_force_without_noise_the_onset_lies_anywhere_between_two_readings():
     time = np.arange(60) * 0.005
     force = 20.0 * np.maximum(time - 0.2013, 0.0)
-    draws = onset_draws((time, force), 0.205, 1e-9, np.zeros(4000), np.random.default_rng(0))
+    draws = onset_draws((time, force), 0.205, 1e-9, np.zeros(4000), BootstrapSettings(), np.random.default_rng(0))
     assert draws.min() == pytest.approx(0.2, abs=1e-5)
     assert draws.max() == pytest.approx(0.205, abs=1e-5)
     assert draws.mean() == pytest.approx(0.2025, abs=1e-4)
@@ -125,8 +125,12 @@ def test_of_a_force_without_noise_the_onset_lies_anywhere_between_two_readings()
 def test_an_onset_that_no_force_climbed_to_has_no_interval():
     time = np.arange(60) * 0.005
     draw = np.random.default_rng(0)
-    assert onset_draws((time, np.full(60, 2.0)), 0.205, 0.004, np.zeros(9), draw) is None  # it touched before
-    assert onset_draws((time, 2.0 - 8.0 * time), 0.0, 0.004, np.zeros(9), draw) is None  # the first reading
+    assert (
+        onset_draws((time, np.full(60, 2.0)), 0.205, 0.004, np.zeros(9), BootstrapSettings(), draw) is None
+    )  # it touched before
+    assert (
+        onset_draws((time, 2.0 - 8.0 * time), 0.0, 0.004, np.zeros(9), BootstrapSettings(), draw) is None
+    )  # the first reading
 
 
 def test_a_finger_that_slid_when_its_speed_was_first_known_began_at_any_instant_since_the_contact(strokes):

@@ -33,8 +33,8 @@ def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included():
 
 
 def test_a_session_is_analysed_without_waiting_for_the_whole_of_scipys_signals():
-    use = "import sys, numpy as np; from sessions.strokes.filters import low_passed, peaks; "
-    use += "low_passed(np.ones((20, 1)), 20.0, 200.0, 3); peaks(np.ones(3)); "
+    use = "import sys, numpy as np; from sessions.strokes.filters import low_pass, peaks; "
+    use += "low_pass(np.ones((20, 1)), 20.0, 200.0, 3); peaks(np.ones(3)); "
     done = subprocess.run(
         [sys.executable, "-c", use + "print('scipy.signal' in sys.modules, 'scipy.stats' in sys.modules)"],
         capture_output=True, text=True, check=True,
