@@ -11,7 +11,7 @@ from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from sessions.strokes import Analysis
 from solver import Finger, Prediction, Scene, SolveFailure, solve_many
 from solver.equilibrium.expected_depth import matching_depths
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 
 

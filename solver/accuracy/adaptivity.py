@@ -9,7 +9,7 @@ from solver.accuracy.finite_ends import end, relaxes, steps_asked
 from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.loads import forces_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps

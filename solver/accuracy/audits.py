@@ -38,7 +38,7 @@ def audits(
     push. `cone_violation`: |t| beyond min(mu p, tau_max), the bound on the deformed length, by the largest push.
     """
     mesh, condensed = finger.geometry.mesh, finger.newton.condensed
-    inner, grown = finger.inner_forces(displacement), finger.energy_growth(displacement)
+    inner, grown = finger.body.forces(displacement), finger.body.energy_growth(displacement)
     if overstress is not None:
         inner = inner + overstress
         grown += float(np.sum(overstress * displacement))
@@ -64,7 +64,7 @@ def audits(
         "penetration": max(-float(height.min()), 0.0) / state.load.depth,
         "tension": max(-float(state.normal.min(initial=0.0)), 0.0) / push,
         "cone_violation": max(float((np.abs(state.tangential) - limit).max(initial=0.0)), 0.0) / push,
-        "smallest_det_F": finger.smallest_det(displacement),
+        "smallest_det_F": finger.body.smallest_det(displacement),
     }
 
 
@@ -158,11 +158,11 @@ def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxin
     lost = -float(np.sum(mean[..., 0] * slip[..., 0]))
     friction = -np.sum(reaction[1:, :, 0] * slip[..., 0], axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
-    stored = newton.stored(states[-1])
+    stored = newton.condensed.stored(states[-1].u, states[-1].reaction)
     least = {"course_least_dissipation": float(friction.min()) / scale}
     if relaxing:
         return {"course_viscous_work": (bone - lost - stored) / scale} | least
-    elastic = newton.elastic_work(states, float(np.sum(mean * moved)))
+    elastic = newton.condensed.work([state.u for state in states], float(np.sum(mean * moved)))
     return {
         "course_work_balance": abs(elastic - stored) / scale,
         "course_step_work": abs(bone - stored - lost) / scale,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from solver.continuation.finite_states import course, depends_on_way
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.finite_relaxation import RelaxingCourse
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps

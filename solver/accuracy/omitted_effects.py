@@ -8,8 +8,7 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.receptor import Patches
 from solver.constitutive.hyperelastic import HUMAN_SKIN
-from solver.equilibrium.finger import Finger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.newton import EquilibriumState
 from solver.scene.scene import Material, Scene
 
@@ -129,7 +128,7 @@ def _course(scene: Scene) -> str:
 
 
 def _finite_strain(finger: LinearFinger, displacement: Array) -> dict[str, Any]:
-    small, large = finger.stretches(displacement)
+    small, large = finger.body.stretches(displacement)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     probes, weights = finger.ending.endings.probes, finger.ending.endings.weights
     gradient = probes.displacement_gradient(mesh, displacement)

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
-from solver.body.tissues import relaxing_laws
 from solver.continuation.small_states import settled
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger, relaxing_laws
 from solver.equilibrium.load_path import PRESSING_TIME, Aim
 from solver.equilibrium.loads import load_of
 from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay
@@ -143,7 +142,7 @@ def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[fl
     # Imported here: small strain need not wait for the compiled loops to be loaded.
     from solver.accuracy.adaptivity import MARGIN
     from solver.continuation.finite_states import roughly
-    from solver.equilibrium.finite_finger import FiniteFinger
+    from solver.equilibrium.finger import FiniteFinger
     from solver.equilibrium.finite_relaxation import RelaxingCourse
 
     finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))

@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.continuation.small_states import end, nearest
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.loads import forces_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps

@@ -1,8 +1,10 @@
-"""A body as Newton sees it: linearised about a state and condensed to the skin that may touch, k nodes of it."""
+"""A body: what is asked of it as a whole, and as Newton sees it, condensed to the k nodes of skin that may touch."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
-from solver.arrays import Array, Narrow
+from solver.arrays import Array, Indices, Narrow
+from solver.mesh.mesh import Mesh
 
 
 class CondensedBody(Protocol):
@@ -53,4 +55,54 @@ class CondensedBody(Protocol):
 
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
+        ...
+
+    def stored(self, u: Array, reaction: Array) -> float:
+        """Return the energy stored at displacements `u` that forces `reaction` (k, 2) hold [N mm per mm]."""
+        ...
+
+    def work(self, way: Sequence[Array], trapezoid: float) -> float:
+        """Return the work of the skin's forces along displacements, by the `trapezoid` rule so much [N mm per mm]."""
+        ...
+
+
+class Body(Protocol):
+    """A body of n nodes; displacements are relative to the bone or to whatever drives it [mm]."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """Its mesh."""
+        ...
+
+    @property
+    def condensed(self) -> CondensedBody:
+        """What Newton sees of it."""
+        ...
+
+    @property
+    def dofs(self) -> int:
+        """Number of unknown displacements."""
+        ...
+
+    def displacement(self, u: Array, only: Indices | None = None) -> Array:
+        """Return the displacements (n, 2, ...) of all nodes for those of one state or of several.
+
+        With `only` (node numbers), other nodes may be left at 0.
+        """
+        ...
+
+    def following(self, skin: Array) -> Array:
+        """Return the small displacements (n, 2, c) that go with those of the skin (2 k, c)."""
+        ...
+
+    def forces(self, displacement: Array) -> Array:
+        """Return the forces (n, 2) that hold all nodes at `displacement` (n, 2) [N/mm]."""
+        ...
+
+    def energy_growth(self, displacement: Array) -> float:
+        """Return by how much the stored energy grows as `displacement` (n, 2) grows by a part of itself [N]."""
+        ...
+
+    def smallest_det(self, displacement: Array) -> float:
+        """Return the least det F [-] at `displacement` (n, 2); not positive where tissue is inside out."""
         ...

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
@@ -18,10 +20,11 @@ from solver.linalg.multifrontal import Elimination, symbolic_factorization
 from solver.mesh.mesh import Mesh, distinct
 from solver.quantities import QUANTITIES, LocalState
 
+IMAGINARY = 1e-30  # step whose square is nothing [-]
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: memory for its tangent is set aside when first asked for
 class FiniteBody:
     """Elements, their unknowns and the skin that may touch; e elements, n unknowns, k nodes of skin.
 
@@ -97,31 +100,21 @@ class FiniteBody:
         )
 
     @property
-    def skin(self) -> Indices:
-        """Nodes of the skin that may touch (k,)."""
-        return self.mesh.skin
-
-    def place(self, u: Array) -> Array:
-        """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
-        return self.mesh.nodes[self.skin] + u[self.skin]
-
-    def nodal(self, local: Array) -> Array:
-        """Return the forces (nodes, 2) on nodes that forces (e, 18) on those of the elements add up to."""
-        out = np.zeros(self.mesh.nodes.shape)
-        np.add.at(out, self.nodes, local.reshape(-1, 9, 2))
-        return out
-
-    def undeformed(self) -> tuple[Array, Array]:
-        """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
-        return np.zeros(self.mesh.nodes.shape), np.zeros((len(self.nodes), 3))
-
-    @property
     def elements(self) -> ElementArrays:
         """The elements as loops take them."""
         return ElementArrays(
             self.grad_x, self.grad_y, self.weight, self.modes, self.laplace, self.shear, self.stiffening, self.lame,
             self.nodes, self.unknown,
         )  # fmt: skip
+
+    @property
+    def condensed(self) -> "CondensedFinite":
+        """Its tangent condensed to the skin."""
+        return self._condensed
+
+    @cached_property
+    def _condensed(self) -> "CondensedFinite":
+        return CondensedFinite(self)
 
     @property
     def size(self) -> int:
@@ -133,31 +126,114 @@ class FiniteBody:
         """Number of unknown displacements, centres included."""
         return self.plan.size + 2 * len(self.nodes)
 
+    def nodal(self, local: Array) -> Array:
+        """Return the forces (nodes, 2) on nodes that forces (e, 18) on those of the elements add up to."""
+        out = np.zeros(self.mesh.nodes.shape)
+        np.add.at(out, self.nodes, local.reshape(-1, 9, 2))
+        return out
+
+    def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - all nodes are there anyway
+        """Do as `Body` says."""
+        return u
+
+    def following(self, skin: Array) -> Array:
+        """Do as `Body` says, by the last tangent, the centres of elements with their other nodes."""
+        inside = self.condensed.inside
+        unknowns = np.stack([inside.back_substitute(one, still=True) for one in skin.T.copy()], axis=1)
+        out = np.zeros((*self.mesh.nodes.shape, unknowns.shape[1]))
+        outer = np.where((self.unknown >= 0)[..., None], unknowns[self.unknown], 0.0)  # (e, 8, 2, c)
+        out[self.nodes[:, :8]] = outer
+        recovery = self.condensed.system.recovery_matrix[:, :, :16]
+        out[self.nodes[:, 8]] = -recovery @ outer.reshape(len(outer), 16, -1)
+        return out
+
+    def deformation(self, u: Array) -> Array:
+        """Return F (e, 9, 2, 2) at the quadrature points for displacements `u` (nodes, 2)."""
+        return np.eye(2) + self._gradient(u)
+
+    def smallest_det(self, displacement: Array) -> float:
+        """Do as `Body` says, of the quadrature points."""
+        return float(np.linalg.det(self.deformation(displacement)).min())
+
+    def pressure(self, u: Array) -> Array:
+        """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
+        return self.lame[:, None] * self._logarithm(self._gradient(u))[1]
+
+    def energy(self, u: Array) -> float:
+        """Return the energy stored in the body [N mm per mm]."""
+        return self._stored(self._gradient(u)).real
+
+    def energy_slope(self, u: Array, way: Array) -> float:
+        """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
+
+        From the energy alone, by a step in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), no stress
+        asked.
+        """
+        H = self._gradient(u) + 1j * IMAGINARY * self._gradient(way)
+        return self._stored(cast("Array", H)).imag / IMAGINARY
+
+    def energy_growth(self, displacement: Array) -> float:
+        """Do as `Body` says, from the energy alone."""
+        return self.energy_slope(displacement, displacement)
+
+    def forces(self, displacement: Array) -> Array:
+        """Do as `Body` says."""
+        H = self._gradient(displacement)
+        log, volume = self._logarithm(H)
+        inverse, exceeds = _turned(H)
+        G = self.shear[:, None] * slopes(self.stiffening[:, None], _excess(H, log))[0]
+        pressure = self.lame[:, None] * (self.modes @ volume[:, :, None])[:, :, 0]
+        stress = self.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
+        gradient = np.stack([self.grad_x, self.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
+        return self.nodal((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
+
+    def _gradient(self, u: Array) -> Array:
+        """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
+        local = u[self.nodes]  # (e, 9, 2)
+        return np.stack([self.grad_x @ local, self.grad_y @ local], axis=-1)
+
+    def _logarithm(self, H: Array) -> tuple[Array, Array]:
+        """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
+        log = log1p(H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0]))
+        return log, np.einsum("eq,eqm,eq->em", self.weight, self.modes, log)
+
+    def _stored(self, H: Array) -> complex:
+        log, volume = self._logarithm(H)
+        grown = shape(self.stiffening[:, None], _excess(H, log))
+        shear = np.sum(self.weight * self.shear[:, None] / 2.0 * grown)
+        return complex(shear + np.sum(self.lame / 2.0 * (volume**2).T))
+
+
+def _turned(H: Array) -> tuple[Array, Array]:
+    """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
+    grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
+    across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
+    F = np.eye(2) + H
+    return (np.eye(2) + across) / (1.0 + grown), (H - across + grown * F) / (1.0 + grown)
+
+
+def _excess(H: Array, log: Array) -> Array:
+    return 2.0 * (np.trace(H, axis1=-2, axis2=-1) - log) + np.sum(H * H, axis=(-2, -1))
+
 
 class CondensedFinite:
     """A body at finite strain with the memory for its tangent."""
 
-    def __init__(self, body: FiniteBody, beside: "CondensedFinite | None" = None) -> None:
-        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan.
-
-        What is there then belongs to whichever was linearised last.
-        """
+    def __init__(self, body: FiniteBody) -> None:
+        """Set memory aside for `body`."""
         count = len(body.nodes)
         self.body, self.constant = body, False
-        self.load = np.zeros(body.size)  # dead loads on the body, of `solver.equilibrium.dead_loads`
+        self.load = np.zeros(body.size)  # dead loads on the body, of `load_stepping.loaded`
         self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
-        if beside is not None and beside.body.plan is body.plan:
-            self.inside, self.system = beside.inside, beside.system._replace(force=self.all_forces)
-        else:
-            self.inside = Elimination(body.plan)
-            self.system = ElementSystem(
-                np.zeros((count, 16, 16)), self.all_forces, np.zeros((count, 2, 17)), np.zeros((count, 3)),
-                np.zeros((count, 3, 18)), np.zeros((count, 3)),
-            )  # fmt: skip
+        self.inside = Elimination(body.plan)
+        self.system = ElementSystem(
+            np.zeros((count, 16, 16)), self.all_forces, np.zeros((count, 2, 17)), np.zeros((count, 3)),
+            np.zeros((count, 3, 18)), np.zeros((count, 3)),
+        )  # fmt: skip
         self.stiffness, self.force = self.inside.stiffness, self.inside.felt
         self.compliance, self.motions = np.zeros((0, 0)), np.zeros((0, 0))
         self.bulk = float((body.lame / body.shear).max())
-        self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.skin))
+        self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.mesh.skin))
         elements, inside = body.elements, self.inside
         self._assemble = bind_arguments(kernels.assemble, elements, self.system)
         self._forces = bind_arguments(kernels.forces, elements, self.system)
@@ -168,11 +244,12 @@ class CondensedFinite:
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
-        return self.body.undeformed()
+        return np.zeros(self.body.mesh.nodes.shape), np.zeros((len(self.body.nodes), 3))
 
     def place(self, u: Array) -> Array:
         """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
-        return self.body.place(u)
+        skin = self.body.mesh.skin
+        return self.body.mesh.nodes[skin] + u[skin]
 
     def linearise(self, u: Array, pressure: Array) -> bool:
         """Assemble and eliminate the tangent at a state; False where it is turned inside out or has no factors."""
@@ -211,6 +288,18 @@ class CondensedFinite:
         after = BodyState(np.empty_like(u), np.empty_like(pressure))
         largest = self._move(BodyState(u, pressure), step, scale, after)
         return after.u, after.pressure, largest
+
+    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked
+        """Return the energy stored in the body at `u` (nodes, 2) [N mm per mm]."""
+        return self.body.energy(u)
+
+    def work(self, way: Sequence[Array], trapezoid: float) -> float:
+        """Do as `CondensedBody` says, by Simpson's rule.
+
+        The forces halfway are those of the elements at the mean displacement.
+        """
+        halfway = (self.body.energy_slope((one + other) / 2.0, other - one) for one, other in pairwise(way))
+        return (trapezoid + 2.0 * sum(halfway)) / 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -297,73 +386,3 @@ def _log_volume(grad_x: Array, grad_y: Array, local: Array) -> Array:
     """Return ln J (e, q, ...) at the quadrature points of elements for displacements of their nodes (e, 9, 2, ...)."""
     along_x, along_y = (np.einsum("eqi,eia...->aeq...", grad, local) for grad in (grad_x, grad_y))
     return log1p(along_x[0] + along_y[1] + along_x[0] * along_y[1] - along_x[1] * along_y[0])
-
-
-IMAGINARY = 1e-30  # step whose square is nothing [-]
-
-
-def deformation(body: FiniteBody, u: Array) -> Array:
-    """Return F (e, 9, 2, 2) at the quadrature points for displacements `u` (nodes, 2)."""
-    return np.eye(2) + _gradient(body, u)
-
-
-def _gradient(body: FiniteBody, u: Array) -> Array:
-    """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
-    local = u[body.nodes]  # (e, 9, 2)
-    return np.stack([body.grad_x @ local, body.grad_y @ local], axis=-1)
-
-
-def _turned(H: Array) -> tuple[Array, Array]:
-    """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
-    grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
-    across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
-    F = np.eye(2) + H
-    return (np.eye(2) + across) / (1.0 + grown), (H - across + grown * F) / (1.0 + grown)
-
-
-def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
-    """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
-    grown = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
-    log = log1p(grown)
-    return log, np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
-
-
-def _excess(H: Array, log: Array) -> Array:
-    return 2.0 * (np.trace(H, axis1=-2, axis2=-1) - log) + np.sum(H * H, axis=(-2, -1))
-
-
-def pressure(body: FiniteBody, u: Array) -> Array:
-    """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
-    return body.lame[:, None] * _logarithm(body, _gradient(body, u))[1]
-
-
-def energy(body: FiniteBody, u: Array) -> float:
-    """Return the energy stored in the body [N mm per mm]."""
-    return _stored(body, _gradient(body, u)).real
-
-
-def energy_slope(body: FiniteBody, u: Array, way: Array) -> float:
-    """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
-
-    From the energy alone, by a step in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), no stress asked.
-    """
-    H = _gradient(body, u) + 1j * IMAGINARY * _gradient(body, way)
-    return _stored(body, cast("Array", H)).imag / IMAGINARY
-
-
-def _stored(body: FiniteBody, H: Array) -> complex:
-    log, volume = _logarithm(body, H)
-    grown = shape(body.stiffening[:, None], _excess(H, log))
-    return complex(np.sum(body.weight * body.shear[:, None] / 2.0 * grown) + np.sum(body.lame / 2.0 * (volume**2).T))
-
-
-def element_forces(body: FiniteBody, u: Array) -> Array:
-    """Return the internal forces (e, 18) of the elements, ordered x, y, x, y, ..."""
-    H = _gradient(body, u)
-    log, volume = _logarithm(body, H)
-    inverse, exceeds = _turned(H)
-    G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(H, log))[0]
-    pressure = body.lame[:, None] * (body.modes @ volume[:, :, None])[:, :, 0]
-    stress = body.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
-    return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(H), 18)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from threading import Lock
 from typing import Literal, Self
 
@@ -14,9 +14,9 @@ from solver import _kernels as kernels
 from solver._kernels import HELD_X, HELD_Y, hooke
 from solver._kernels.arguments import RecoveryArrays
 from solver.arrays import Array, Indices, Narrow
-from solver.body.stiffness import Elastic, Isotropic, condensed_elements
+from solver.body.stiffness import Elastic, Isotropic, Probes, condensed_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
-from solver.element import GAUSS_4, line
+from solver.element import GAUSS_4, Q2P1, line
 from solver.linalg.multifrontal import factors_of, symbolic_factorization
 from solver.mesh.mesh import Mesh
 
@@ -165,6 +165,18 @@ class CondensedLinear:
         """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
         return (self.compliance @ self.load).reshape(-1, 2)
 
+    def held_by(self, reaction: Array) -> Array:
+        """Return the displacements (k, 2) that forces `reaction` (k, 2) of the surface hold."""
+        return (self.compliance @ (self.load + reaction.ravel())).reshape(-1, 2)
+
+    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
+        """Return the energy stored once forces `reaction` (k, 2) alone hold the body [N mm per mm]."""
+        return 0.5 * float(np.sum(reaction * self.held_by(reaction)))
+
+    def work(self, way: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
+        """Do as `CondensedBody` says: forces grow in proportion, so that the rule is exact."""
+        return trapezoid
+
     def place(self, u: Array) -> Array:
         """Return where the skin's nodes are (k, 2) for displacements `u` (k, 2) [mm]."""
         return self.rest + u
@@ -183,7 +195,7 @@ class CondensedLinear:
         return u + scale * step.reshape(u.shape), pressure, float(np.abs(step).max(initial=0.0))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
 class LinearBody:
     """An elastic body whose skin may touch a flat rigid surface that lies below it along y = 0."""
 
@@ -256,7 +268,7 @@ class LinearBody:
         The forces it leaves over are those of the elements, so that a step from it takes round-off out of a state: one
         step of iterative refinement (Wilkinson 1963). For held bodies without dead loads.
         """
-        inner = self.reactions(displacement[:, :, None])[:, :, 0]
+        inner = self.forces(displacement)
         inner[self.mesh.driven] = 0.0
         about, recover = self.under(-inner)
         about.rest = self.mesh.nodes[self.mesh.skin] + displacement[self.mesh.skin]
@@ -275,15 +287,46 @@ class LinearBody:
         felt = np.where(self.mesh.driven[self.mesh.skin].ravel(), 0.0, _interleaved(felt))
         return self.condensed.loaded(felt), recover
 
-    def reactions(self, displacement: Array) -> Array:
-        """Return the forces (nodes, 2, c) that hold all nodes where they are: the elements' inner forces [N/mm]."""
-        count = len(self.mesh.elements)
+    def following(self, skin: Array) -> Array:
+        """Do as `Body` says."""
+        return self.displacement(skin.reshape(len(skin) // 2, 2, -1))
+
+    def forces(self, displacement: Array) -> Array:
+        """Do as `Body` says."""
         local = displacement[self.mesh.elements]
         # what moves an element as a whole strains nothing, but would drown small strains in round-off
-        local = (local - local[:, 8:]).reshape(count, 18, -1)
+        local = (local - local[:, 8:]).reshape(len(local), 18, 1)
         out = np.zeros(displacement.shape)
-        np.add.at(out, self.mesh.elements, (self.elastic.stiffness @ local).reshape(count, 9, 2, -1))
+        np.add.at(out, self.mesh.elements, (self.elastic.stiffness @ local).reshape(len(local), 9, 2))
         return out
+
+    def energy_growth(self, displacement: Array) -> float:
+        """Do as `Body` says."""
+        return float(np.sum(self.forces(displacement) * displacement))
+
+    def smallest_det(self, displacement: Array) -> float:
+        """Do as `Body` says, of the corners of elements, where strains are largest."""
+        return float(np.prod(self.stretches(displacement), axis=0).min())
+
+    def stretches(self, displacement: Array) -> Array:
+        """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
+
+        They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
+        """
+        local = displacement[self.mesh.elements]
+        f = (self._corners @ (local - local[:, 8:])).reshape(-1, 2, 2) + np.eye(2)  # transposed, of the same stretches
+        det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+        total = np.sum(f * f, axis=(1, 2))
+        plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
+        return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
+
+    @cached_property
+    def _corners(self) -> Array:
+        """The gradients (e, 8, 9) of shape functions, along x and y at each corner of each element."""
+        count = len(self.mesh.elements)
+        element, local = np.repeat(np.arange(count), 4), np.tile(Q2P1.corners, (count, 1))
+        gradient = Probes.at(self.mesh, self.elastic, element, local).gradient
+        return np.ascontiguousarray(np.swapaxes(gradient, 1, 2).reshape(count, 8, 9))
 
 
 def _unknowns(mesh: Mesh) -> Indices:

@@ -10,7 +10,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, STEEP
 from solver.continuation import limit_point as reach
 from solver.continuation.arc_length import follow
 from solver.continuation.limit_point import PLAIN, Reach, folded, sound
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged

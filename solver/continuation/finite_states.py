@@ -11,7 +11,7 @@ from solver.continuation import limit_point as reach
 from solver.continuation.existence import APART, all_at_the_bound, stands, steady, steep
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_path import Aim, Way, press_and_drag
 from solver.equilibrium.loads import load_of, sliding_load

@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 from solver.arrays import Array
-from solver.body.tissues import finite_laws
 from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch, continue_branch
 from solver.continuation.surface_instability import folds_at
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState
 from solver.failures import NotConverged

@@ -6,20 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import _kernels as kernels
-from solver.body.finite import deformation
+from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import Law
 from solver.contact.skin_compression import SkinCompression
 from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, FiniteNewton, LoadState
+from solver.equilibrium.newton import BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged
 
 CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
 
 
 def steady(
-    newton: FiniteNewton,
+    whole: FiniteBody,
     load: LoadState,
     skin: Law,
     start: EquilibriumState | None = None,
@@ -32,7 +32,8 @@ def steady(
     NotConverged where it is lost before, which tells nothing of the body, or cannot be begun; Cancelled where `stop`
     says so.
     """
-    body = _OwnBody(newton)
+    newton = Newton(whole.condensed)
+    body = _OwnBody(whole, newton)
     bare = settled(newton, load._replace(mu=0.0), start, stop=stop)
     branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin), stop)
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
@@ -50,19 +51,19 @@ def steady(
 class _OwnBody:
     """A body of which all skin is looked at that may touch."""
 
-    newton: FiniteNewton
+    body: FiniteBody
+    newton: Newton
 
     def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        mesh, every = self.newton.body.mesh, np.ones(len(shape.state) // 2, bool)
+        mesh, every = self.body.mesh, np.ones(len(shape.state) // 2, bool)
         return SkinCompression(*kernels.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
 
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        mesh = self.newton.body.mesh
+        mesh = self.body.mesh
         return kernels.crosses(mesh.nodes, shape.u, mesh.skin)
 
     def spoilt(self, shape: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        det = np.linalg.det(deformation(self.newton.body, shape.u))
-        return bool(shape.touching[[0, -1]].any() or det.min() < CRUSHED)
+        return bool(shape.touching[[0, -1]].any()) or self.body.smallest_det(shape.u) < CRUSHED

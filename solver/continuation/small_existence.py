@@ -7,7 +7,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import STICK
 from solver.continuation.small_states import followed_under, settled
 from solver.continuation.wedging import continue_branch, limits
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
@@ -42,7 +42,7 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
 
 def _folded(finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
-    return finger.smallest_det(finger.displacement(state)) <= 0.0
+    return finger.body.smallest_det(finger.displacement(state)) <= 0.0
 
 
 def _pressed(scene: Scene) -> str:

@@ -7,12 +7,11 @@ import numpy as np
 
 from solver._kernels import STICK
 from solver.arrays import Array
-from solver.body.tissues import relaxing_laws
 from solver.continuation.wedging import continue_branch
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
+from solver.equilibrium.finger import LinearFinger, relaxing_laws
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
-from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, march
 from solver.equilibrium.loads import forces_of, load_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState, Newton

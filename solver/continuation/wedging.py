@@ -10,7 +10,7 @@ from contextlib import suppress
 from math import log2, sqrt
 
 from solver.body.linear import LinearBody
-from solver.body.tissues import settled_moduli
+from solver.equilibrium.finger import settled_moduli
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.failures import ContactLost

@@ -4,19 +4,30 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from time import perf_counter
 from typing import Generic, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.linalg import LinAlgError
 
+from solver import _kernels as kernels
 from solver.arrays import Array, Indices
-from solver.body.receptor import Endings, Patches, endings, middle
+from solver.body.condensed import Body
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.linear import LinearBody
+from solver.body.receptor import Endings, LinearPatches, Patches, endings, middle
 from solver.body.stiffness import Centred
+from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
+from solver.constitutive.linear import Moduli, Prony
 from solver.contact.edges import arcs_of, width
+from solver.contact.skin_compression import SkinCompression
+from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.mesh.mesh import distinct
-from solver.mesh.mesher import FingerMesh
+from solver.mesh.mesh import MeshError, distinct
+from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
-from solver.scene.scene import Scene
+from solver.scene.scene import Material, Materials, Scene, SceneError
 
 Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them
 
@@ -28,62 +39,46 @@ class Finger(ABC, Generic[Placed]):
     scene: Scene  # whose finger it is; its friction and load may be those of another surface
     geometry: FingerMesh
     newton: Newton
-
-    @property
-    @abstractmethod
-    def elements(self) -> Centred:
-        """The elements of its body."""
-
-    @property
-    @abstractmethod
-    def dofs(self) -> int:
-        """Number of unknown displacements."""
+    body: Body
 
     @abstractmethod
     def patches(self, placed: Endings) -> Placed:
         """Return endings that were `placed` on its mesh, as its body feels them."""
 
+    @property
     @abstractmethod
+    def centred(self) -> Centred:
+        """The elements of its body, with the places that their pressure modes are counted from."""
+
+    def endings(self, arcs: Array) -> Placed:
+        """Return endings like the scene's at arc positions `arcs` (r,) [mm]."""
+        return self.patches(endings(self.geometry, self.centred, self.scene.receptor, arcs))
+
+    @cached_property
+    def ending(self) -> Placed:
+        """The reference ending alone."""
+        return self.endings(np.zeros(1))
+
+    @cached_property
+    def point(self) -> Placed:
+        """The middle of the reference ending."""
+        return self.patches(middle(self.geometry, self.centred, self.scene.receptor))
+
+    @cached_property
+    def row(self) -> Placed:
+        """The row of receptors."""
+        return self.endings(ROW)
+
+    def displacement(self, state: EquilibriumState) -> Array:
+        """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
+        return self.body.displacement(state.u)
+
     def displacements(self, states: Sequence[EquilibriumState], only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, c) of all nodes relative to the bone [mm] in c states.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-
-    @abstractmethod
-    def displacement(self, state: EquilibriumState) -> Array:
-        """Return the displacement (nodes, 2) of all nodes relative to the bone [mm]."""
-
-    @abstractmethod
-    def following(self, skin: Array) -> Array:
-        """Return the small displacements (nodes, 2, c) that go with those of the skin (2 k, c), by the last tangent."""
-
-    @abstractmethod
-    def inner_forces(self, displacement: Array) -> Array:
-        """Return the forces (nodes, 2) that hold all nodes at `displacement` (nodes, 2) [N/mm]."""
-
-    @abstractmethod
-    def energy_growth(self, displacement: Array) -> float:
-        """Return by how much the stored energy grows as `displacement` (nodes, 2) grows by a part of itself [N]."""
-
-    @abstractmethod
-    def smallest_det(self, displacement: Array) -> float:
-        """Return the least det F [-] at `displacement` (nodes, 2); not positive where tissue is inside out."""
-
-    @cached_property
-    def ending(self) -> Placed:
-        """The reference ending alone."""
-        return self.patches(endings(self.geometry, self.elements, self.scene.receptor, np.zeros(1)))
-
-    @cached_property
-    def point(self) -> Placed:
-        """The middle of the reference ending."""
-        return self.patches(middle(self.geometry, self.elements, self.scene.receptor))
-
-    @cached_property
-    def row(self) -> Placed:
-        """The row of receptors."""
-        return self.patches(endings(self.geometry, self.elements, self.scene.receptor, ROW))
+        return self.body.displacement(np.stack([state.u for state in states], axis=2), only)
 
     def sed_ending(self, displacement: Array) -> float:
         """Return the SED averaged over the reference ending [MPa] for displacements (nodes, 2)."""
@@ -131,3 +126,137 @@ class Finger(ABC, Generic[Placed]):
     def arcs(self) -> Array:
         """Arc positions (k,) of the nodes that may touch [mm]."""
         return arcs_of(self.geometry)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFinger(Finger[LinearPatches]):
+    """A finger at small strain on one mesh."""
+
+    body: LinearBody
+    solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
+
+    @staticmethod
+    def of(scene: Scene, sizing: Sizing) -> "LinearFinger":
+        """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
+
+        Raises MeshError where the outline cannot be meshed.
+        """
+        return LinearFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+
+    @staticmethod
+    def on(scene: Scene, geometry: FingerMesh) -> "LinearFinger":
+        """Do the same on a mesh of the finger that was made before."""
+        begun = perf_counter()
+        body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
+        return LinearFinger(scene, geometry, Newton(body.condensed), body, perf_counter() - begun)
+
+    @property
+    def centred(self) -> Centred:
+        """Do as `Finger` says."""
+        return self.body.elastic
+
+    def patches(self, placed: Endings) -> LinearPatches:
+        """Do as `Finger` says."""
+        return LinearPatches(self.geometry.mesh, self.body.elastic, placed)
+
+    def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
+        """Return whether skin outside the part that may touch would, so that the part must be made larger."""
+        whole = self.geometry.whole
+        below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
+        may = np.zeros(len(displacement), bool)
+        may[self.geometry.mesh.skin] = True
+        may = may[whole]
+        ends = bool(state.touching[0] and may[0] == 0) or bool(state.touching[-1] and may[-1] == 0)
+        return ends or bool((below & ~may).any())
+
+
+@dataclass(frozen=True, eq=False)
+class FiniteFinger(Finger[FinitePatches]):
+    """A finger at finite strain on one mesh."""
+
+    body: FiniteBody
+
+    @staticmethod
+    def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
+        """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
+        try:
+            return FiniteFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+        except (MeshError, LinAlgError) as bad:
+            raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
+
+    @staticmethod
+    def on(scene: Scene, geometry: FingerMesh) -> "FiniteFinger":
+        """Do the same on a mesh of the finger that was made before."""
+        body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
+        return FiniteFinger(scene, geometry, Newton(body.condensed), body)
+
+    @property
+    def centred(self) -> Centred:
+        """Do as `Finger` says."""
+        return self.body
+
+    def patches(self, placed: Endings) -> FinitePatches:
+        """Do as `Finger` says."""
+        return FinitePatches.of(self.body, placed)
+
+    def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
+        """Return `shape`, found on `other`, as a start on this mesh."""
+        return self.bridge(other).carried(shape)
+
+    def bridge(self, other: "FiniteFinger") -> MeshTransfer:
+        """Return the way here from the mesh of `other`, made when first asked for."""
+        if other not in self._bridges:
+            self._bridges[other] = MeshTransfer.of(other.places, self.places)
+        return self._bridges[other]
+
+    @cached_property
+    def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":
+        return WeakKeyDictionary()
+
+    @cached_property
+    def places(self) -> Places:
+        """Where nodes and quadrature points lie, for states that are carried."""
+        return Places.of(self.geometry, self.body)
+
+    def runs_out(self, shape: EquilibriumState) -> bool:
+        """Return whether contact reaches an end of the skin that is looked at."""
+        return bool(shape.touching[[0, -1]].any())
+
+    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        geometry, first = self.geometry, self._first
+        return SkinCompression(
+            *kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first)
+        )
+
+    @cached_property
+    def _first(self) -> int:
+        """The first node of the whole skin that may touch."""
+        return int(np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)[0])
+
+    def crosses(self, shape: EquilibriumState) -> bool:
+        """Return whether the skin crosses itself."""
+        return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
+
+
+def settled_moduli(materials: Materials) -> list[Moduli]:
+    """Return the small-strain moduli of a settled response: those that a tissue has once it has relaxed."""
+    return [law.relaxed for law in relaxing_laws(materials)]
+
+
+def relaxing_laws(materials: Materials) -> list[Prony]:
+    """Return the small-strain laws; a tissue that does not relax has no terms."""
+    return [Prony(t.E, t.nu, tuple((term.g, term.tau) for term in t.prony)) for t in materials.by_region]
+
+
+def finite_laws(materials: Materials) -> list[Law]:
+    """Return the laws at finite strain of a settled response: the shear modulus relaxed, the bulk modulus as it was."""
+    both = zip(materials.by_region, relaxing_laws(materials), strict=True)
+    return [_finite(tissue, law.relaxed) for tissue, law in both]
+
+
+def _finite(tissue: Material, moduli: Moduli) -> Law:
+    young, nu = moduli.engineering if tissue.prony else (tissue.E, tissue.nu)
+    if tissue.law != "ogden":
+        return NeoHooke(young, nu)
+    return Ogden(young, nu) if tissue.stiffening is None else Ogden(young, nu, tissue.stiffening)

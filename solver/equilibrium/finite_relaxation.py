@@ -12,17 +12,16 @@ import numpy as np
 from solver import _kernels as kernels
 from solver._kernels import STICK
 from solver.arrays import Array, Indices
-from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches, deformation
-from solver.body.tissues import relaxing_laws
+from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.validation import check_moduli, check_terms
 from solver.constitutive import overstress
 from solver.constitutive.linear import Prony
 from solver.constitutive.overstress import Past
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, relaxing_laws
 from solver.equilibrium.load_path import DRAGGING_STEPS, LONG, PRESSING_STEPS, Aim, Way, press_and_drag
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.loads import load_of
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, Newton
+from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.equilibrium.relaxation import RELAXED, wait
 from solver.failures import NotConverged
 from solver.progress import report_progress
@@ -43,6 +42,15 @@ class CondensedRelaxing(CondensedFinite):
         self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.weight.shape[1])))
         self.tensor = np.zeros((*body.weight.shape, 4))
 
+    def ready(self, step: float) -> None:
+        """Prepare a step in time [s]."""
+        self.tensor = self.past.over(step).reshape(self.tensor.shape)
+        self.found = None
+
+    def took(self, u: Array, step: float) -> None:
+        """Remember the step that was made ready and led to displacements `u` (nodes, 2)."""
+        self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
+
     def assemble(self, u: Array, pressure: Array) -> float:
         """Fill tangents and forces at a state and return the least det F."""
         least = super().assemble(u, pressure)
@@ -60,37 +68,16 @@ class CondensedRelaxing(CondensedFinite):
     def _add(self, u: Array, *, anew: bool) -> None:
         kernels.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
 
-
-class RelaxingNewton(FiniteNewton):
-    """The iterations on a body that relaxes."""
-
-    def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
-        """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
-        self.body = body
-        self.finite = self.relaxing = CondensedRelaxing(body, laws)
-        Newton.__init__(self, self.relaxing)
-
-    def ready(self, step: float) -> None:
-        """Prepare a step in time [s]."""
-        body = self.relaxing
-        body.tensor = body.past.over(step).reshape(body.tensor.shape)
-        body.found = None
-
-    def took(self, shape: EquilibriumState, step: float) -> None:
-        """Remember the step that was made ready and led to `shape`."""
-        body = self.relaxing
-        body.past = body.past.after(deformation(self.body, shape.u).reshape(-1, 2, 2), step)
-
-    def excess(self, shape: EquilibriumState) -> Array:
-        """Return the forces (e, 18) of the overstress on the nodes of the elements at `shape`."""
+    def excess(self, u: Array) -> Array:
+        """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
         body = self.body
-        stress = overstress.stress(self.relaxing.tensor, deformation(body, shape.u))
+        stress = overstress.stress(self.tensor, body.deformation(u))
         gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
 
-    def stored(self, state: EquilibriumState) -> float:
-        """Return the energy stored at a state, with what the terms hold at the last instant remembered."""
-        return super().stored(state) + float(self.relaxing.past.energy() @ self.body.weight.ravel())
+    def stored(self, u: Array, reaction: Array) -> float:
+        """Return the energy stored at `u`, with what the terms hold at the last instant remembered."""
+        return super().stored(u, reaction) + float(self.past.energy() @ self.body.weight.ravel())
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
@@ -133,9 +120,9 @@ class RelaxingCourse(Way):
     ) -> None:
         """March the whole course in `times` the usual steps, or to `aims` alone. Raises NotConverged, Cancelled."""
         laws, loading = relaxing_laws(scene.materials), scene.loading_per_mm
-        self.relaxing = RelaxingNewton(finger.newton.body, laws)
+        self.relaxing = CondensedRelaxing(finger.body, laws)
         good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
-        super().__init__(self.relaxing, load_of(scene), loading, good, stop)
+        super().__init__(Newton(self.relaxing), load_of(scene), loading, good, stop)
         self._watched = [_Watched(probes, self.relaxing.body, laws) for probes in (finger.ending, finger.point)]
         self._longest, self._times, self._sense = scene.materials.longest_creep, times, 0
         self.sed: list[tuple[float, float]] = []
@@ -150,7 +137,7 @@ class RelaxingCourse(Way):
         step = aim.time - self.aim.time
         self.relaxing.ready(step)
         shape = super().found(replace(before, load=before.load._replace(sense=self._sense)), aim)
-        self.relaxing.took(shape, step)
+        self.relaxing.took(shape.u, step)
         ending, point = (watched.follow(shape, step) for watched in self._watched)
         self.sed.append((ending, point))
         return shape

@@ -6,10 +6,8 @@ pressure in the geometric stiffness is the linearised prediction of the iteratio
 Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +26,6 @@ from solver._kernels.arguments import (
 )
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
-from solver.body.finite import CondensedFinite, FiniteBody, energy, energy_slope
 from solver.body.validation import finite
 from solver.contact.law import FrictionLaw
 from solver.failures import ContactLost, NotConverged
@@ -94,23 +91,6 @@ class Given(NamedTuple):
         return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
 
 
-class Deformable(Protocol):
-    """What a state is asked about: a body, or what Newton sees of it."""
-
-    @property
-    def held(self) -> States:
-        """Which nodes of the skin are held (k,)."""
-        ...
-
-    def undeformed(self) -> tuple[Array, Array]:
-        """Return displacements and pressures of the body at rest."""
-        ...
-
-    def place(self, u: Array) -> Array:
-        """Return where the skin's nodes are (k, 2) for displacements `u` [mm]."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class EquilibriumState:
     """A state of the body; never changed once made. k nodes of skin, e elements."""
@@ -124,13 +104,13 @@ class EquilibriumState:
     iterations: int  # linear systems solved on the way here, from undeformed
 
     @staticmethod
-    def undeformed(body: Deformable) -> "EquilibriumState":
+    def undeformed(body: CondensedBody) -> "EquilibriumState":
         """Return the body before anything touches it."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
         return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), LoadState(0.0, 0.0), 0)
 
-    def place(self, body: Deformable) -> Array:
+    def place(self, body: CondensedBody) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
         return body.place(self.u)
 
@@ -228,22 +208,6 @@ class Newton:
         """Return where the skin lies for displacements `u`, relative to the surface."""
         place = self.condensed.place(u)
         return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
-
-    def relaxed(self, state: EquilibriumState) -> EquilibriumState:
-        """Return a state of tissues that relax with the displacements that its forces hold once they have."""
-        skin = self.condensed
-        return replace(state, u=(skin.compliance @ (skin.load + state.reaction.ravel())).reshape(-1, 2))
-
-    def stored(self, state: EquilibriumState) -> float:
-        """Return the energy stored in the body at a state [N mm per mm]."""
-        return 0.5 * float(np.sum(state.reaction * self.relaxed(state).u))
-
-    def elastic_work(self, states: Sequence[EquilibriumState], trapezoid: float) -> float:  # noqa: ARG002
-        """Return the work of the skin's forces along `states`, by the `trapezoid` rule so much [N mm per mm].
-
-        That rule is exact where forces grow in proportion.
-        """
-        return trapezoid
 
     def follows(self, steps: Array) -> Array:
         """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
@@ -368,24 +332,3 @@ def lowered(body: CondensedBody, shape: EquilibriumState) -> EquilibriumState:
 def load_arguments(load: LoadState) -> LoadArguments:
     """Return `load` as loops take it."""
     return LoadArguments(float(load.depth), float(load.mu), float(load.tau), int(load.sense))
-
-
-class FiniteNewton(Newton):
-    """The iterations on a body at finite strain."""
-
-    def __init__(self, body: FiniteBody, beside: "FiniteNewton | None" = None) -> None:
-        """Set memory aside for `body`, or share that of `beside` where both are eliminated by one plan."""
-        self.body, self.finite = body, CondensedFinite(body, None if beside is None else beside.finite)
-        super().__init__(self.finite)
-
-    def stored(self, state: EquilibriumState) -> float:
-        """Return the energy stored in the body at a state [N mm per mm]."""
-        return energy(self.body, state.u)
-
-    def elastic_work(self, states: Sequence[EquilibriumState], trapezoid: float) -> float:
-        """Return the work of the skin's forces along `states`, by Simpson's rule [N mm per mm].
-
-        The forces halfway are those of the elements at the mean displacement.
-        """
-        halfway = (energy_slope(self.body, (one.u + other.u) / 2.0, other.u - one.u) for one, other in pairwise(states))
-        return (trapezoid + 2.0 * sum(halfway)) / 3.0

@@ -17,8 +17,7 @@ from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
 from solver.body.finite import IMAGINARY
 from solver.body.receptor import Patches
-from solver.equilibrium.finger import Finger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, load_arguments
 from solver.quantities import NAMES, SED
 from solver.scene.scene import Scene
@@ -54,7 +53,7 @@ def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> 
     """
     skin = of_skin(finger.newton, state)
     along, up = finger.newton.follows(skin)
-    ending = slope(finger.ending, finger.displacement(state), finger.following(skin))[:, 0]
+    ending = slope(finger.ending, finger.displacement(state), finger.body.following(skin))[:, 0]
     rows = np.array([*ending, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
     if scene.normal_force is None:
         return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
@@ -109,7 +108,7 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
     if state.load.mu != 0.0:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
-    by_depth = finger.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
+    by_depth = finger.body.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
     moved, slope = (
         field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth)
     )

@@ -8,8 +8,8 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes, local_coordinates
-from solver.body.tissues import finite_laws, settled_moduli
 from solver.element import Q2P1
+from solver.equilibrium.finger import finite_laws, settled_moduli
 from solver.mesh.mesh import Mesh
 from solver.mesh.outline import Outline
 from solver.prediction import Prediction

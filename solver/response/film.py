@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant, Way, course
 from solver.equilibrium.loads import load_of
 from solver.equilibrium.newton import EquilibriumState
@@ -68,7 +68,7 @@ def _unfolded(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instan
     """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
 
     def folds(instant: Instant) -> bool:
-        return finger.smallest_det(finger.displacement(instant.state)) <= 0.0
+        return finger.body.smallest_det(finger.displacement(instant.state)) <= 0.0
 
     return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
@@ -77,7 +77,7 @@ def most_squeezed(finger: LinearFinger, state: EquilibriumState, depth: float) -
     """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh
-    corner = int(np.argmin(finger.stretches(displacement)[0]))
+    corner = int(np.argmin(finger.body.stretches(displacement)[0]))
     node = mesh.elements[corner // 4, corner % 4]
     x, y = mesh.nodes[node] + displacement[node]
     return float(x), float(y - depth)

@@ -16,10 +16,10 @@ from solver.accuracy.finite_ends import steps_asked
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.finite_relaxation import RelaxingCourse, RelaxingNewton
+from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.finite_relaxation import CondensedRelaxing, RelaxingCourse
 from solver.equilibrium.load_path import Way
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, FiniteNewton
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.step_error import times_on_way
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.prediction import Prediction
@@ -91,7 +91,7 @@ def _predicted(
     if not shape.touching.any():
         raise NotConverged(f"No contact was found at {shape.load.depth:g} mm of indentation: ask for more depth.")
     within_reach(scene, shape.load.depth)
-    newton = finger.newton if relaxing is None else relaxing.relaxing
+    newton = finger.newton if relaxing is None else relaxing.newton
     shape, checks = _balanced(finger, newton, shape)
     refuse_unsound(checks, shape.load.depth)
     checks |= forces_missed(scene, float(shape.force[1]), float(shape.force[0]))
@@ -115,7 +115,7 @@ def _predicted(
 
 
 def _balanced(
-    finger: FiniteFinger, newton: FiniteNewton, shape: EquilibriumState
+    finger: FiniteFinger, newton: Newton, shape: EquilibriumState
 ) -> tuple[EquilibriumState, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
 
@@ -126,7 +126,7 @@ def _balanced(
     for _ in range(CORRECTIONS):
         if unbalanced(checks) <= ROUGH:
             break
-        x = shape.place(newton.body)[:, 0]
+        x = shape.place(newton.condensed)[:, 0]
         if not newton.linearise(shape, shape.load, x):
             break
         after, _, _ = newton.moved(shape, shape.load, newton.steps[:, EQUILIBRIUM].copy(), x)
@@ -138,8 +138,9 @@ def _balanced(
     return shape, checks
 
 
-def _audits(finger: FiniteFinger, newton: FiniteNewton, shape: EquilibriumState) -> dict[str, float]:
-    over = finger.body.nodal(newton.excess(shape)) if isinstance(newton, RelaxingNewton) else None
+def _audits(finger: FiniteFinger, newton: Newton, shape: EquilibriumState) -> dict[str, float]:
+    body = newton.condensed
+    over = finger.body.nodal(body.excess(shape.u)) if isinstance(body, CondensedRelaxing) else None
     return audits(finger, shape, shape.u, over)
 
 

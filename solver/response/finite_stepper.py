@@ -9,7 +9,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.arrays import Array
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.force_control import corrected
 from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given
 from solver.response.stepper import SLIDING, Stepper
@@ -30,7 +30,7 @@ class FiniteStepper(Stepper):
 
     def __init__(self, finger: FiniteFinger, mu: float, tau: float = np.inf) -> None:
         """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
-        super().__init__(finger.newton.body, mu, tau)
+        super().__init__(finger.body.condensed, mu, tau)
         self._finger, self._newton = finger, finger.newton
         self._lost_at: float | None = None  # normal force [N/mm]
         self._hopeless = False  # whether these forces were led to in vain
@@ -76,7 +76,7 @@ class FiniteStepper(Stepper):
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
         newton = self._newton
         shape = self._ready(normal, tangential)
-        origin, before = shape.place(newton.body)[:, 0], shape.load.travel
+        origin, before = shape.place(newton.condensed)[:, 0], shape.load.travel
         given, hurried = Given(normal, tangential), self._goes_far(normal)
         far, turns = (NEAR, ARRIVING) if self._behind else (FAR, HURRIED)
         for number in range(1, max(iterations, turns) + 1):
@@ -124,14 +124,14 @@ class FiniteStepper(Stepper):
     def outline(self) -> Array:
         """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
         whole = self._finger.geometry.whole
-        return self._newton.body.mesh.nodes[whole] + self.state.u[whole] - [0.0, self.depth]
+        return self._finger.geometry.mesh.nodes[whole] + self.state.u[whole] - [0.0, self.depth]
 
     def _ready(self, normal: float, tangential: float) -> EquilibriumState:
         """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
         slides = abs(tangential) > SLIDING * self.mu * normal
         shape = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not shape.touching.any():
-            shape.state[int(np.argmin(shape.place(self._newton.body)[:, 1]))] = SLIP if slides else STICK
+            shape.state[int(np.argmin(shape.place(self._newton.condensed)[:, 1]))] = SLIP if slides else STICK
         elif not slides and not (shape.state == STICK).any():
             shape.state[shape.state != OPEN] = STICK
         return shape

@@ -10,9 +10,7 @@ from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
-from solver.body.tissues import settled_moduli
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesh import Mesh
 from solver.scene.scene import Scene
@@ -98,7 +96,7 @@ class FinitePicture(LivePicture):
     @classmethod
     def of(cls, finger: FiniteFinger, scene: Scene) -> Self:
         """Place a probe in the middle of each face of the `finger` of `scene`."""
-        body, mesh = finger.newton.body, finger.geometry.mesh
+        body, mesh = finger.body, finger.geometry.mesh
         element, local = _middles(mesh)
         probes = Probes.at(mesh, Elastic.of(mesh, settled_moduli(scene.materials)), element, local)
         each = Endings(

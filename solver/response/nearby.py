@@ -15,14 +15,12 @@ from numpy.typing import NDArray
 from solver import _kernels as kernels
 from solver._kernels import SLIP
 from solver.arrays import Array
-from solver.body.finite import pressure
 from solver.contact.law import NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control, full_slip
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.failures import ContactLost, NotConverged
@@ -134,13 +132,13 @@ class _FiniteNearby(Nearby):
     def of(cls, found: Prediction) -> Self:
         """Return the settled slide of `found` from what is kept of it. Raises NotConverged where it is not met."""
         finger, scene, skin = FiniteFinger.on(found.scene, found.geometry), found.scene, found.skin
-        body, sense = finger.newton.body, -scene.loading.direction
+        body, sense = finger.body, -scene.loading.direction
         length = np.empty(len(skin.x))
         kernels.tributary(skin.x, body.middle, length)
         load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
         state = states(skin).astype(np.int32)
         reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
-        modes, senses = pressure(body, found.displacement), np.full(len(state), sense, np.int32)
+        modes, senses = body.pressure(found.displacement), np.full(len(state), sense, np.int32)
         start = EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0)
         return cls(scene, finger.newton.settle(start, load), finger)
 

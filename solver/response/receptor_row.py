@@ -8,7 +8,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.receptor import LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
-from solver.body.tissues import finite_laws, settled_moduli
+from solver.equilibrium.finger import finite_laws, settled_moduli
 from solver.prediction import ROW, Prediction
 from solver.scene.scene import Receptor
 

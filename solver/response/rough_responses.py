@@ -13,14 +13,12 @@ from numpy.linalg import LinAlgError
 
 from solver.accuracy.adaptivity import COARSE, WIDER
 from solver.arrays import Array
-from solver.body.receptor import endings
 from solver.continuation.finite_states import roughly
 from solver.continuation.limit_point import sound
 from solver.continuation.small_existence import direct
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
@@ -54,7 +52,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
             if not finger.reaches_out(state, finger.displacement(state), state.load.depth):
                 states[number] = state
     if states:
-        row = finger.patches(endings(finger.geometry, finger.elements, first.receptor, np.asarray(arcs)))
+        row = finger.endings(np.asarray(arcs, np.float64))
         out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
     return out
 
@@ -67,7 +65,7 @@ def _finite(scenes: Sequence[Scene], arcs: Array) -> Array:
         group, near = list(numbers), None
         depth = max(expected_depth(scenes[number]) for number in group)
         finger = FiniteFinger.of(scenes[group[0]], Sizing(COARSE, depth, margin=WIDER))
-        row = finger.patches(endings(finger.geometry, finger.elements, scenes[0].receptor, arcs))
+        row = finger.endings(arcs)
         for number in group:
             try:
                 state = roughly(finger, scenes[number], never, near)

@@ -28,7 +28,7 @@ from solver.arrays import Array
 from solver.continuation.small_existence import direct
 from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined
 from solver.continuation.wedging import WIDE
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.equilibrium.step_error import Steps, times_on_way
@@ -192,7 +192,9 @@ def _solved(scene: Scene, shared: _Shared, progress: Progress | None) -> tuple[S
     settled = contact
     if scene.solve.course == "history":
         way, over_time = marched(scene, finger, progress, times)
-        contact = way[-1].state if over_time is None else finger.newton.relaxed(way[-1].state)
+        contact = way[-1].state
+        if over_time is not None:
+            contact = replace(contact, u=finger.body.condensed.held_by(contact.reaction))
     displacement = finger.displacement(contact)
     depth = contact.load.depth
     in_tissue(scene, finger, depth)

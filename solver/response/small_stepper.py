@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from solver.arrays import Array
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import LinearPatches
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.newton import Given, Newton, lowered
 from solver.failures import ContactLost
 from solver.response.stepper import SLIDING, Stepper

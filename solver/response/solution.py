@@ -11,7 +11,7 @@ from solver.accuracy.measured_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
 from solver.contact.law import STEEP
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction

@@ -9,10 +9,10 @@ import numpy as np
 
 from solver._kernels import SLIP, STICK
 from solver.arrays import Array
+from solver.body.condensed import CondensedBody
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.newton import Deformable, EquilibriumState, LoadState
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
 
@@ -35,7 +35,7 @@ class Stepper(ABC):
     (True, True)
     """
 
-    def __init__(self, body: Deformable, mu: float, tau: float) -> None:
+    def __init__(self, body: CondensedBody, mu: float, tau: float) -> None:
         """Start untouched."""
         self._rest = body
         self.mu = mu  # coefficient of friction, taken anew with every reading [-]

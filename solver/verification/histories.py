@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.scene.scene import Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import MESHED, Kinematics

@@ -11,13 +11,10 @@ import numpy as np
 from solver.accuracy.adaptivity import COARSE, MARGIN
 from solver.arrays import Array
 from solver.body.linear import LinearBody
-from solver.body.tissues import settled_moduli
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import Finger
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState
@@ -40,7 +37,7 @@ class Meshed(ABC, Generic[Made]):
     @property
     def dofs(self) -> int:
         """Number of unknown displacements."""
-        return self.finger.dofs
+        return self.finger.body.dofs
 
     @abstractmethod
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
@@ -106,7 +103,7 @@ class FiniteMeshed(Meshed[FiniteFinger]):
     def floor(self) -> float:
         """Do as `Meshed` says."""
         newton = self.finger.newton
-        shape = EquilibriumState.undeformed(newton.body)
+        shape = EquilibriumState.undeformed(newton.condensed)
         begun = clock()
         newton.linearise(shape, LoadState(0.1, 0.0), newton.skin_x)
         return clock() - begun

@@ -9,8 +9,7 @@ import numpy as np
 
 from solver.continuation.finite_states import settled as finite_settled
 from solver.continuation.small_states import settled
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.scene.scene import Scene

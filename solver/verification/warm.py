@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.response.stepper import Stepper, stepper
 from solver.scene.scene import Friction, Scene

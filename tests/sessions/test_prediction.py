@@ -77,7 +77,7 @@ def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
     assert times == sorted(times)
     assert times[-1] >= 1.0  # it was pressed, and lost while it slid
     last = instants[-1]
-    assert np.prod(way.finger.stretches(way.finger.displacement(last.state)), axis=0).min() > 0.0  # nothing folds
+    assert np.prod(way.finger.body.stretches(way.finger.displacement(last.state)), axis=0).min() > 0.0  # nothing folds
     x, y = most_squeezed(way.finger, last.state, last.depth)
     nodes = way.finger.geometry.mesh.nodes + way.finger.displacement(last.state)
     assert nodes[:, 0].min() <= x <= nodes[:, 0].max()

@@ -10,8 +10,8 @@ from solver.body.receptor import endings
 from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.newton import FiniteNewton
+from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.newton import Newton
 from solver.mesh.mesh import Mesh
 from solver.mesh.mesher import Sizing, finger_mesh
 
@@ -25,7 +25,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     body = FiniteBody.of(made.mesh, [NeoHooke(E, nu) for E in moduli])
     elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
     probes = FinitePatches.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
-    return FiniteNewton(body), probes, made.whole
+    return Newton(body.condensed), probes, made.whole
 
 
 @cache

@@ -73,7 +73,7 @@ def test_without_friction_the_energy_that_is_stored_is_the_work_of_the_press():
     newton, _, _ = finger(5)
 
     def stored(depth):
-        return oracle.energy(newton.body, settled(newton, LoadState(depth, 0.0, sense=1), tolerance=1e-12).u)
+        return oracle.energy(newton.condensed.body, settled(newton, LoadState(depth, 0.0, sense=1), tolerance=1e-12).u)
 
     def slope(step):
         return (stored(1.5 + step) - stored(1.5 - step)) / (2.0 * step)

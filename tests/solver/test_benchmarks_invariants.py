@@ -8,8 +8,8 @@ import pytest
 from solver import Friction, Loading, Material, Materials, Scene
 from solver._kernels import SHEAR_LIMITED, SLIP
 from solver.contact.law import FrictionLaw
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.load_path import march
 from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState
@@ -36,7 +36,7 @@ def load_of(law):
 
 
 def bone_force(finger, contact: EquilibriumState):
-    inner = finger.body.reactions(finger.displacement(contact)[:, :, None])[:, :, 0]
+    inner = finger.body.forces(finger.displacement(contact))
     return inner[finger.geometry.mesh.held].sum(axis=0)
 
 

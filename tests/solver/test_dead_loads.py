@@ -10,8 +10,8 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.hyperelastic import NeoHooke, stress
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.dead_loads import loaded
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
+from solver.equilibrium.load_stepping import loaded
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)
@@ -21,8 +21,8 @@ def on_the_flat():
     """A block on the surface, held in the middle of its foot only, everything below touching."""
     mesh = block(columns=4, rows=2)
     middle = mesh.skin[np.isclose(mesh.nodes[mesh.skin, 0], 1.0)]
-    newton = FiniteNewton(FiniteBody.of(replace(mesh, held=middle), [DERMIS]))
-    start = EquilibriumState.undeformed(newton.body)
+    newton = Newton(FiniteBody.of(replace(mesh, held=middle), [DERMIS]).condensed)
+    start = EquilibriumState.undeformed(newton.condensed)
     touching = np.full(len(mesh.skin), SLIP, np.int32)
     return newton, replace(start, state=touching, sense=np.ones_like(touching))
 
@@ -33,11 +33,11 @@ def on_the_flat():
 )
 def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_shape(stretch, across, nominal):
     newton, start = on_the_flat()
-    mesh = newton.body.mesh
+    mesh = newton.condensed.body.mesh
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 1], 1.0))
     top = top[np.argsort(mesh.nodes[top, 0])]
     pressed = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, nominal]])
-    found = loaded(newton, pressed, load=LoadState(0.0, 0.0, sense=1), start=start)
+    found = loaded(newton.condensed.body, pressed, load=LoadState(0.0, 0.0, sense=1), start=start)
     exact = (mesh.nodes - [1.0, 0.0]) * [across - 1.0, stretch - 1.0]
     np.testing.assert_allclose(found.u, exact, atol=3e-5)  # the traction is given to five figures
     # the held corner of two of the four edges takes a sixth of each
@@ -48,17 +48,21 @@ def test_a_prescribed_affine_boundary_is_affine_inside():
     mesh = block(columns=3, rows=3, distortion=0.15, seed=4)
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     boundary = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
-    newton = FiniteNewton(FiniteBody.of(replace(mesh, held=boundary), [DERMIS]))
+    newton = Newton(FiniteBody.of(replace(mesh, held=boundary), [DERMIS]).condensed)
     gradient = np.array([[0.2, 0.3], [-0.1, -0.1]])
-    found = loaded(newton, prescribed=mesh.nodes @ gradient.T * newton.body.mesh.driven, load=LoadState(-1e3, 0.0))
+    found = loaded(
+        newton.condensed.body,
+        prescribed=mesh.nodes @ gradient.T * newton.condensed.body.mesh.driven,
+        load=LoadState(-1e3, 0.0),
+    )
     np.testing.assert_allclose(found.u, mesh.nodes @ gradient.T, atol=1e-9)
 
 
 def test_a_hanging_bar_carries_its_dead_traction_far_from_the_clamp():
     mesh = block(columns=2, rows=6, width=0.5, height=3.0)
-    newton = FiniteNewton(FiniteBody.of(mesh, [DERMIS]))
+    newton = Newton(FiniteBody.of(mesh, [DERMIS]).condensed)
     pulled = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[0.0, -0.01]])
-    place = mesh.nodes + loaded(newton, pulled, load=LoadState(-1e3, 0.0)).u
+    place = mesh.nodes + loaded(newton.condensed.body, pulled, load=LoadState(-1e3, 0.0)).u
     low, next_up = (np.isclose(mesh.nodes[:, 1], height) for height in (0.0, 0.5))
     stretches = np.ptp(place[low, 0]) / 0.5, (place[next_up, 1].mean() - place[low, 1].mean()) / 0.5
     P = stress(DERMIS, np.diag(stretches))  # noqa: N806
@@ -68,8 +72,8 @@ def test_a_hanging_bar_carries_its_dead_traction_far_from_the_clamp():
 def test_small_loads_give_the_small_strain_answer():
     mesh = block(columns=4, rows=3, distortion=0.1, seed=2)
     right = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[1e-5, -2e-5]])
-    newton = FiniteNewton(FiniteBody.of(mesh, [NeoHooke(1.0, 0.3)]))
-    finite = loaded(newton, right, load=LoadState(-1e3, 0.0), steps=1)
+    newton = Newton(FiniteBody.of(mesh, [NeoHooke(1.0, 0.3)]).condensed)
+    finite = loaded(newton.condensed.body, right, load=LoadState(-1e3, 0.0), steps=1)
     body = LinearBody.of(mesh, [Hooke(1.0, 0.3)], right)
     small = body.displacement(body.condensed.untouched())
     np.testing.assert_allclose(finite.u, small, rtol=1e-3, atol=1e-4 * np.abs(small).max())
@@ -80,4 +84,4 @@ def test_a_load_on_an_elements_centre_is_refused():
     loads = np.zeros(mesh.nodes.shape)
     loads[mesh.elements[0, 8]] = 1.0
     with pytest.raises(ValueError, match="centre of an element"):
-        loaded(FiniteNewton(FiniteBody.of(mesh, [DERMIS])), loads)
+        loaded(FiniteBody.of(mesh, [DERMIS]), loads)

@@ -18,8 +18,7 @@ from solver.constitutive.linear import Hooke
 from solver.continuation.small_states import settled
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium.finite_finger import FiniteFinger
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.newton import LoadState, Newton
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES

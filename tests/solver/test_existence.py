@@ -68,7 +68,7 @@ def test_skin_that_nearly_all_slips_at_the_bound_drags_with_the_bound_on_all_tha
     finger = published(fineness, depth)
     shape = steady(finger, LoadState(depth, 1000.0, tau, sense))
     on = np.flatnonzero(shape.touching)
-    x = shape.place(finger.newton.body)[:, 0]
+    x = shape.place(finger.newton.condensed)[:, 0]
     widest = x[min(on[-1] + 1, len(x) - 1)] - x[max(on[0] - 1, 0)]  # to the neighbours that do not touch
     assert tau * (x[on[-1]] - x[on[0]]) * 0.99 <= sense * shape.force[0] <= tau * widest * 1.01
 

@@ -17,8 +17,8 @@ from solver.constitutive.hyperelastic import stress as relaxed_stress
 from solver.constitutive.hyperelastic import tangent as relaxed_tangent
 from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
-from solver.equilibrium.finite_relaxation import RelaxingNewton
-from solver.equilibrium.newton import EquilibriumState, LoadState
+from solver.equilibrium.finite_relaxation import CondensedRelaxing
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
@@ -165,35 +165,34 @@ def test_after_a_sudden_strain_the_stress_of_the_shape_falls_as_the_exponential(
 def relaxing_block(distortion=0.06):
     law = Prony(0.08, 0.48, ((0.3, 0.5),))
     body = FiniteBody.of(block(distortion=distortion, seed=1), [NeoHooke(*law.relaxed.engineering)])
-    newton = RelaxingNewton(body, [law])
+    relaxing = CondensedRelaxing(body, [law])
     rng = np.random.default_rng(3)
     u = rng.uniform(-0.015, 0.015, body.mesh.nodes.shape)
     u[body.mesh.held] = 0.0
-    start = replace(EquilibriumState.undeformed(body), u=u)
-    newton.ready(0.2)
-    newton.took(start, 0.2)
-    newton.ready(0.3)
-    return newton, start, rng
+    start = replace(EquilibriumState.undeformed(body.condensed), u=u)
+    relaxing.ready(0.2)
+    relaxing.took(start.u, 0.2)
+    relaxing.ready(0.3)
+    return Newton(relaxing), start, rng
 
 
 def whole(newton, u, pressure):
     """Forces (e, 18) and tangents (e, 18, 18) in plain NumPy."""
-    body, T = newton.body, newton.relaxing.tensor
+    body, T = newton.condensed.body, newton.condensed.tensor
     force, tangent = oracle.forces_and_tangents(body, u, pressure)
     gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
     bend = overstress.tangent(T, oracle.deformation(body, u))
     count = len(body.nodes)
     more = np.einsum("eq,eqaAbB,eqiA,eqjB->eiajb", body.weight, bend, gradient, gradient)
-    shape = replace(EquilibriumState.undeformed(body), u=u)
-    return force + newton.excess(shape), tangent + more.reshape(count, 18, 18)
+    return force + newton.condensed.excess(u), tangent + more.reshape(count, 18, 18)
 
 
 def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differences():
     newton, start, rng = relaxing_block()
-    body, pressure = newton.body, np.zeros((len(newton.body.nodes), 3))
+    body, pressure = newton.condensed.body, np.zeros((len(newton.condensed.body.nodes), 3))
     u = start.u + 0.3 * start.u[::-1]
     u[body.mesh.held] = 0.0
-    assert newton.relaxing.assemble(u, pressure) > 0.0
+    assert newton.condensed.assemble(u, pressure) > 0.0
     force, tangent = whole(newton, u, pressure)
     inside = np.linalg.inv(tangent[:, 16:, 16:])
     across = tangent[:, :16, 16:] @ inside
@@ -201,18 +200,18 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     expected = np.zeros(body.size + 1)
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
     scale = np.abs(tangent).max()
-    np.testing.assert_allclose(np.tril(newton.relaxing.system.tangent), np.tril(outer), atol=1e-12 * scale)
-    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(np.tril(newton.condensed.system.tangent), np.tril(outer), atol=1e-12 * scale)
+    np.testing.assert_allclose(newton.condensed.all_forces, expected[:-1], atol=1e-13 * scale)
     # the same forces for a tangent kept from there
     other = 0.7 * u
-    assert newton.relaxing.resist(other) > 0.0
+    assert newton.condensed.resist(other) > 0.0
     force, _ = whole(newton, other, pressure)
     expected[:] = 0.0
     np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
-    np.testing.assert_allclose(newton.relaxing.all_forces, expected[:-1], atol=1e-13 * scale)
+    np.testing.assert_allclose(newton.condensed.all_forces, expected[:-1], atol=1e-13 * scale)
     way, h = rng.normal(size=u.shape), 1e-6
     local = way[body.nodes].reshape(len(body.nodes), 18)
-    ahead, behind = (newton.excess(replace(start, u=u + sign * h * way)) for sign in (1.0, -1.0))
+    ahead, behind = (newton.condensed.excess(u + sign * h * way) for sign in (1.0, -1.0))
     plain = oracle.forces_and_tangents(body, u, pressure)[1]
     change = np.einsum("eij,ej->ei", tangent - plain, local)
     np.testing.assert_allclose((ahead - behind) / (2 * h), change, atol=1e-7 * np.abs(change).max())
@@ -220,20 +219,20 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
 
 def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     newton, _, _ = relaxing_block(distortion=0.0)
-    body = newton.body
-    shape = EquilibriumState.undeformed(body)
-    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
+    body = newton.condensed.body
+    shape = EquilibriumState.undeformed(body.condensed)
+    newton.condensed.past = Past.at_rest(newton.condensed.past.shear, newton.condensed.past.tau)
     pushes = []
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
-        newton.ready(step)
+        newton.condensed.ready(step)
         shape = newton.settle(shape, LoadState(depth, 0.3), 1e-9)
         force, _ = oracle.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
         total = np.zeros(body.mesh.nodes.shape)
-        np.add.at(total, body.nodes, (force + newton.excess(shape)).reshape(-1, 9, 2))
-        total[body.skin] -= shape.reaction
+        np.add.at(total, body.nodes, (force + newton.condensed.excess(shape.u)).reshape(-1, 9, 2))
+        total[body.mesh.skin] -= shape.reaction
         total[body.mesh.held] = 0.0
         assert np.abs(total).max() < 1e-9 * shape.force[1]
-        newton.took(shape, step)
+        newton.condensed.took(shape.u, step)
         pushes.append(shape.force[1])
     assert pushes[1] > pushes[2] > pushes[3]
 
@@ -241,22 +240,22 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
 def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissue_loses():
     """Lost: g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues of A B^-1, over the block and in time."""
     newton, _, _ = relaxing_block(distortion=0.0)
-    body, weight = newton.body, newton.body.weight.ravel()
-    newton.relaxing.past = Past.at_rest(newton.relaxing.past.shear, newton.relaxing.past.tau)
-    shape, way, rates, steps, time = EquilibriumState.undeformed(body), [], [0.0], 24, 0.5
+    body, weight = newton.condensed.body, newton.condensed.body.weight.ravel()
+    newton.condensed.past = Past.at_rest(newton.condensed.past.shear, newton.condensed.past.tau)
+    shape, way, rates, steps, time = EquilibriumState.undeformed(body.condensed), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):
-        newton.ready(time / steps)
+        newton.condensed.ready(time / steps)
         shape = newton.settle(shape, LoadState(0.2 * number / steps, 0.3), 1e-9)
-        newton.took(shape, time / steps)
+        newton.condensed.took(shape.u, time / steps)
         way.append(shape)
         whole_of = [
             np.array([_whole(t) for t in tensors])
-            for tensors in (newton.relaxing.past.metric[:, 0], newton.relaxing.past.before)
+            for tensors in (newton.condensed.past.metric[:, 0], newton.condensed.past.before)
         ]
         eigen = np.linalg.eigvals(whole_of[0] @ np.linalg.inv(whole_of[1])).real
         rate = (
-            newton.relaxing.past.shear[:, 0]
-            / (2.0 * newton.relaxing.past.tau[:, 0])
+            newton.condensed.past.shear[:, 0]
+            / (2.0 * newton.condensed.past.tau[:, 0])
             * np.sum(eigen + 1.0 / eigen - 2.0, axis=1)
         )
         rates.append(float(rate @ weight))

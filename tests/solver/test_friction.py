@@ -19,7 +19,6 @@ from solver.equilibrium.newton import (
     BY_FRICTION,
     BY_TRAVEL,
     EquilibriumState,
-    FiniteNewton,
     LoadState,
     Newton,
 )
@@ -121,12 +120,12 @@ def cushion():
     """A round cushion of skin at finite strain."""
     across = np.array([0.0, 0.1, 0.2, 0.35, 0.6, 1.2])
     mesh = block(np.r_[-across[:0:-1], across], np.array([0.0, 0.2, 0.5, 1.0]), 2.0)
-    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    return Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]).condensed)
 
 
 def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06, 0.015), (0.06, 0.1), (0.06, 0.098),
                                  (0.06, 0.05), (0.03, 0.05), (-0.1, 0.05))):  # fmt: skip
-    shapes = [EquilibriumState.undeformed(newton.body)]
+    shapes = [EquilibriumState.undeformed(newton.condensed)]
     for depth, travel in drives:
         shapes.append(newton.settle(shapes[-1], LoadState(depth, law.mu, law.tau_max, 0, travel), 1e-13))
     return shapes
@@ -135,9 +134,9 @@ def dragged(newton, law, drives=((0.02, 0.0), (0.06, 0.0), (0.06, 0.004), (0.06,
 def finite(law, newton):
     out, shapes = [], dragged(newton, law)
     for before, now in pairwise(shapes):
-        place, moved = now.place(newton.body), now.load.travel - before.load.travel
+        place, moved = now.place(newton.condensed), now.load.travel - before.load.travel
         length = np.maximum(oracle.rubbed(place[:, 0], now.touching, law.mu), 0.0)
-        slip = place[:, 0] - before.place(newton.body)[:, 0] - moved
+        slip = place[:, 0] - before.place(newton.condensed)[:, 0] - moved
         drag, push = now.reaction.T
         touching = now.state != OPEN  # elsewhere the body's own unbalanced forces, round-off of the iterations
         drag, push = np.where(touching, drag, 0.0), np.where(touching, push, 0.0)
@@ -270,9 +269,9 @@ def test_a_state_of_all_kinds_at_finite_strain_moves_as_its_tangent_says(cushion
     here = LoadState(0.06, law.mu, law.tau_max, 0, 0.015)
     now = cushion.settle(start, here, 1e-13)
     assert set(now.state.tolist()) == {OPEN, STICK, SLIP, SHEAR_LIMITED}
-    anchor = start.place(cushion.body)[:, 0] + here.travel - start.load.travel
+    anchor = start.place(cushion.condensed)[:, 0] + here.travel - start.load.travel
     assert cushion.linearise(now, here, anchor)
-    tangent, skin = cushion.steps.copy(), cushion.body.mesh.skin
+    tangent, skin = cushion.steps.copy(), cushion.condensed.body.mesh.skin
     for column, name in ((BY_DEPTH, "depth"), (BY_FRICTION, "mu"), (BY_TRAVEL, "travel")):
         step = 1e-5
         ahead, behind = (

@@ -9,12 +9,11 @@ from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
 from solver.contact.law import FrictionLaw
-from solver.equilibrium.dead_loads import loaded
-from solver.equilibrium.finite_relaxation import RelaxingNewton
+from solver.equilibrium.finite_relaxation import CondensedRelaxing
 from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Given, LoadState, Newton
+from solver.equilibrium.load_stepping import loaded, march
+from solver.equilibrium.newton import Given, LoadState, Newton
 from solver.equilibrium.relaxation import RelaxingBody
 from solver.mesh.mesh import Mesh, MeshError, block
 
@@ -95,21 +94,21 @@ def as_handed_in(mesh, whole, lengths):
         (lambda: RelaxingBody(MESH, [relaxes(1.2, 1.0)]), "terms that cannot relax"),
         (lambda: RelaxingBody(MESH, [relaxes(-0.1, 1.0)]), "terms that cannot relax"),
         (lambda: RelaxingBody(MESH, [relaxes(0.3, -1.0)]), "terms that cannot relax"),
-        (lambda: RelaxingNewton(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, -1.0, sense=-1)), "mu = -1.0"),
+        (lambda: CondensedRelaxing(FiniteBody.of(MESH, SKIN), [relaxes(0.3, np.nan)]), "terms that cannot relax"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN).condensed), LoadState(0.1, -1.0, sense=-1)), "mu = -1.0"),
         (
-            lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, 0.3, -1.0, sense=-1)),
+            lambda: settled(Newton(FiniteBody.of(MESH, SKIN).condensed), LoadState(0.1, 0.3, -1.0, sense=-1)),
             "tau_max = -1.0",
         ),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(np.nan, 0.3, sense=-1)), "depth = nan"),
-        (lambda: settled(FiniteNewton(FiniteBody.of(MESH, SKIN)), LoadState(0.1, 0.3, sense=2)), "sense = 2"),
-        (lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [LoadState(np.inf, 0.3)])), "depth = inf"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN).condensed), LoadState(np.nan, 0.3, sense=-1)), "depth = nan"),
+        (lambda: settled(Newton(FiniteBody.of(MESH, SKIN).condensed), LoadState(0.1, 0.3, sense=2)), "sense = 2"),
+        (lambda: next(march(Newton(FiniteBody.of(MESH, SKIN).condensed), [LoadState(np.inf, 0.3)])), "depth = inf"),
         (
-            lambda: next(march(FiniteNewton(FiniteBody.of(MESH, SKIN)), [LoadState(0.1, 0.3, travel=np.nan)])),
+            lambda: next(march(Newton(FiniteBody.of(MESH, SKIN).condensed), [LoadState(0.1, 0.3, travel=np.nan)])),
             "travel = nan",
         ),
-        (lambda: loaded(FiniteNewton(FiniteBody.of(MESH, SKIN)), load=LoadState(0.0, -0.3)), "mu = -0.3"),
-        (lambda: untouched(FiniteNewton(FiniteBody.of(MESH, SKIN)), -0.3, np.inf), "mu = -0.3"),
+        (lambda: loaded(FiniteBody.of(MESH, SKIN), load=LoadState(0.0, -0.3)), "mu = -0.3"),
+        (lambda: untouched(Newton(FiniteBody.of(MESH, SKIN).condensed), -0.3, np.inf), "mu = -0.3"),
         (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
         (
             lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), LoadState(np.nan, 0.3, sense=1)),
@@ -143,7 +142,7 @@ def test_a_mesh_of_numbers_of_any_width_gives_the_forces_of_the_closed_form(whol
     mesh = as_handed_in(rolls, whole, lengths)
     found = settled(Newton(LinearBody.of(mesh, TISSUE).condensed), LoadState(np.float32(0.125), 0, sense=1))
     assert found.force[1] == pytest.approx(2.0 * 0.125 * 0.08 / (1.0 - 0.48**2), rel=1e-6)
-    force = settled(FiniteNewton(FiniteBody.of(mesh, SKIN)), LoadState(0.1, 0, sense=1)).force
+    force = settled(Newton(FiniteBody.of(mesh, SKIN).condensed), LoadState(0.1, 0, sense=1)).force
     assert force[1] == pytest.approx(2.0 * 0.012098, rel=1e-4)
 
 

@@ -14,7 +14,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.contact.skin_compression import crosses_itself, pinched
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -102,7 +102,7 @@ def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, he
     condensed, _ = assembled(body, u, np.zeros((len(body.nodes), 3)))
     _, tangent = oracle.system(body, u, np.zeros((len(body.nodes), 3)))
     force = np.random.default_rng(0).normal(size=body.size)
-    skin = np.random.default_rng(1).normal(size=2 * len(body.skin))
+    skin = np.random.default_rng(1).normal(size=2 * len(body.mesh.skin))
     felt, stiffness = oracle.reduced(force, tangent, len(skin))
     assert condensed.inside.factorise(condensed.system.tangent)
     np.testing.assert_allclose(condensed.inside.condense(force), felt, rtol=1e-9, atol=1e-9)
@@ -139,8 +139,8 @@ def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
 
 def test_contact_rows_are_the_derivatives_of_their_conditions():
     body, u = distorted(NeoHooke(0.08, 0.48))
-    newton = FiniteNewton(body)
-    start = EquilibriumState.undeformed(body)
+    newton = Newton(body.condensed)
+    start = EquilibriumState.undeformed(newton.condensed)
     state = np.array([STICK, SLIP, SHEAR_LIMITED, SHEAR_LIMITED, SHEAR_LIMITED, SLIP, OPEN], np.int32)
     sense = np.array([1, 1, -1, -1, -1, -1, 1], np.int32)
     load = LoadState(0.05, 0.4, 0.01, 0)
@@ -150,11 +150,11 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
         pressure = newton_pressure(body, u)
         at = EquilibriumState(u, pressure, state, sense, start.reaction, load, 0)
         force = oracle.system(body, u, pressure)[0]
-        place = at.place(body)
+        place = at.place(newton.condensed)
         length = oracle.tributary(place[:, 0])
         out = force.copy()
-        for i in range(len(body.skin)):
-            x = body.size - 2 * len(body.skin) + 2 * i
+        for i in range(len(body.mesh.skin)):
+            x = body.size - 2 * len(body.mesh.skin) + 2 * i
             y = x + 1
             if state[i] != OPEN:
                 out[y] = place[i, 1] - load.depth
@@ -194,7 +194,7 @@ def equilibrated(body, u):
 
 def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
     newton, probes, _ = finger(4)
-    body = newton.body
+    body = newton.condensed.body
     F = np.array([[1.1, 0.2], [0.05, 0.9]])
     u = body.mesh.nodes @ (F - np.eye(2)).T
     Q = np.sum(F * F) - 2.0 - 2.0 * np.log(np.linalg.det(F))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.response.live_picture import SmallPicture

@@ -8,7 +8,7 @@ import pytest
 from solver._kernels import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
@@ -34,12 +34,12 @@ def marched():
 
 def test_work_of_the_bone_is_stored_or_lost_to_friction_and_friction_only_takes(marched):
     newton, (_, fine) = marched
-    body, before, work, lost = newton.body, fine[0], 0.0, 0.0
+    body, before, work, lost = newton.condensed.body, fine[0], 0.0, 0.0
     for shape in fine[1:]:
         push = (shape.reaction + before.reaction) / 2.0
         work += push[:, 1].sum() * (shape.load.depth - before.load.depth)
         work += push[:, 0].sum() * (shape.load.travel - before.load.travel)
-        slip = np.diff([s.place(body)[:, 0] - s.load.travel for s in (before, shape)], axis=0)[0]
+        slip = np.diff([s.place(newton.condensed)[:, 0] - s.load.travel for s in (before, shape)], axis=0)[0]
         assert (shape.reaction[:, 0] * slip).max() < 1e-12
         lost -= float(push[:, 0] @ slip)
         before = shape

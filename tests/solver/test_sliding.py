@@ -10,7 +10,7 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import FiniteNewton, LoadState
+from solver.equilibrium.newton import LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -46,7 +46,7 @@ def capped():
 
 def test_the_surface_and_the_bone_push_alike(capped):
     newton, shape = capped
-    body = newton.body
+    body = newton.condensed.body
     pressure = pressure_of(body, shape.u)
     force, _ = oracle.forces_and_tangents(body, shape.u, pressure)
     whole = np.zeros(body.mesh.nodes.shape)
@@ -60,14 +60,14 @@ def test_the_surface_and_the_bone_push_alike(capped):
 
 def test_forces_of_touching_points_obey_the_friction_law(capped):
     newton, shape = capped
-    load, body = shape.load, newton.body
-    length = oracle.tributary(shape.place(body)[:, 0])
+    load = shape.load
+    length = oracle.tributary(shape.place(newton.condensed)[:, 0])
     slip, cap, open_ = (shape.state == code for code in (SLIP, SHEAR_LIMITED, OPEN))
     np.testing.assert_allclose(shape.reaction[slip, 0], load.mu * shape.reaction[slip, 1], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[cap, 0], load.tau * length[cap], atol=1e-12)
     np.testing.assert_allclose(shape.reaction[open_], 0.0, atol=1e-12)
     assert (shape.reaction[slip | cap, 1] >= -1e-12).all()
-    height = shape.place(body)[:, 1] - load.depth
+    height = shape.place(newton.condensed)[:, 1] - load.depth
     assert height.min() > -1e-10
 
 
@@ -101,10 +101,10 @@ def test_the_next_surface_follows_from_the_last_one():
 
 def test_scaling_all_stiffness_scales_the_answer():
     newton, probes, _ = finger(5)
-    body = newton.body
+    body = newton.condensed.body
     stiffer = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
     one = settled(newton, LoadState(1.0, 0.44, 0.02, 1))
-    ten = settled(FiniteNewton(stiffer), LoadState(1.0, 0.44, 0.2, 1))
+    ten = settled(Newton(stiffer.condensed), LoadState(1.0, 0.44, 0.2, 1))
     np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
     assert replace(probes, body=stiffer).average(ten.u)[0] == pytest.approx(10 * probes.average(one.u)[0], rel=1e-9)
 

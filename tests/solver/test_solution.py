@@ -25,8 +25,8 @@ from solver import (
 )
 from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.linear_finger import LinearFinger
 from solver.equilibrium.newton import LoadState
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve, stepper
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.force_control import march as forced_march
 from solver.equilibrium.force_control import untouched as at_rest
-from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.march import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import Given
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW

@@ -9,11 +9,10 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.finite_finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.linear_finger import LinearFinger
-from solver.equilibrium.march import march
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState, Newton
+from solver.equilibrium.load_stepping import march
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.scene.published import STICKINESS, scene
@@ -49,7 +48,7 @@ def _linear(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
 
 
 def _finite(mesh: Mesh, layers: Sequence[tuple[float, float]]) -> Newton:
-    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(*layer) for layer in layers]))
+    return Newton(FiniteBody.of(mesh, [NeoHooke(*layer) for layer in layers]).condensed)
 
 
 def _sed(finger: Finger, state: EquilibriumState) -> float:

@@ -11,8 +11,8 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.march import march
-from solver.equilibrium.newton import EquilibriumState, FiniteNewton, LoadState
+from solver.equilibrium.load_stepping import march
+from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.verification.published.bodies import graded, mirrored, mound
 from solver.verification.published.zones import half_above, half_width
 
@@ -28,7 +28,7 @@ STEP = 5e-5  # of the surface sideways, in half-widths
 class LightFinite:
     """A half-plane at finite strain and what a light press of it gives."""
 
-    newton: FiniteNewton
+    newton: Newton
     pressed: EquilibriumState
     load: float  # [N/mm]
 
@@ -45,8 +45,7 @@ class LightFinite:
     @property
     def x(self) -> Array:
         """Where the skin's nodes lie undeformed (k,)."""
-        mesh = self.newton.body.mesh
-        return mesh.nodes[mesh.skin, 0]
+        return self.newton.skin_x
 
     @property
     def length(self) -> Array:
@@ -97,6 +96,6 @@ def light_finite() -> LightFinite:
     """Return the half-plane, pressed without friction."""
     x = mirrored(graded(ELEMENT, 0.3, 1.2, WIDE))
     y = graded(ELEMENT, 0.3, 0.0, WIDE)
-    newton = FiniteNewton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]))
+    newton = Newton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]).condensed)
     pressed = settled(newton, LoadState(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
     return LightFinite(newton, pressed, float(pressed.force[1]))
