@@ -9,10 +9,9 @@ from solver.accuracy.finite_ends import end, relaxes, steps_asked
 from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
-from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.loads import forces_of, sliding_load
+from solver.equilibrium.finger import FiniteFinger, forces_of, sliding_load
+from solver.equilibrium.load_path import Steps
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import NestedNumbers

@@ -17,8 +17,8 @@ import numpy as np
 
 from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
+from solver.equilibrium.load_path import Steps
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
-from solver.equilibrium.step_error import Steps
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Response
 from solver.quantities import NAMES
 from solver.scene.scene import Scene

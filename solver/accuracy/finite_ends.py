@@ -4,9 +4,8 @@ from collections.abc import Callable
 
 from solver.continuation.finite_states import course, depends_on_way
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.finite_relaxation import RelaxingCourse
+from solver.equilibrium.load_path import Steps, march
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps
 from solver.scene.scene import Scene
 
 
@@ -18,7 +17,7 @@ def relaxes(scene: Scene) -> bool:
 def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> EquilibriumState:
     """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
     if relaxes(scene):
-        return RelaxingCourse(scene, finger, stop, times=times).last
+        return march(scene, finger, times, relaxing=True, stop=stop).last
     return course(scene, finger, stop, times).last
 
 

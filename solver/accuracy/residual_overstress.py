@@ -15,10 +15,9 @@ import numpy as np
 
 from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import LinearFinger, relaxing_laws
-from solver.equilibrium.load_path import PRESSING_TIME, Aim
-from solver.equilibrium.loads import load_of
-from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay
+from solver.equilibrium.finger import LinearFinger, load_of, relaxing_laws
+from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, way_of
+from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
@@ -119,12 +118,11 @@ def _small(scene: Scene, aims: list[Aim]) -> tuple[float, float]:
     finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
     body = copy(body)  # each course has a past of its own
     body.rest()
-    way = RelaxingWay(
-        body, load_of(scene), scene.loading_per_mm, finger.ending.endings, finger.point.endings, aims[0].time
-    )
+    tissue = LinearTissue(body, (finger.ending.endings,))
+    way = RelaxingWay(tissue, finger.newton, load_of(scene), scene.loading_per_mm)
     for aim in aims:
         way.go(aim)
-    return way.sed[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))
+    return way.energies[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))
 
 
 @lru_cache(maxsize=1)
@@ -143,8 +141,11 @@ def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[fl
     from solver.accuracy.adaptivity import MARGIN
     from solver.continuation.finite_states import roughly
     from solver.equilibrium.finger import FiniteFinger
-    from solver.equilibrium.finite_relaxation import RelaxingCourse
 
     finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))
     at_last = finger.sed_ending(roughly(finger, scene, stop).u)
-    return RelaxingCourse(scene, finger, stop, aims).sed[-1][0], at_last
+    way = way_of(scene, finger, relaxing=True, stop=stop)
+    for aim in aims:
+        way.go(aim)
+    assert isinstance(way, RelaxingWay)
+    return way.energies[-1][0], at_last

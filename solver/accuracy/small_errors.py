@@ -6,10 +6,9 @@ import numpy as np
 
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.continuation.small_states import end, nearest
-from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.loads import forces_of
+from solver.equilibrium.finger import LinearFinger, forces_of
+from solver.equilibrium.load_path import Steps
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps
 from solver.failures import SolveFailure
 from solver.prediction import COUNT, NestedNumbers
 from solver.scene.scene import Scene

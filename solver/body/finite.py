@@ -350,6 +350,12 @@ class FinitePatches:
         kernels.energies(displacement, self.body.elements, probes, out)
         return out
 
+    def deformation(self, displacement: Array) -> Array:
+        """Return F (p, 2, 2) for displacements (nodes, 2)."""
+        local = displacement[self.body.nodes[self.element]]
+        gradient = np.stack([self.grad_x, self.grad_y], axis=-1)
+        return np.eye(2) + np.einsum("pia,piA->paA", local, gradient)
+
     def average(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
         return patch_means(self.energy(displacement), self.weights, self.patch, self.areas)

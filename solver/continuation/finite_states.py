@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver._kernels import STICK
 from solver.continuation import limit_point as reach
 from solver.continuation.existence import APART, all_at_the_bound, stands, steady, steep
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium.finger import FiniteFinger
+from solver.equilibrium.finger import FiniteFinger, sliding_load
 from solver.equilibrium.force_control import balanced
-from solver.equilibrium.load_path import Aim, Way, press_and_drag
-from solver.equilibrium.loads import load_of, sliding_load
+from solver.equilibrium.load_path import Way, march
 from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
@@ -22,16 +20,11 @@ from solver.scene.scene import Scene
 
 FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
-GOOD, CLOSE = 1e-7, 1e-7  # tolerance of the states of a course [mm], and by the indentation where that is less
-PRESSES = 40  # steps of the pre-indentation, and of a drag that grows
 BEYOND = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
 SEARCHES = 20  # steps of a search for the depth at which a force is met
 FURTHEST = 0.25  # of the depth, by which it may change in one
 MET = 1e-9  # relative difference within which it is
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
-STRIDE = 0.1  # of the bone while it slides, by the indentation [-]
-LONGEST = 8.0  # slide after which a course that has not settled is given up, by the indentation [-]
-SETTLED = 1e-10  # relative change of the ending's SED in a step, with every touching point slipping
 
 
 def settled(
@@ -241,28 +234,4 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
     """
     for leg in scene.earlier_slides():  # one that never settles is refused with its limits
         settled(finger, leg, stop)
-    loading, count = scene.loading_per_mm, round(PRESSES * times)
-    good = GOOD if scene.normal_force is not None else min(GOOD, CLOSE * loading.depth)
-    way = Way(finger.newton, load_of(scene), loading, good, stop)
-    press_and_drag(way, loading, lambda part: report_progress("pressing and dragging step by step", part), count, count)
-    if not loading.dragged:
-        for direction in loading.directions:
-            _settle(way, finger, direction * loading.speed, times)
-    return way
-
-
-def _settle(way: Way, finger: FiniteFinger, speed: float, times: float) -> None:
-    """Slide until the response does not change any more. Raises NotConverged where it still does."""
-    depth, friction = way.last.load.depth, way.last.load.mu
-    sed, step = finger.sed_ending(way.last.u), STRIDE / times * depth
-    longest = int(LONGEST / STRIDE * times)
-    for number in range(longest):
-        report_progress("sliding until nothing changes", number / longest)
-        way.go(Aim(way.aim.time + step / abs(speed), way.aim.press, way.aim.along + float(np.sign(speed)) * step))
-        before, sed = sed, finger.sed_ending(way.last.u)
-        if not (way.last.state == STICK).any() and abs(sed - before) * times <= SETTLED * sed:
-            return
-    raise NotConverged(
-        f"After {LONGEST * depth:.3g} mm of sliding at {depth:.3g} mm of indentation and mu = {friction:.3g} "
-        "the response still changes: no settled state was reached; ask for less friction or depth."
-    )
+    return march(scene, finger, times, stop=stop)

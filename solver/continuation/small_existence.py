@@ -7,8 +7,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import STICK
 from solver.continuation.small_states import followed_under, settled
 from solver.continuation.wedging import continue_branch, limits
-from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.loads import sliding_load
+from solver.equilibrium.finger import LinearFinger, sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.scene.scene import Scene

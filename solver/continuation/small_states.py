@@ -9,15 +9,13 @@ from solver._kernels import STICK
 from solver.arrays import Array
 from solver.continuation.wedging import continue_branch
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
-from solver.equilibrium.finger import LinearFinger, relaxing_laws
+from solver.equilibrium.finger import LinearFinger, forces_of, load_of, sliding_load
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
-from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Instant, march
-from solver.equilibrium.loads import forces_of, load_of, sliding_load
+from solver.equilibrium.load_path import Instant, RelaxingWay, march
 from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.equilibrium.relaxation import RelaxingBody, RelaxingWay, march_relaxing
 from solver.failures import ContactLost, NoSteadyState, beyond_friction
-from solver.progress import Progress
+from solver.progress import Progress, report_part
 from solver.scene.scene import Scene
 
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
@@ -32,7 +30,7 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
     """
     load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
     if loading.direction == 0 and not load.frictionless:
-        return march(newton, load_of(scene), loading, times=times)[-1].state
+        return march(scene, finger, times).last
     if loading.normal_force is None:
         return full_slip(newton, load)
     deepest = DEEPEST * scene.finger.pulp_thickness()
@@ -42,7 +40,7 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
         if loading.tangential_force is None:
             raise
         # the drag may be met where sliding would wedge
-        return march(newton, load_of(scene), loading, times=times)[-1].state
+        return march(scene, finger, times).last
     if loading.tangential_force is None:
         return found
     most = abs(float(found.force[0]))
@@ -50,7 +48,7 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
         raise beyond_friction(loading.tangential_force, most, loading.normal_force)
     if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
         return found
-    return march(newton, load_of(scene), loading, times=times)[-1].state
+    return march(scene, finger, times).last
 
 
 def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
@@ -101,22 +99,16 @@ def marched(
     scene: Scene, finger: LinearFinger, progress: Progress | None = None, times: float = 1.0
 ) -> tuple[tuple[Instant, ...], Array | None]:
     """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
-    load, loading = load_of(scene), scene.loading_per_mm
-    if not scene.materials.relax:
-        return march(finger.newton, load, loading, progress, times), None
-    laws = relaxing_laws(scene.materials)
-    body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
-    first = PRESSING_TIME / round(PRESSING_STEPS * times)
-    way = RelaxingWay(body, load, loading, finger.ending.endings, finger.point.endings, first)
-    march_relaxing(way, loading, scene.materials.longest_creep, progress, times)
-    return tuple(way.instants), np.array(way.sed)
+    way = march(
+        scene, finger, times, relaxing=scene.materials.relax, report=lambda _, part: report_part(progress, part)
+    )
+    over_time = np.array([(0.0, 0.0), *way.energies]) if isinstance(way, RelaxingWay) else None
+    return tuple(way.instants), over_time
 
 
 def end(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
     """Return the end of a course that it depends on. Raises NotConverged."""
-    if scene.materials.relax and scene.solve.course == "history":
-        return marched(scene, finger, times=times)[0][-1].state
-    return march(finger.newton, load_of(scene), scene.loading_per_mm, times=times)[-1].state
+    return march(scene, finger, times, relaxing=scene.materials.relax and scene.solve.course == "history").last
 
 
 def refined(

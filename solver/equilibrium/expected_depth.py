@@ -6,9 +6,8 @@ from functools import lru_cache
 
 from numpy.linalg import LinAlgError
 
-from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_under
-from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesh import MeshError

@@ -23,7 +23,7 @@ from solver.constitutive.linear import Moduli, Prony
 from solver.contact.edges import arcs_of, width
 from solver.contact.skin_compression import SkinCompression
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
-from solver.equilibrium.newton import EquilibriumState, Newton
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.mesh.mesh import MeshError, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
@@ -260,3 +260,24 @@ def _finite(tissue: Material, moduli: Moduli) -> Law:
     if tissue.law != "ogden":
         return NeoHooke(young, nu)
     return Ogden(young, nu) if tissue.stiffening is None else Ogden(young, nu, tissue.stiffening)
+
+
+def load_of(scene: Scene) -> LoadState:
+    """Return depth, friction and bound of a scene as what the surface does; a bound of zero is no friction."""
+    bound = scene.friction.cap
+    depth = scene.loading.depth if scene.normal_force is None else 0.0  # found, where a force is given
+    return LoadState(depth, float(scene.friction.mu) if bound > 0.0 else 0.0, bound)
+
+
+def sliding_load(scene: Scene) -> LoadState:
+    """Return what the surface does while it slides as a scene has it, or along +x where that does not matter."""
+    return load_of(scene)._replace(sense=-(scene.loading.direction or 1))
+
+
+def forces_of(scene: Scene, load: LoadState) -> Given | None:
+    """Return the forces that a scene gives to a state under `load`, None where it gives a depth."""
+    if scene.normal_force is None:
+        return None
+    holds = scene.tangential_force is not None and load.sense == 0 and not load.frictionless
+    drag = -scene.loading.direction * scene.tangential_force if holds and scene.tangential_force is not None else None
+    return Given(scene.normal_force, drag, load.travel)

@@ -1,27 +1,71 @@
-"""The way of a finger in time: the bone comes down over 1 s, then slides until nothing changes, or is dragged."""
+"""The course of a finger in time: the bone comes down over 1 s, then slides until nothing changes, or is dragged.
 
-from collections.abc import Callable
+Tissues that relax are marched in time, and at last waited for. The steps are those of `CourseSteps`; how many a course
+takes whose end depends on its way, and by how much that end may be off for not taking more, say `Steps`.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
-from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
+from solver._kernels import OPEN, STICK
+from solver.arrays import Array
+from solver.body.receptor import Patches
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, load_of, relaxing_laws
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_stepping import StepControl, advance, never
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, followed_to
-from solver.progress import Progress, report_part
-from solver.scene.scene import Loading
+from solver.progress import report_progress
+from solver.scene.scene import Loading, Scene
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
-PRESSING_STEPS = 25
 DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
-DRAGGING_STEPS = 25
-LONG = 25.0  # travel within which all but slides near the wedging limit settle, in indentations
-FURTHEST = 100.0  # and after which a slide that has not settled is given up
 CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
-TOLERANCE = 1e-10  # of displacements [mm]
+Report = Callable[[str, float], None]  # called with what is being done, and the part of the course done, 0 to 1
+
+
+@dataclass(frozen=True, slots=True)
+class CourseSteps:
+    """How a course is cut into steps; those of a slide by the indentation."""
+
+    press: int  # of the pre-indentation, and as many of a drag that grows
+    first: float
+    growth: float  # of each step of a slide by the one before
+    largest: float
+    furthest: float  # slide after which a course that has not settled is given up
+    plateau: int = 0  # steps beyond the settled state, to show that nothing changes
+    tolerance: float = 1e-10  # of displacements [mm]
+    by_depth: float = 1.0  # the same by the indentation, where that is less
+
+    def finer(self, times: float) -> "CourseSteps":
+        """Return so many `times` the steps."""
+        press = round(self.press * times)
+        return replace(self, press=press, first=self.first / times, largest=self.largest / times)
+
+
+SMALL = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
+FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
+RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8, by_depth=1e-7)
+LONG = 25.0  # slide within which all but those near the wedging limit settle, by the indentation
+SETTLED = 1e-10  # relative change of the ending's SED in a step of finite strain, with every touching point slipping
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """How long tissues are waited for when nothing but relaxation goes on."""
+
+    relaxed: float = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7
+    equal: int = 6  # steps of equal length before they are doubled
+    still: float = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
+    doublings: int = 60  # of the steps at most
+
+
+WAITING = Waiting()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,48 +98,6 @@ class Aim(NamedTuple):
         return Aim(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
-def march(
-    newton: Newton, friction: LoadState, loading: Loading, progress: Progress | None = None, times: float = 1.0
-) -> tuple[Instant, ...]:
-    """Drive a body down and along, step by step (backward Euler), until every slide of `loading` has settled.
-
-    So many `times` the usual steps are taken. Forces of `loading` are per mm. A given drag must be less than what
-    friction carries. Raises NotConverged where a step cannot be made or sliding does not settle, Cancelled where
-    `progress` says so.
-    """
-    way = Way(newton, friction, loading)
-    course(way, loading, progress, times)
-    return tuple(way.instants)
-
-
-def course(way: "Way", loading: Loading, progress: Progress | None = None, times: float = 1.0) -> None:
-    """Press, and slide or drag, along `way`, in so many `times` the usual steps. Raises as `march`."""
-
-    def report(part: float) -> None:
-        report_part(progress, part if loading.dragged else part / 2.0)
-
-    press_and_drag(way, loading, report, round(PRESSING_STEPS * times), round(DRAGGING_STEPS * times))
-    if not loading.dragged:
-        for direction in loading.directions:
-            slide(way, direction, loading.speed, progress, times)
-
-
-def press_and_drag(way: "Way", loading: Loading, report: Callable[[float], None], pressing: int, dragging: int) -> None:
-    """Press along `way` in so many steps, and let a given drag grow in so many; `report` the part done, 0 to 1."""
-    press = loading.depth if loading.normal_force is None else loading.normal_force
-    count = pressing + (dragging if loading.dragged else 0)
-    for number in range(1, pressing + 1):
-        part = number / pressing
-        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
-        report(number / count)
-    if loading.tangential_force is not None:
-        load = -loading.direction * loading.tangential_force
-        for number in range(1, dragging + 1):
-            part = number / dragging
-            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
-            report((pressing + number) / count)
-
-
 class Way:
     """The states so far, and how the next one is found."""
 
@@ -104,7 +106,7 @@ class Way:
         newton: Newton,
         friction: LoadState,
         loading: Loading,
-        tolerance: float = TOLERANCE,
+        tolerance: float = SMALL.tolerance,
         stop: Callable[[], bool] = never,
     ) -> None:
         """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found.
@@ -154,33 +156,238 @@ class Way:
         return balanced(self.newton, lowered(self.newton.condensed, before), given)
 
 
-def slide(way: Way, direction: int, speed: float, progress: Progress | None, times: float) -> None:
-    """Append the sliding states until they do not change, and a stretch of them beyond."""
+class RelaxingWay(Way):
+    """The way of a body that relaxes, with the SED of one ending and one point at every instant after rest."""
+
+    def __init__(
+        self,
+        tissue: Tissue,
+        newton: Newton,
+        friction: LoadState,
+        loading: Loading,
+        tolerance: float = SMALL.tolerance,
+        stop: Callable[[], bool] = never,
+    ) -> None:
+        """Start at rest, as `Way`."""
+        super().__init__(newton, friction, loading, tolerance, stop)
+        self.tissue = tissue
+        self.energies: list[tuple[float, ...]] = []
+        self.sense = 0  # of the friction force on all that touches, whatever comes to touch; 0: it is found
+
+    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
+        """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
+        step = aim.time - self.aim.time
+        self.newton = self.tissue.ready(step)
+        state = super().found(replace(before, load=before.load._replace(sense=self.sense)), aim)
+        self.energies.append(self.tissue.took(state, step))
+        return state
+
+
+def march(
+    scene: Scene,
+    finger: Finger[Patches],
+    times: float = 1.0,
+    *,
+    relaxing: bool = False,
+    stop: Callable[[], bool] = never,
+    report: Report = report_progress,
+) -> Way:
+    """Drive the finger of a scene down and along, step by step (backward Euler), until every slide has settled.
+
+    So many `times` the usual steps are taken. With `relaxing` the tissues relax, and are waited for at last; else they
+    have relaxed from the start. A given drag must be less than what friction carries. Raises NotConverged where a step
+    cannot be made or sliding does not settle, Cancelled where `stop` or `report` says so.
+    """
+    steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
+    way = way_of(scene, finger, relaxing=relaxing, stop=stop)
+    follow(way, finger, loading, steps, times, report)
+    if isinstance(way, RelaxingWay):
+        _wait(way, loading, scene.materials.longest_creep, times, report)
+    return way
+
+
+def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
+    """Return the usual steps of the courses of a finger."""
+    return SMALL if isinstance(finger, LinearFinger) else RELAXING if relaxing else FINITE
+
+
+def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False, stop: Callable[[], bool] = never) -> Way:
+    """Return the untouched finger of a scene, at the beginning of its course."""
+    steps, loading = steps_of(finger, relaxing=relaxing), scene.loading_per_mm
+    good = steps.tolerance
+    if loading.normal_force is None:
+        good = min(good, steps.by_depth * loading.depth)
+    if not relaxing:
+        return Way(finger.newton, load_of(scene), loading, good, stop)
+    return RelaxingWay(tissue_of(scene, finger), finger.newton, load_of(scene), loading, good, stop)
+
+
+def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
+    """Return the tissues of a scene's finger at rest, as they relax."""
+    laws = relaxing_laws(scene.materials)
+    if isinstance(finger, FiniteFinger):
+        return FiniteTissue(finger.body, laws, (finger.ending, finger.point))
+    assert isinstance(finger, LinearFinger)
+    body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
+    return LinearTissue(body, (finger.ending.endings, finger.point.endings))
+
+
+def follow(
+    way: Way, finger: Finger[Patches], loading: Loading, steps: CourseSteps, times: float, report: Report
+) -> None:
+    """Press, and slide or drag, along `way`. Raises as `march`."""
+    press = loading.depth if loading.normal_force is None else loading.normal_force
+    share = 1.0 if loading.dragged else 0.5  # of the work
+    count = steps.press * (2 if loading.dragged else 1)
+    doing = "pressing and dragging step by step" + _why(way)
+    for number in range(1, steps.press + 1):
+        part = number / steps.press
+        way.go(Aim(PRESSING_TIME * part, press * part, 0.0))
+        report(doing, share * number / count)
+    if loading.tangential_force is not None:
+        load = -loading.direction * loading.tangential_force
+        for number in range(1, steps.press + 1):
+            part = number / steps.press
+            way.go(Aim(PRESSING_TIME + DRAGGING_TIME * part, press, load * part))
+            report(doing, share * (steps.press + number) / count)
+        return
+    for direction in loading.directions:
+        _slide(way, direction * loading.speed, steps, _Settled(way, finger, direction, times), report)
+
+
+def _why(way: Way) -> str:
+    return ", since the tissues relax" if isinstance(way, RelaxingWay) else ""
+
+
+class _Settled:
+    """Whether a slide has settled, asked before every step of it."""
+
+    def __init__(self, way: Way, finger: Finger[Patches], direction: int, times: float) -> None:
+        self._way, self._finger, self._direction, self._times = way, finger, direction, times
+        self._sed: float | None = None
+
+    def __call__(self) -> bool:
+        """Return whether further sliding changes nothing.
+
+        At small strain that is so once every touching point slips against the slide. At finite strain states may go on
+        to change: there the ending's SED must stay too, or the tissues be waited for.
+        """
+        state = self._way.last
+        if isinstance(self._finger, LinearFinger):
+            slips = (state.sense == -self._direction) | self._way.frictionless
+            return bool(((state.state == OPEN) | ((state.state != STICK) & slips)).all())
+        before = self._sed
+        relaxes = isinstance(self._way, RelaxingWay)
+        sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
+        still = before is not None and (relaxes or abs(sed - before) * self._times <= SETTLED * sed)
+        return still and not (state.state == STICK).any()
+
+
+def _slide(way: Way, speed: float, steps: CourseSteps, settled: Callable[[], bool], report: Report) -> None:
+    """Append the sliding states until they do not change, and a stretch of them beyond. Raises NotConverged."""
     begun, depth = way.aim, way.instants[-1].depth
-    step, distance = 0.01 / times * depth, 0.0
-    largest = 0.06 / times * depth
+    step, distance = steps.first * depth, 0.0
+    direction, longest = np.sign(speed).item(), min(LONG, steps.furthest) * depth
 
-    def at(distance: float) -> Aim:
-        return Aim(begun.time + distance / speed, begun.press, begun.along + direction * distance)
+    def go(distance: float) -> None:
+        way.go(Aim(begun.time + distance / abs(speed), begun.press, begun.along + direction * distance))
 
-    while distance < FURTHEST * depth:
-        if _settled(way.instants[-1].state, direction, frictionless=way.frictionless):
-            plateau = max(1.3 * distance, distance + depth)
-            for part in np.linspace(distance, plateau, 5)[1:]:
-                way.go(at(float(part)))
-            return
+    while not settled():
+        if distance >= steps.furthest * depth:
+            raise NotConverged(
+                f"after {distance:.3g} mm of sliding at {depth:.4g} mm of indentation and mu = {way.last.load.mu:.3g} "
+                "the state still changes, as it does where the finger wedges itself in; ask for less friction or depth"
+            )
         distance += step
-        way.go(at(distance))
-        step = min(step * 1.2, largest)
-        report_part(progress, 0.5 + 0.5 * min(distance / (LONG * depth), 1.0))
-    message = f"sliding had not settled after {distance:.1f} mm at {depth:.4g} mm indentation"
-    raise NotConverged(
-        f"{message}: the drag still grew, as it does where the finger wedges itself in; ask for less friction or depth."
-    )
+        go(distance)
+        step = min(step * steps.growth, steps.largest * depth)
+        report("sliding step by step until nothing changes" + _why(way), 0.5 + 0.5 * min(distance / longest, 1.0))
+    beyond = max(0.3 * distance, depth)
+    for number in range(1, steps.plateau + 1):
+        go(distance + beyond * number / steps.plateau)
 
 
-def _settled(state: EquilibriumState, direction: int, *, frictionless: bool) -> bool:
-    """Return whether every touching point slips against the slide, so that further sliding changes nothing."""
-    slips = (state.state == SLIP) | (state.state == SHEAR_LIMITED)
-    along = state.sense == -direction
-    return bool(((state.state == OPEN) | (slips & (along | frictionless))).all())
+def _wait(way: RelaxingWay, loading: Loading, slowest: float, times: float, report: Report) -> None:
+    """Go on in steps that double until the `slowest` tissue [s] has relaxed, the bone sliding on where it slid last.
+
+    Longer where the energy at the ending still moves: near a limit of sliding a body settles more slowly than any of
+    its tissues.
+    """
+    speed = 0.0 if loading.dragged else loading.direction * loading.speed
+    if not isinstance(way.tissue, LinearTissue):
+        way.sense = -int(np.sign(speed))  # by now all that touches slips
+    step, waited, longest = way.instants[-1].time - way.instants[-2].time, 0.0, WAITING.relaxed * slowest
+    for _ in range(WAITING.doublings):
+        before = way.energies[-1][0]
+        for _ in range(ceil(WAITING.equal * times)):
+            report("waiting step by step until the tissues have relaxed", min(waited / longest, 1.0))
+            way.go(Aim(way.aim.time + step, way.aim.press, way.aim.along + speed * step))
+            waited += step
+        if waited >= longest and abs(way.energies[-1][0] - before) <= WAITING.still * abs(way.energies[-1][0]):
+            return
+        step *= 2.0
+
+
+PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
+MOST = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
+USUAL = 0.003  # tolerance that steps are chosen for where none is asked for, as the default meshes' errors
+SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """The steps of one course. Numbers are those of `all_numbers` (c,).
+
+    A press with friction, or a drag that friction carries, depends on its way: where in a step a point comes to touch
+    is where it is held from then on. The error so falls with the number of steps, on average, and irregularly: each
+    point touches at some part of its step. It is nearly the same on every mesh, so that it is measured on a coarse one,
+    by two courses of fewer steps. With an error c of the usual steps and c/p of a part p of them, the end changes by
+    c (1/p - 1). Either course may agree with the usual one by chance, which is why both estimates of c are added. A
+    settled slide has no such error.
+    """
+
+    times: int  # the usual ones
+    excess: Array  # (c,) of the numbers after the usual steps over those after many
+    bound: Array  # (c,) of its size
+
+    @staticmethod
+    def of(usual: Array, fewer: Array, tolerance: float | None) -> "Steps":
+        """Return the fewest that a tolerance asks for.
+
+        `usual` (c,) and `fewer` (2, c) are numbers after the usual steps and after PARTS of them, on a coarse mesh.
+        """
+        excess = (fewer - usual) / (1.0 / PARTS - 1.0)[:, None]
+        bound = np.abs(excess).sum(axis=0)
+        off = float(bound[0]) / max(abs(float(usual[0])), np.finfo(float).tiny)
+        times = min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST)
+        return Steps(times, excess.mean(axis=0), bound)
+
+    @staticmethod
+    def asked(
+        end: Callable[[float], EquilibriumState],
+        numbers: Callable[[Sequence[EquilibriumState]], Array],
+        tolerance: float | None,
+    ) -> "Steps":
+        """Return those that a tolerance asks for; `end` returns that of the course in so many times the usual steps."""
+        usual, *fewer = numbers([end(times) for times in (1.0, *PARTS.tolist())])
+        return Steps.of(usual, np.array(fewer), tolerance)
+
+    @property
+    def error(self) -> Array:
+        """By how much numbers may be off for not taking more steps (c,)."""
+        return self.bound / self.times
+
+    def taken(self, usual: Array) -> Array:
+        """Return what the numbers (c,) after the usual steps would be after these."""
+        return usual - (1.0 - 1.0 / self.times) * self.excess
+
+
+def times_on_way(scene: Scene, asked: Callable[[Scene], Steps | None]) -> int:
+    """Return how many times the usual load steps a history takes whose end does not depend on them.
+
+    Those that a tolerance asks for at the end of its press; `asked` returns the steps of that. Raises as it does.
+    """
+    if scene.solve.course == "steady" or scene.solve.tolerance is None or load_of(scene).frictionless:
+        return 1
+    steps = asked(scene.pressed_only())
+    return 1 if steps is None else steps.times

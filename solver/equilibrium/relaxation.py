@@ -1,38 +1,51 @@
-"""Bodies whose tissues relax (`materials.Prony`), step by step in time at small strain.
+"""Bodies whose tissues relax (`constitutive.linear.Prony`), step by step in time.
 
-Of every term of a series the strain that has not yet relaxed is kept, h(t) = integral of exp(-(t - s)/tau) de/ds ds.
-It is linear in the displacements, so it is kept as displacements of each element's nodes, and its stress is the
-stiffness of the shear modulus times them. Within a step the strain grows evenly, for which the recursion is exact
-(Taylor, Pister and Goudreau 1970; Simo and Hughes 1998, sec. 10.3):
+At small strain, of every term of a series the strain that has not yet relaxed is kept, h(t) = integral of
+exp(-(t - s)/tau) de/ds ds. It is linear in the displacements, so it is kept as displacements of each element's nodes,
+and its stress is the stiffness of the shear modulus times them. Within a step the strain grows evenly, for which the
+recursion is exact (Taylor, Pister and Goudreau 1970; Simo and Hughes 1998, sec. 10.3):
 
     h(t + dt) = exp(-dt/tau) h(t) + kept(dt/tau) (e(t + dt) - e(t)),    kept(x) = (1 - exp(-x))/x.
 
 A step is then elastic, with the moduli `Prony.within(dt)` and what is left of the past as a load. The SED is the energy
 stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, e being the strain's deviator.
+
+At finite strain there are a relaxed law and the overstress of the past (`constitutive.overstress`). In the end only the
+relaxed law is left. The finger carries its own skin along the surface and nothing flows through it, so that a settled
+slide stands still in the tissue and has relaxed wholly, whatever its speed.
 """
 
 from collections.abc import Callable, Sequence
-from math import ceil
+from typing import Protocol
 
 import numpy as np
 
-from solver.arrays import Array
+from solver import _kernels as kernels
+from solver.arrays import Array, Indices
+from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.linear import CondensedLinear, LinearBody
 from solver.body.receptor import Endings, patch_means
 from solver.body.stiffness import Elastic, Probes
-from solver.body.validation import check_body, check_driven, check_held, check_terms
+from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
+from solver.constitutive import overstress
 from solver.constitutive.linear import Moduli, Prony, kept
-from solver.equilibrium.load_path import PRESSING_STEPS, PRESSING_TIME, Aim, Way, course
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
+from solver.constitutive.overstress import Past
+from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.mesh.mesh import Mesh
-from solver.progress import Progress
-from solver.scene.scene import Loading
 
 KEPT = 4  # lengths of steps that a body is kept ready for, factors and all
-RELAXED = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7
-EQUAL_STEPS = 6  # steps of equal length while nothing but relaxation goes on, before they are doubled
-STILL = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
-DOUBLINGS = 60  # of the steps at most
+
+
+class Tissue(Protocol):
+    """A finger's tissues as they relax, and the places that are watched."""
+
+    def ready(self, step: float) -> Newton:
+        """Prepare a step in time [s] and return the iterations on the body that take it."""
+        ...
+
+    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
+        """Take the step that was made ready, to `state`; return the energy stored in each watched place [MPa]."""
+        ...
 
 
 class RelaxingBody:
@@ -162,66 +175,104 @@ class RelaxingBody:
         return self._steps[key]
 
 
-class RelaxingWay(Way):
-    """The course of a body that relaxes, with the SED of one ending and one point at every instant."""
+class CondensedRelaxing(CondensedFinite):
+    """A body that relaxes, whose own laws are the relaxed ones."""
 
-    def __init__(
-        self,
-        body: RelaxingBody,
-        friction: LoadState,
-        loading: Loading,
-        ending: Endings,
-        point: Endings,
-        first: float = PRESSING_TIME / PRESSING_STEPS,
-    ) -> None:
-        """Start at rest; `first` is the length of the first step [s]."""
-        self.body = body
-        self._ending, self._point, self._ready = ending, point, first
-        super().__init__(Newton(body.ready(first)), friction, loading)
-        self.sed: list[tuple[float, float]] = [(0.0, 0.0)]
+    def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
+        """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
+        super().__init__(body)
+        check_moduli(body.mesh, laws)
+        check_terms(laws)
+        self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.weight.shape[1])))
+        self.tensor = np.zeros((*body.weight.shape, 4))
 
-    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
-        step = aim.time - self.aim.time
-        if step != self._ready:
-            self.newton = Newton(self.body.ready(step))
-        self._ready = 0.0  # what comes next has another past
-        state = super().found(before, aim)
-        self.body.advance(state.u)
-        self.sed.append((float(self.body.average(self._ending)[0]), float(self.body.average(self._point)[0])))
-        return state
+    def ready(self, step: float) -> None:
+        """Prepare a step in time [s]."""
+        self.tensor = self.past.over(step).reshape(self.tensor.shape)
+        self.found = None
+
+    def took(self, u: Array, step: float) -> None:
+        """Remember the step that was made ready and led to displacements `u` (nodes, 2)."""
+        self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
+
+    def assemble(self, u: Array, pressure: Array) -> float:
+        """Fill tangents and forces at a state and return the least det F."""
+        least = super().assemble(u, pressure)
+        if least > 0.0:
+            self._add(u, anew=True)
+        return least
+
+    def resist(self, u: Array) -> float:
+        """Fill the forces at a state for the tangent that is there and return the least det F."""
+        least = super().resist(u)
+        if least > 0.0:
+            self._add(u, anew=False)
+        return least
+
+    def _add(self, u: Array, *, anew: bool) -> None:
+        kernels.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
+
+    def excess(self, u: Array) -> Array:
+        """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
+        body = self.body
+        stress = overstress.stress(self.tensor, body.deformation(u))
+        gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
+        return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
+
+    def stored(self, u: Array, reaction: Array) -> float:
+        """Return the energy stored at `u`, with what the terms hold at the last instant remembered."""
+        return super().stored(u, reaction) + float(self.past.energy() @ self.body.weight.ravel())
 
 
-def march_relaxing(
-    way: RelaxingWay, loading: Loading, slowest: float, progress: Progress | None = None, times: float = 1.0
-) -> None:
-    """Press, slide or drag as `stepping.march` does, and go on until the `slowest` tissue [s] has relaxed.
-
-    Raises as `stepping.march`.
-    """
-    course(way, loading, progress, times)
-    speed = 0.0 if loading.dragged else loading.direction * loading.speed
-
-    def go(step: float) -> None:
-        way.go(Aim(way.aim.time + step, way.aim.press, way.aim.along + speed * step))
-
-    wait(go, way.instants[-1].time - way.instants[-2].time, slowest, way.sed, times)
+def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
+    """Return g G and tau (p, m) of the terms at points in regions (p,)."""
+    most = max(len(law.terms) for law in laws)
+    shear, tau = np.zeros((len(region), most)), np.ones((len(region), most))
+    for number, law in enumerate(laws):
+        for place, (g, time) in enumerate(law.terms):
+            shear[region == number, place], tau[region == number, place] = g * law.shear, time
+    return shear, tau
 
 
-def wait(
-    go: Callable[[float], None], step: float, slowest: float, sed: Sequence[tuple[float, float]], times: float
-) -> None:
-    """Go on in steps that double, the first of `step` [s], until all has relaxed.
+class LinearTissue:
+    """Tissues that relax at small strain."""
 
-    That is RELAXED times of the `slowest` tissue [s], and longer where the energy at the ending, the first of `sed`'s
-    last, still moves: near a limit of sliding a body settles more slowly than any of its tissues.
-    """
-    waited = 0.0
-    for _ in range(DOUBLINGS):
-        before = sed[-1][0]
-        for _ in range(ceil(EQUAL_STEPS * times)):
-            go(step)
-            waited += step
-        if waited >= RELAXED * slowest and abs(sed[-1][0] - before) <= STILL * abs(sed[-1][0]):
-            return
-        step *= 2.0
+    def __init__(self, body: RelaxingBody, watched: Sequence[Endings]) -> None:
+        """Start as `body` is."""
+        self._body, self._watched = body, watched
+
+    def ready(self, step: float) -> Newton:
+        """Do as `Tissue` says."""
+        return Newton(self._body.ready(step))
+
+    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - it was made ready
+        """Do as `Tissue` says."""
+        self._body.advance(state.u)
+        return tuple(float(self._body.average(place)[0]) for place in self._watched)
+
+
+class FiniteTissue:
+    """Tissues that relax at finite strain, and what those of the watched places still hold of the past."""
+
+    def __init__(self, body: FiniteBody, laws: Sequence[Prony], watched: Sequence[FinitePatches]) -> None:
+        """Start at rest; `laws` by region, of which the terms and moduli at once are used."""
+        self._relaxing, self._watched = CondensedRelaxing(body, laws), watched
+        self._newton = Newton(self._relaxing)
+        self._pasts: list[Past] = [Past.at_rest(*_terms(laws, body.mesh.region[probes.element])) for probes in watched]
+
+    def ready(self, step: float) -> Newton:
+        """Do as `Tissue` says."""
+        self._relaxing.ready(step)
+        return self._newton
+
+    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
+        """Do as `Tissue` says."""
+        self._relaxing.took(state.u, step)
+        self._pasts = [
+            past.after(at.deformation(state.u), step) for past, at in zip(self._pasts, self._watched, strict=True)
+        ]
+        means: list[float] = []
+        for past, at in zip(self._pasts, self._watched, strict=True):
+            energy = at.energy(state.u) + past.energy()
+            means.append(float(energy @ at.weights / at.weights.sum()))
+        return tuple(means)

@@ -13,9 +13,8 @@ from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact.law import NAMES
 from solver.equilibrium.finger import Finger
-from solver.equilibrium.load_path import Instant
+from solver.equilibrium.load_path import Instant, Steps
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.scene.scene import Scene
 

@@ -8,12 +8,11 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import Instant, Way, course
-from solver.equilibrium.loads import load_of
+from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
 from solver.prediction import Skin
-from solver.progress import Progress
+from solver.progress import Progress, report_part
 from solver.response.answer import skin_of
 from solver.response.fields import Fields, Sketch
 from solver.scene.scene import Scene
@@ -56,9 +55,9 @@ def way_until(
     They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
     Cancelled where `progress` says so.
     """
-    way = Way(finger.newton, load_of(scene), scene.loading_per_mm)
+    way = way_of(scene, finger)
     try:
-        course(way, scene.loading_per_mm, progress)
+        follow(way, finger, scene.loading_per_mm, SMALL, 1.0, lambda _, part: report_part(progress, part))
     except SolveFailure as failure:
         return _unfolded(finger, way.instants), failure
     return tuple(way.instants), None

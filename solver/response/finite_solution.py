@@ -1,7 +1,7 @@
 """From scenes at finite strain to predictions, each on a mesh made for its contact, and an error estimate with each.
 
 Settled sliding is found directly and refused where it does not exist (`existence`); the course is marched, and
-where tissues relax, in time (`solver.equilibrium.finite_relaxation`).
+where tissues relax, in time (`solver.equilibrium.relaxation`).
 """
 
 from collections.abc import Callable, Sequence
@@ -17,10 +17,9 @@ from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.finite_relaxation import CondensedRelaxing, RelaxingCourse
-from solver.equilibrium.load_path import Way
+from solver.equilibrium.load_path import RelaxingWay, Way, march, times_on_way
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
-from solver.equilibrium.step_error import times_on_way
+from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import Cancelled, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
@@ -83,10 +82,13 @@ def _predicted(
     coarse = nested.coarse.finger
     times = times_on_way(scene, lambda press: steps_asked(press, coarse, stop)) if steps is None else steps.times
     way: Way | None = None
-    relaxing: RelaxingCourse | None = None
+    relaxing: RelaxingWay | None = None
     if scene.solve.course == "history":
-        relaxing = RelaxingCourse(scene, finger, stop, times=times) if scene.materials.relax else None
-        way = relaxing or course(scene, finger, stop, times)
+        if scene.materials.relax:
+            way = march(scene, finger, times, relaxing=True, stop=stop)
+            relaxing = way if isinstance(way, RelaxingWay) else None
+        else:
+            way = course(scene, finger, stop, times)
         shape = way.last
     if not shape.touching.any():
         raise NotConverged(f"No contact was found at {shape.load.depth:g} mm of indentation: ask for more depth.")
@@ -101,7 +103,7 @@ def _predicted(
         checks |= course_audits(newton, states, relaxing=relaxing is not None)
     if way and (relaxing is None or shape.sticking == 0.0):  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(finger.sed_ending(at.shape.u) / numbers[0] - 1.0)
-    over_time = None if relaxing is None else np.array(relaxing.sed)
+    over_time = None if relaxing is None else np.array(relaxing.energies)
     marched = history(scene, finger, way.instants[1:], over_time) if way else None
     solved = perf_counter()
     report_progress("estimating errors, on the nested mesh")

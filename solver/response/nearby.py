@@ -19,9 +19,8 @@ from solver.contact.law import NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.limit_point import sound
 from solver.equilibrium import force_control, full_slip
-from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.equilibrium.finger import FiniteFinger, LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.loads import sliding_load
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin

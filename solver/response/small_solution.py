@@ -29,9 +29,8 @@ from solver.continuation.small_existence import direct
 from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import Instant
+from solver.equilibrium.load_path import Instant, Steps, times_on_way
 from solver.equilibrium.newton import EquilibriumState
-from solver.equilibrium.step_error import Steps, times_on_way
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing

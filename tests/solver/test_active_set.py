@@ -12,7 +12,7 @@ from solver.constitutive.linear import Hooke
 from solver.contact.law import FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import Aim, Way
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
@@ -87,7 +87,10 @@ def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, ta
 
 def test_a_way_under_given_forces_ends_with_them(newton):
     loading = Loading(normal_force=0.1, tangential_force=0.02)
-    last = march(newton, LoadState(0.0, 0.5, 0.01), loading)[-1].state
+    way = Way(newton, LoadState(0.0, 0.5, 0.01), loading)
+    for n in range(1, 51):
+        way.go(Aim(0.04 * n, 0.1 * min(n / 25, 1.0), -0.02 * max(n / 25 - 1.0, 0.0)))
+    last = way.last
     np.testing.assert_allclose(last.force, [-0.02, 0.1], rtol=1e-9)
     assert (last.state == STICK).any()
 

@@ -17,8 +17,8 @@ from solver.constitutive.hyperelastic import stress as relaxed_stress
 from solver.constitutive.hyperelastic import tangent as relaxed_tangent
 from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
-from solver.equilibrium.finite_relaxation import CondensedRelaxing
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
+from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block

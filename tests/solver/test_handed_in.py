@@ -9,12 +9,11 @@ from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
 from solver.contact.law import FrictionLaw
-from solver.equilibrium.finite_relaxation import CondensedRelaxing
 from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import loaded, march
 from solver.equilibrium.newton import Given, LoadState, Newton
-from solver.equilibrium.relaxation import RelaxingBody
+from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh.mesh import Mesh, MeshError, block
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))

@@ -8,7 +8,7 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.continuation.small_states import end
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.step_error import PARTS, Steps
+from solver.equilibrium.load_path import PARTS, Steps
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
 from solver.quantities import NAMES
