@@ -7,8 +7,8 @@ import numpy as np
 
 from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
 from solver.arrays import Array
+from solver.equilibrium.load_path import PARTS, Steps
 from solver.equilibrium.newton import EquilibriumState, Given, Newton
-from solver.equilibrium.step_error import PARTS, Steps
 
 Numbers = Callable[[Newton, EquilibriumState], Array]
 

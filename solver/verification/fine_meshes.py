@@ -13,7 +13,7 @@ from solver.arrays import Array
 from solver.continuation import small_states
 from solver.continuation.wedging import WIDE
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.linear_finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_stepping import never
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing

@@ -12,9 +12,9 @@ from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled, slide_under
-from solver.equilibrium.march import march
-from solver.equilibrium.newton import FiniteNewton, Given, LoadState, Newton
-from solver.equilibrium.step_error import PARTS
+from solver.equilibrium.load_path import PARTS
+from solver.equilibrium.load_stepping import march
+from solver.equilibrium.newton import Given, LoadState, Newton
 from solver.mesh.halving import HalvedMesh
 from solver.mesh.mesh import block, quality
 
@@ -31,7 +31,7 @@ def small(mesh):
 
 
 def finite(mesh):
-    return FiniteNewton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]))
+    return Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]).condensed)
 
 
 def force(_, state):
