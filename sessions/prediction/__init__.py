@@ -7,6 +7,7 @@ from sessions.prediction.finger_file import finger_in
 from sessions.prediction.options import PredictionOptions, tau_scale, with_own_finger
 from sessions.prediction.predicting import Way, predict
 from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES, scene_along, scenes_of, with_loads
+from sessions.prediction.shown_quantities import BY_NAME, shown_unit
 from sessions.prediction.solving import (
     Progress,
     derivatives_by,
@@ -24,6 +25,7 @@ from solver.quantities import QUANTITIES, SED, Quantity
 from solver.response.nearby import Nearby
 
 __all__ = [
+    "BY_NAME",
     "DEFAULT_SPEED",
     "QUANTITIES",
     "SED",
@@ -47,6 +49,7 @@ __all__ = [
     "scenes_of",
     "seds_at",
     "settled",
+    "shown_unit",
     "slides",
     "solved",
     "tau_scale",

@@ -26,7 +26,7 @@ from sessions.report.contents import (
     TextFile,
     Trace,
 )
-from sessions.report.experiments import experiments, quantities, with_psychometric, with_response
+from sessions.report.experiments import experiments, quantities, with_psychometric
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Seds
@@ -86,8 +86,7 @@ def findings(
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
     numbers = quantities(predicted, found)
-    judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area)
-    judged = with_response(judged, numbers, more.response)
+    judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area, more.response)
     return Report(
         title=_title(recording),
         session=recording.folder.name,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sessions.plan.plan import Block, SessionPlan
+from sessions.prediction import BY_NAME, SED
 from sessions.recording.reader import Recording
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Seds, path_findings
@@ -28,8 +29,9 @@ def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[Strok
     for one in predictions:
         if one.index is not None:
             stroke = by_number.get(one.stroke or 0)
-            numbers = {name: getattr(one if name in (MODEL, GIVEN) else stroke, FIELDS[name], None) for name in FIELDS}
+            numbers = {name: getattr(one if name == GIVEN else stroke, FIELDS[name], None) for name in FIELDS}
             numbers |= {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
+            numbers[MODEL] = one.sed
             for name, value in numbers.items():
                 if value is not None:
                     given[name][one.experiment, one.index].append(value)
@@ -68,15 +70,19 @@ def experiments(
     numbers: Quantities,
     paths: Mapping[int, Seds] | None = None,
     law: AreaLaw = FIXED,
+    response: str = SED.name,
 ) -> tuple[Experiment, ...]:
     """Return one experiment a block; `numbers` are the `quantities` of its surfaces.
 
-    `paths` holds the SED of each trial along many paths of the analysis, where they were asked for, and `law` the
-    contact area by which every other number was told.
+    `response` names the quantity of the model that is held against scores and rivals. `paths` holds the SED of each
+    trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
+    number was told.
     """
     means = mean_scores(tables)
     return tuple(
-        _experiment(block, means, tables, numbers, paths or {}, law) for block in plan.blocks if block.phase == "main"
+        _experiment(block, means, tables, numbers, paths or {}, law, response)
+        for block in plan.blocks
+        if block.phase == "main"
     )
 
 
@@ -87,6 +93,7 @@ def _experiment(
     numbers: Quantities,
     paths: Mapping[int, Seds],
     law: AreaLaw,
+    response: str,
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
@@ -96,7 +103,8 @@ def _experiment(
         name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
         for name, values in numbers.items()
     }
-    predicted = series.get(MODEL, {})
+    label = BY_NAME[response].label
+    predicted = series.get(label, {})
     return Experiment(
         name=block.name,
         descriptor=descriptor,
@@ -112,7 +120,8 @@ def _experiment(
         ),
         score_relation=_related(score_of, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
-        rivals=rivals_of_means(score_of, series) if predicted and score_of else (),
+        rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
+        response=response,
         paths=path_findings(
             [
                 PathTrial("", index, score_of.get(index), rule_for(trial), paths.get(trial.number, ()))
@@ -124,22 +133,6 @@ def _experiment(
             within=False,
         ),
     )
-
-
-def with_response(found: Sequence[Experiment], numbers: Quantities, name: str) -> tuple[Experiment, ...]:
-    """Return the experiments with the relations of the quantity of that name; `numbers` are the `quantities`.
-
-    Rivals and paths stay those of the SED, the published quantity.
-    """
-    label = next((label for label, one in RESPONSES.items() if one == name), MODEL)
-    told: list[Experiment] = []
-    for one in found:
-        values = {index: value for (block, index), value in numbers[label].items() if block == one.name}
-        scores = {mean.index: mean.mean for mean in one.scores}
-        indices = {index: float(index) for index in one.indices}
-        related = _related(scores, values), _related(indices, values)
-        told.append(replace(one, response=name, score_relation=related[0], index_relation=related[1]))
-    return tuple(told)
 
 
 def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from sessions.prediction import QUANTITIES, SED
+from sessions.prediction import BY_NAME, SED, shown_unit
 from sessions.report.contents import Numbers, PredictionFinding
 from sessions.report.wording import digits
 
@@ -43,7 +43,7 @@ class ShownResponse:
 
 def shown_response(name: str) -> ShownResponse:
     """Return how the quantity of that name is told; the names are those of `solver.quantities`."""
-    one = next(quantity for quantity in QUANTITIES if quantity.name == name)
-    if one.unit == "MPa":
-        return ShownResponse(one.name, one.label, "MPa", "kPa", 1e3, 3, "Pa")
-    return ShownResponse(one.name, one.label, one.unit, "1", 1.0, 4, "10⁻⁶")
+    one = BY_NAME[name]
+    unit, factor = shown_unit(one)
+    places, step = (3, "Pa") if unit == "kPa" else (4, "10⁻⁶")
+    return ShownResponse(one.name, one.label, one.unit, unit, factor, places, step)

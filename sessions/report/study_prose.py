@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
+from sessions.prediction import BY_NAME, SED
 from sessions.prediction.model_facts import UNKNOWNS
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
@@ -27,9 +28,8 @@ def summary(study: StudyFindings) -> list[str]:
     subjects = {visit.subject for visit in study.visits}
     read = "was" if len(study.visits) == 1 else "were"
     said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
-    strain = study.options.prediction.kinematics
     for one in study.descriptors:
-        said += _related(one, strain)
+        said += _related(one, study)
         said += rivals_sentences(f"{one.descriptor}, by means over subjects", one.rivals_of_means)
         said += rivals_sentences(f"{one.descriptor}, within subjects", one.rivals)
         said += scale_sentences(one)
@@ -46,28 +46,31 @@ def summary(study: StudyFindings) -> list[str]:
     return said
 
 
-def _related(one: DescriptorFindings, strain: str) -> list[str]:
-    name = one.descriptor[:1].upper() + one.descriptor[1:]
+def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:
+    name, label = one.descriptor[:1].upper() + one.descriptor[1:], BY_NAME[study.response].label
+    strain = study.options.prediction.kinematics
     other = "finite" if strain == "small" else "small"
     if one.repeated is None:
-        return [f"{name}: {_unrelated(one)}"]
+        return [f"{name}: {_unrelated(one, label)}"]
     r = one.repeated
     interval = f"no interval from {plural(r.subjects, 'subject')} with two trials or more"
     if r.people is not None:
         low, high = r.people
         interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
+    # Paths hold the SED alone.
+    otherwise = _otherwise(one if study.response == SED.name else replace(one, paths=()), other)
     return [
-        f"{name}: within subjects, score and the SED predicted at {strain} strain go together by "
-        f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
+        f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
+        f"r = {correlation(r.r)}, {interval}; {otherwise}."
     ]
 
 
-def _unrelated(one: DescriptorFindings) -> str:
+def _unrelated(one: DescriptorFindings, label: str) -> str:
     """Say why there is no correlation within subjects."""
     trials = Counter(subject for subject, *_ in one.points)
     if sum(trials.values()) - len(trials) - 1 < 2:
         return "too few subjects with scores and strokes of their own for a correlation within subjects."
-    return "no correlation within subjects, in none of whom score and SED both vary."
+    return f"no correlation within subjects, in none of whom score and {label} both vary."
 
 
 def _otherwise(one: DescriptorFindings, other: str) -> str:
@@ -172,7 +175,10 @@ def _meshes(study: StudyFindings) -> list[str]:
         f"mesh alone by as much as its estimated error, {_range_of(errors)} of it."
     )
     spreads = [
-        s.sed.sd / s.sed.mean for one in study.descriptors for s in one.surfaces if s.sed is not None and s.sed.sd
+        s.response.sd / s.response.mean
+        for one in study.descriptors
+        for s in one.surfaces
+        if s.response is not None and s.response.sd and study.response == SED.name  # whose errors these are
     ]
     if spreads:
         said += (
@@ -259,6 +265,7 @@ def again(study: StudyFindings) -> list[Fact]:
         Fact("τ max", model.tau_reading),
         Fact("contact area", study.options.area.sentence),
         Fact("many paths", study.options.paths),
+        Fact("held against scores", BY_NAME[study.response].label, BY_NAME[study.response].meaning),
     ]
     made: defaultdict[str, list[str]] = defaultdict(list)
     for visit in study.visits:
@@ -277,6 +284,7 @@ def command(study: StudyFindings, name: str) -> str:
     if study.synthetic is not None:
         words = ["daq-app", "study", "--synthetic", str(study.synthetic), "--out", shlex.quote(name)]
     words += [*model_words(model), *area_words(options.area), *calibration_words(options.gain_error)]
+    words += [] if study.response == SED.name else ["--quantity", study.response]
     words += [] if model.intervals == usual else ["--intervals" if model.intervals else "--no-intervals"]
     words += {"none": [], "small": ["--paths"], "finite": ["--paths", "finite"]}[options.paths]
     return " ".join(words)

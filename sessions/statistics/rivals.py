@@ -1,4 +1,4 @@
-"""What else follows the scores beside a model's quantity: friction, forces and speed of the same strokes."""
+"""What else follows the scores beside a model's quantity: its others, and friction, forces and speed of the strokes."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from sessions.prediction import QUANTITIES, SED
+from sessions.prediction import BY_NAME, SED
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from sessions.statistics.dependent_correlations import (
@@ -20,13 +20,12 @@ from sessions.statistics.reml import Array
 from sessions.statistics.scores import CONFIDENCE, fisher_interval, pearson, relation, spearman
 from sessions.statistics.within_subjects import repeated_correlation
 
-MODEL = "SED"
+MODEL = SED.label  # the published quantity, to which the others are compared where no other is named
 GIVEN = "µ of the model"
-# Name for people, and that of the model's other quantities at the receptor.
-RESPONSES: Mapping[str, str] = {one.label: one.name for one in QUANTITIES if one is not SED}
-# Name for people, and the field of a stroke or trial that holds it; to the first, the model's, all are compared.
+# Name for people, and that of the model's quantities at the receptor.
+RESPONSES: Mapping[str, str] = {one.label: one.name for one in BY_NAME.values()}
+# Name for people, and the field of a stroke or trial that holds it.
 FIELDS: Mapping[str, str] = {
-    MODEL: "sed",
     GIVEN: "mu",
     "µ dynamic": "mu_dynamic",
     "µ static": "mu_static",
@@ -35,7 +34,7 @@ FIELDS: Mapping[str, str] = {
     "N": "normal_force",
     "speed": "speed",
 }
-NAMES = (MODEL, *RESPONSES, *(name for name in FIELDS if name != MODEL))
+NAMES = (*RESPONSES, *FIELDS)
 _RESAMPLES = 10_000
 _NO_LINE = "without some surface the others fix no line"
 _LEAST_SUBJECTS = 3  # of a bootstrap over subjects, and of the jackknife beside it
@@ -73,31 +72,34 @@ class RivalTrial:
     values: Mapping[str, float]
 
 
-def rivals_of_means(scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> tuple[Rival, ...]:
-    """Return how each quantity of the surfaces goes with their mean scores; () where the model has no quantity.
+def rivals_of_means(
+    scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]], model: str = MODEL
+) -> tuple[Rival, ...]:
+    """Return how each quantity of the surfaces goes with their mean scores; () where there is no `model`.
 
-    `scores` and each of `series` go by a surface's index; the quantities' names are those of `NAMES`.
+    `scores` and each of `series` go by a surface's index; the quantities' names are those of `NAMES`. All are compared
+    to `model`, which comes first.
     """
-    if MODEL not in series:
+    if model not in series:
         return ()
-    return tuple(_of_means(name, scores, series) for name in NAMES if name in series)
+    return tuple(_of_means(name, model, scores, series) for name in _ordered(model) if name in series)
 
 
-def rivals_of_surfaces(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
+def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
-    counted = [trial for trial in trials if MODEL in trial.values]
+    counted = [trial for trial in trials if model in trial.values]
     names = [name for name in NAMES if any(name in trial.values for trial in counted)]
-    return rivals_of_means(*_means(counted, names))
+    return rivals_of_means(*_means(counted, names), model)
 
 
-def rivals_within(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
-    """Return how each quantity goes with the scores within subjects; () where no trial has the model's quantity.
+def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
+    """Return how each quantity goes with the scores within subjects; () where no trial has `model`.
 
     Differences and partial correlations have percentile intervals of a bootstrap over subjects: those of other people
     on these very surfaces. What a larger number of surfaces would tell stands on the means over subjects.
     """
-    counted = [trial for trial in trials if MODEL in trial.values]
-    names = [name for name in NAMES if any(name in trial.values for trial in counted)]
+    counted = [trial for trial in trials if model in trial.values]
+    names = [name for name in _ordered(model) if any(name in trial.values for trial in counted)]
     if not counted:
         return ()
     deviances = {name: _deviance(name, counted) for name in names}
@@ -106,13 +108,17 @@ def rivals_within(trials: Sequence[RivalTrial]) -> tuple[Rival, ...]:
     found: list[Rival] = []
     for name in names:
         told = deviances[name]
-        rival = replace(_within(name, counted), weight=weights.get(name))
+        rival = replace(_within(name, model, counted), weight=weights.get(name))
         found.append(_because(rival, "weight", told if isinstance(told, str) else None))
     return tuple(found)
 
 
-def _of_means(name: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
-    used = [name, MODEL, *([GIVEN] if GIVEN in series else [])]
+def _ordered(model: str) -> tuple[str, ...]:
+    return (model, *(name for name in NAMES if name != model))
+
+
+def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
+    used = [name, model, *([GIVEN] if GIVEN in series else [])]
     own = [index for index in scores if index in series[name]]
     x, y = [series[name][i] for i in own], [scores[i] for i in own]
     related = relation(x, y, own)
@@ -122,8 +128,8 @@ def _of_means(name: str, scores: Mapping[int, float], series: Mapping[str, Mappi
     shared = [i for i in scores if all(i in series[one] for one in used)]
     score = [scores[i] for i in shared]
     values = {one: [series[one][i] for i in shared] for one in used}
-    if name != MODEL:
-        rival = _compared(rival, values[MODEL], values[name], score)
+    if name != model:
+        rival = _compared(rival, values[model], values[name], score)
     if GIVEN not in used or name == GIVEN:
         return _because(rival, "partial", "µ itself is given")
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[GIVEN]), pearson(score, values[GIVEN])
@@ -152,8 +158,8 @@ def _compared(rival: Rival, model: Sequence[float], other: Sequence[float], scor
     )
 
 
-def _within(name: str, trials: Sequence[RivalTrial]) -> Rival:
-    used = [*dict.fromkeys((name, MODEL, GIVEN))]
+def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
+    used = [*dict.fromkeys((name, model, GIVEN))]
     mine = [trial for trial in trials if name in trial.values]
     x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
     subjects = [trial.subject for trial in mine]
@@ -167,9 +173,9 @@ def _within(name: str, trials: Sequence[RivalTrial]) -> Rival:
     drawn = _resampled(shared, used)
     few = f"it takes {_LEAST_SUBJECTS} subjects with trials that have all of them"
     if drawn is None:
-        return _because(_because(rival, "partial", few), "contrast", None if name == MODEL else few)
+        return _because(_because(rival, "partial", few), "contrast", None if name == model else few)
     here, again = drawn
-    if name != MODEL:
+    if name != model:
         rival = _bootstrapped(rival, here, again, len(shared))
     if name == GIVEN:
         return _because(rival, "partial", "µ itself is given")

@@ -18,7 +18,7 @@ from daq_app.simulation.ground_truth import relations
 from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes
 from daq_app.simulation.wiring import planted_surface
 from sessions.plan.protocols import plan, protocol
-from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, SED
+from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, SED_TERM
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import TrialRow, Visit
 from simulators.subject import SimulatedSubject
@@ -165,10 +165,10 @@ def followed_held():
         (found,) = pooled(people(followed, 1000 + number)).descriptors
         low, high = found.repeated.people
         held["correlation within subjects", "planted"].append(low <= rho <= high)
-        for name, planted in ((SED, SLOPE), (DRIFT, DRIFTING), (CARRY_OVER, 0.0)):
-            term = found.on_sed.term(name)
+        for name, planted in ((SED_TERM, SLOPE), (DRIFT, DRIFTING), (CARRY_OVER, 0.0)):
+            term = found.on_response.term(name)
             held[f"mixed model on SED: {name}", "planted"].append(term.low <= planted <= term.high)
-        differ = found.on_sed.spreads
+        differ = found.on_response.spreads
         held["mixed model on SED: spread of levels", "planted"].append(differ.level.low <= LEVEL <= differ.level.high)
         held["mixed model on SED: noise", "planted"].append(differ.left.low <= NOISE <= differ.left.high)
     return held

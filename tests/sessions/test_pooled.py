@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from study_example import study, visit
 
-from sessions.prediction import PredictionOptions
+from sessions.prediction import BY_NAME, PredictionOptions
 from sessions.report.study_csv import trials_csv
 from sessions.report.study_page import study_page
 from sessions.report.study_prose import command, excluded, remarks, summary
 from sessions.report.tables.study_models import missing_scores
 from sessions.statistics.multiverse import PATHS
 from sessions.statistics.pooling.exclusions import Exclusion, exclusions_in
-from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED, WITHIN
+from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED_TERM, WITHIN
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import Visit, VisitOptions
 from sessions.strokes.contact_area import HERTZ, AreaLaw
@@ -57,7 +57,7 @@ def test_the_planted_relation_of_people_at_large_stands_beside_the_intervals_for
     found = {one.effect: one for one in study.effects}
     of = study.descriptors[0]
     assert (found[WITHIN].planted, found[WITHIN].low, found[WITHIN].high) == (0.9, *of.repeated.people)
-    assert (found[SED].planted, found[SED].low) == (60.0, of.on_sed.term(SED).low)
+    assert (found[SED_TERM].planted, found[SED_TERM].low) == (60.0, of.on_response.term(SED_TERM).low)
 
 
 def test_a_decision_leaves_a_subject_out_of_every_number_and_is_told():
@@ -86,7 +86,7 @@ def test_visits_that_only_scored_give_means_and_no_relation():
     found = pooled([visit(number, sed=None) for number in range(1, 5)]).descriptors[0]
     assert found.mean_relation is None
     assert found.repeated is None
-    assert "three subjects with scores and strokes of their own" in found.on_sed
+    assert "three subjects with scores and strokes of their own" in found.on_response
     assert [mean.n for mean in found.scores] == [4] * 5
 
 
@@ -263,3 +263,28 @@ def test_a_study_of_one_subject_says_why_tables_are_missing():
     assert within.startswith("No intervals within subjects: they take two subjects")
     assert differences.startswith("No differences of surfaces of stickiness: they take three subjects")
     assert missing_scores(pooled(VISITS[:3])) == []
+
+
+def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that_a_study_finds():
+    """Where it is a line in the SED, it finds the same; its unit and its rivals are its own."""
+
+    def with_shear(row):
+        return row if row.sed is None else replace(row, responses={"shear_along_skin": 10.0 * row.sed - 0.02})
+
+    visits = [replace(visit, rows=tuple(map(with_shear, visit.rows))) for visit in VISITS]
+    by_sed, by_shear = pooled(visits), pooled(visits, quantity=BY_NAME["shear_along_skin"])
+    for one, other in zip(by_sed.descriptors, by_shear.descriptors, strict=True):
+        assert other.repeated.r == pytest.approx(one.repeated.r)
+        assert other.mean_relation.pearson == pytest.approx(one.mean_relation.pearson)
+        slopes = one.on_response.term(SED_TERM).estimate, other.on_response.term("shear along the skin [1]").estimate
+        assert slopes[1] == pytest.approx(100.0 * slopes[0], rel=1e-6)  # points per kPa, and per unit of 10 / MPa
+        assert [s.response.mean for s in other.surfaces] == pytest.approx(
+            [10.0 * s.response.mean - 0.02 for s in one.surfaces]
+        )
+        assert other.rivals[0].name == "shear along the skin"
+        assert next(rival for rival in other.rivals if rival.name == "SED").contrast.difference == pytest.approx(
+            0.0, abs=1e-9
+        )
+    page = study_page(by_shear, "made")
+    assert "predicted shear along the skin [1]" in page
+    assert "--quantity shear_along_skin" in page

@@ -16,12 +16,13 @@ from daq_app.cli.analysis_options import add_analysis, area_law, calibration_err
 from daq_app.cli.options import add_kinematics, add_quantity, add_tau, add_visit, numbers_by_key, within
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.prediction import (
-    QUANTITIES,
+    BY_NAME,
     PredictionOptions,
     Quantity,
     SessionPrediction,
     TrialPrediction,
     finger_in,
+    shown_unit,
 )
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
@@ -30,7 +31,6 @@ from sessions.prediction.series_slopes import other_signs
 from sessions.prediction.variants import Alternative
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
-BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 
 INTERVALS = ["trial", "SED [kPa]", "per 0.01 of mu [Pa]", "per kPa of tau_max [Pa]", "slid the other way [kPa]"]
 MARKED = "by the solver's tangent, or where marked * by solving draws"
@@ -112,7 +112,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.result({**prediction.to_dict(), **seal, **firing})
     console.say(recording.simulated_sentence)
     quantity = BY_NAME[options.quantity]
-    unit = "kPa" if quantity.unit == "MPa" else quantity.unit
+    unit, _ = shown_unit(quantity)
     head = ["trial", "surface", "mu", "tau_max [kPa]", f"{quantity.label} [{unit}]", "error"]
     rows = [
         [

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept "
         "before)",
     )
-    add_quantity(parser, "to hold against scores")
+    add_quantity(parser, "to hold against scores and rivals")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_analysis(parser)
 

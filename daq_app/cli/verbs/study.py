@@ -21,6 +21,7 @@ from daq_app.cli.options import (
     LARGEST_SEED,
     add_kinematics,
     add_paths,
+    add_quantity,
     add_tau,
     add_workers,
     numbers_by_key,
@@ -29,7 +30,7 @@ from daq_app.cli.options import (
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
-from sessions.prediction import PredictionOptions
+from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.pooling.exclusions import exclusions_in
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "none",
     )
     add_tau(parser, "as for 'daq-app predict'")
+    add_quantity(parser, "to hold against scores and rivals")
     parser.add_argument(
         "--intervals",
         action=argparse.BooleanOptionalAction,
@@ -112,13 +114,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
-    if truth is not None:
+    if truth is not None and options.quantity == SED.name:
         from daq_app.simulation.ground_truth import (
             planted_relations,  # simulators are loaded only where they are asked for
         )
 
         truth["relation"] = planted_relations(truth["people"], asked.prediction, asked.area)
-    study = pooled(done, failed, exclusions, truth, asked)
+    study = pooled(done, failed, exclusions, truth, asked, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})

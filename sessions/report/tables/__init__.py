@@ -1,5 +1,6 @@
 """The tables of a report: cells as text, and for every number that is missing the reason."""
 
+from sessions.prediction import BY_NAME
 from sessions.report import Report
 from sessions.report.tables.cells import Cell, Column, Group, Table, sections_of
 from sessions.report.tables.multiverse import paths_table
@@ -35,7 +36,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
         "afferent": (afferent_table(report),),
         "relation": (
             relation_table(report),
-            rivals_table(compared, report.model),
+            rivals_table(compared, BY_NAME[report.response].label, report.model),
         ),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),

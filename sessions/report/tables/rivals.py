@@ -6,7 +6,7 @@ from textwrap import fill
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
 from sessions.report.wording import NONE, correlation, digits, p_value, places
 from sessions.statistics.dependent_correlations import POWER
-from sessions.statistics.rivals import MODEL, RESPONSES, Rival
+from sessions.statistics.rivals import RESPONSES, Rival
 
 _ALPHA = 0.05
 MANY_SURFACES = 10_000  # beyond which nobody asks how many
@@ -14,25 +14,25 @@ MANY = 3  # responses of the model that are no longer named one by one
 _LINE = 44  # characters that a line of a picture's title has room for
 
 
-def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], model: str) -> Table | None:
-    """Return the rivals of each group that is named; `model` says in short which model the SED is of."""
+def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], quantity: str, model: str) -> Table | None:
+    """Return the rivals of a quantity in each group that is named; `model` says in short which model it is of."""
     notes = Notes()
-    groups = [Group(name, tuple(_row(rival, notes) for rival in rivals)) for name, rivals in compared]
+    groups = [Group(name, tuple(_row(rival, quantity, notes) for rival in rivals)) for name, rivals in compared]
     columns = (
-        "quantity | n | r | SED's r less this | Steiger's Z | p | r given the model's µ | "
+        f"quantity | n | r | {quantity}'s r less this | Steiger's Z | p | r given the model's µ | "
         "left-out error [0–100] | AIC weight"
     )
     caption = (
-        f"r of scores with the SED ({model}) and rivals. Differences: with both r made positive; Zou (2007), Steiger "
-        "(1980), within subjects by bootstrap. Left-out error: of surfaces left out, root mean square. AIC: crossed "
-        "mixed models. Exploratory, not corrected."
+        f"r of scores with the {quantity} ({model}) and rivals. Differences: with both r made positive; Zou (2007), "
+        "Steiger (1980), within subjects by bootstrap. Left-out error: of surfaces left out, root mean square. AIC: "
+        "crossed mixed models. Exploratory, not corrected."
     )
     return table("table-rivals", caption, columns, groups, notes)
 
 
 def rival_words(rivals: Sequence[Rival]) -> str:
     """Return lines with the r of each measured rival for the title of a picture, "" where there is none."""
-    measured = [rival for rival in rivals if rival.name != MODEL and rival.name not in RESPONSES]
+    measured = [rival for rival in rivals if rival.name not in RESPONSES]
     told = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
     unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in told]
     return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if told else ""
@@ -40,15 +40,14 @@ def rival_words(rivals: Sequence[Rival]) -> str:
 
 def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
     """Return what the scores can and what they cannot tell apart, a sentence each; none without rivals."""
-    model = next((rival for rival in rivals if rival.name == MODEL), None)
-    compared = [rival for rival in rivals if rival.contrast is not None]
-    if model is None or not any(rival.name != MODEL for rival in rivals):
+    if len(rivals) < 2:
         return []
-    return [*_alike(name, rivals), *_verdict(name, compared)]
+    compared = [rival for rival in rivals if rival.contrast is not None]
+    return [*_alike(name, rivals[0].name, rivals), *_verdict(name, rivals[0].name, compared)]
 
 
-def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
-    """Return which rivals order the surfaces as the SED does, and how many surfaces it takes to tell them apart."""
+def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
+    """Return which rivals order the surfaces as the model does, and how many surfaces it takes to tell them apart."""
     alike = [rival for rival in rivals if rival.same_order]
     if not alike:
         return []
@@ -57,8 +56,8 @@ def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
     needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
     each = [f"{_rounded(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
     said = (
-        f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the SED does, so no order of "
-        f"scores can tell {them} apart from it; "
+        f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
+        f"of scores can tell {them} apart from it; "
     )
     if not each:
         return [f"{said}at the r seen here, no number of surfaces would."]
@@ -68,8 +67,8 @@ def _alike(name: str, rivals: Sequence[Rival]) -> list[str]:
     ]
 
 
-def _verdict(name: str, compared: Sequence[Rival]) -> list[str]:
-    """Return which rivals the scores follow more or less closely than the SED, and of which nothing can be said."""
+def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
+    """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
     for rival in compared:
         found = rival.contrast
@@ -77,17 +76,17 @@ def _verdict(name: str, compared: Sequence[Rival]) -> list[str]:
             side = "more" if found.difference < 0.0 else "less"
             sides[side if found.differs(_ALPHA) else "neither"].append(rival.name)
     if not compared:
-        return [f"Of {name} the surfaces are too few, or r too near 1, to compare the SED with any rival."]
-    told = [f"{_named(sides[side])} {side} closely than the SED" for side in ("more", "less") if sides[side]]
+        return [f"Of {name} the surfaces are too few, or r too near 1, to compare the {model} with any rival."]
+    told = [f"{_named(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]]
     said = f"the scores follow {' and '.join(told)} (p < 0.05, not corrected)" if told else ""
     if sides["neither"]:
         said += (
             "; they" if said else "the scores"
-        ) + f" tell no difference between the SED and {_named(sides['neither'])}"
+        ) + f" tell no difference between the {model} and {_named(sides['neither'])}"
     return [f"On {name}, {said}."]
 
 
-def _row(rival: Rival, notes: Notes) -> Row:
+def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     why = rival.reasons.get
     found = rival.contrast
     ends = None if rival.low is None or rival.high is None else (rival.low, rival.high)
@@ -100,7 +99,7 @@ def _row(rival: Rival, notes: Notes) -> Row:
             _or_dash(None if found.z is None else digits(found.z, 2)),
             _or_dash(None if found.p is None else p_value(found.p)),
         )
-    elif rival.name != MODEL:
+    elif rival.name != quantity:
         less = (notes.number(None, correlation, why("contrast")), *less[1:])
     return (
         Cell(rival.name),
@@ -126,15 +125,16 @@ def _or_dash(text: str | None) -> Cell:
 def _named(names: Sequence[str]) -> str:
     """Return a list of rivals, the model's other responses by their number where they are many.
 
-    >>> _named(["pressure", "T"]), _named([*RESPONSES, "T"])
+    >>> _named(["pressure", "T"]), _named([*list(RESPONSES)[1:], "T"])
     ('pressure and T', 'all 9 other responses of the model and T')
     """
     responses = [name for name in names if name in RESPONSES]
     if len(responses) < MANY:
         return _listed(names)
-    how = "all" if len(responses) == len(RESPONSES) else f"{len(responses)} of the"
+    others = len(RESPONSES) - 1
+    how = "all" if len(responses) == others else f"{len(responses)} of the"
     rest = [name for name in names if name not in RESPONSES]
-    return _listed([f"{how} {len(RESPONSES)} other responses of the model", *rest])
+    return _listed([f"{how} {others} other responses of the model", *rest])
 
 
 def _listed(names: Sequence[str]) -> str:

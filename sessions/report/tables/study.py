@@ -3,7 +3,9 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 
+from sessions.prediction import BY_NAME
 from sessions.report.predictions import model_in_short
+from sessions.report.responses import shown_response
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.psychometric import compared_in_study, psychometric_table
@@ -193,22 +195,25 @@ def _surfaces(study: StudyFindings) -> Table | None:
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
-            kilopascal = None if s.sed is None else _scaled(s.sed, 1e3)
+            response = None if s.response is None else _scaled(s.response, shown.factor)
             yield (
                 Cell(str(s.index)),
                 Cell(str(s.subjects)),
                 *_mean(s.mu, 3, notes),
-                *_mean(kilopascal, 3, notes),
-                _spread(kilopascal, notes),
+                *_mean(response, shown.places, notes),
+                _spread(response, notes),
             )
 
+    shown = shown_response(study.response)
+    unit = shown.unit
     columns = (
-        "index | subjects | µ [1] | 95 % interval [1] | SED [kPa] | 95 % interval [kPa] | standard deviation [kPa]"
+        f"index | subjects | µ [1] | 95 % interval [1] | {shown.label} [{unit}] | 95 % interval [{unit}] | "
+        f"standard deviation [{unit}]"
     )
     model = model_in_short(study.options.prediction, study.options.area)
     caption = (
-        "Friction that the model got, and predicted SED: means over subjects, each from its own strokes, with t "
-        "intervals; standard deviation of the SED with its interval by chi squared. "
+        f"Friction that the model got, and predicted {shown.label}: means over subjects, each from its own strokes, "
+        f"with t intervals; standard deviation of the {shown.label} with its interval by chi squared. "
         f"Model: {model}."
     )
     groups = [
@@ -283,11 +288,11 @@ def _relation(study: StudyFindings) -> Table | None:
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
-    model = model_in_short(study.options.prediction, study.options.area)
+    model, label = model_in_short(study.options.prediction, study.options.area), BY_NAME[study.response].label
     caption = (
-        f"Predicted SED ({model}) with scores. Means: Pearson's r of means over the subjects who have "
+        f"Predicted {label} ({model}) with scores. Means: Pearson's r of means over the subjects who have "
         "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
-        "Within subjects: repeated-measures correlation of each subject's scores with the SEDs of its own strokes "
+        "Within subjects: repeated-measures correlation of each subject's scores with what its own strokes give "
         "(Bakdash and Marusich 2017), with an interval and a p for other people who meet these very surfaces "
         "(jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the intervals of means speak. "
         "Confirmatory are these correlations of scores as given alone, one for each descriptor: they are the family "
@@ -306,8 +311,8 @@ def _rivals(study: StudyFindings) -> Table | None:
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
-    model = model_in_short(study.options.prediction, study.options.area)
-    return rivals_table(((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds), model)
+    model, label = model_in_short(study.options.prediction, study.options.area), BY_NAME[study.response].label
+    return rivals_table(((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds), label, model)
 
 
 def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:

@@ -2,26 +2,33 @@
 
 from collections import defaultdict
 
+from sessions.prediction import BY_NAME, Quantity, shown_unit
 from sessions.report.tables.cells import Cell, Group, Row, Table, range_cell, table
 from sessions.report.wording import NONE, digits, p_value, plural, significant, three_figures
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel
-from sessions.statistics.pooling.findings import LEVELS, NOISE, SED, UNITS, StudyFindings
+from sessions.statistics.pooling.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
+from sessions.statistics.pooling.pooled import response_term
 
 
 def models_table(study: StudyFindings) -> Table | None:
-    """Return the mixed models of scores on SED and on index, with how far subjects differ."""
+    """Return the mixed models of scores on the model's response and on index, with how far subjects differ."""
     models = [
         (f"{one.descriptor}: score on {what}", model)
         for one in study.descriptors
-        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction))
+        for what, model in _models(one, study)
     ]
-    groups = [Group(f"{name}, {_fitted(model)}", _terms(model)) for name, model in models if not isinstance(model, str)]
+    quantity = BY_NAME[study.response]
+    groups = [
+        Group(f"{name}, {_fitted(model)}", _terms(model, quantity))
+        for name, model in models
+        if not isinstance(model, str)
+    ]
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
         "subjects; drift is the slope on the trials before in the block, carry-over that on the index stroked before. "
         "The first trial of a block counts as if index 50 had been stroked before. "
         "Exploratory: p is not corrected, for terms, models or descriptors. "
-        "The level is that at the mean of SED or index. t intervals, for other people on these surfaces. "
+        f"The level is that at the mean of {quantity.label} or index. t intervals, for other people on these surfaces. "
         "Standard deviations of the subjects' own levels and slopes, and of single scores about them: by least "
         "squares, the error of each subject's own line taken away; intervals by modified large sample (Ting et al. "
         "1990), of single scores by chi squared. A singular fit "
@@ -30,11 +37,17 @@ def models_table(study: StudyFindings) -> Table | None:
     return table("table-models", caption, "term | unit | estimate | 95 % interval | p", groups)
 
 
+def _models(one: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, MixedModel | str], ...]:
+    """Return the mixed models of a descriptor, each with what the score stands on."""
+    label = BY_NAME[study.response].label
+    return (label, one.on_response), ("index", one.on_index), ("index and µ", one.on_friction)
+
+
 def missing_models(study: StudyFindings) -> list[str]:
     """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
     told: defaultdict[str, list[str]] = defaultdict(list)
     for one in study.descriptors:
-        for what, model in (("SED", one.on_sed), ("index", one.on_index), ("index and µ", one.on_friction)):
+        for what, model in _models(one, study):
             if isinstance(model, str):
                 told[model].append(f"{one.descriptor} on {what}")
     related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
@@ -78,9 +91,10 @@ def _fitted(model: MixedModel) -> str:
     return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
 
 
-def _terms(model: MixedModel) -> tuple[Row, ...]:
-    first = model.terms[1].name
-    middle = f"{digits(model.middle, 3)} kPa" if first == SED else f"index {digits(50 + model.middle, 1)}"
+def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
+    first, (unit, _) = model.terms[1].name, shown_unit(quantity)
+    units = {response_term(quantity): f"points per {unit}", **UNITS}
+    middle = f"{digits(model.middle, 3)} {unit}" if first != INDEX else f"index {digits(50 + model.middle, 1)}"
 
     def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> Row:
         told = NONE if p is None else p_value(p)
@@ -89,7 +103,7 @@ def _terms(model: MixedModel) -> tuple[Row, ...]:
     rows = [
         row(
             f"level at {middle}" if t.name == INTERCEPT else t.name,
-            UNITS.get(t.name, "points"),
+            units.get(t.name, "points"),
             t.estimate,
             t.low,
             t.high,
@@ -100,7 +114,7 @@ def _terms(model: MixedModel) -> tuple[Row, ...]:
     if model.spreads is not None:
         told = (
             (LEVELS, "points", model.spreads.level),
-            ("spread of subjects' slopes", UNITS[first], model.spreads.slope),
+            ("spread of subjects' slopes", units[first], model.spreads.slope),
             (NOISE, "points", model.spreads.left),
         )
         rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in told if s is not None]

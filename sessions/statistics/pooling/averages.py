@@ -30,7 +30,7 @@ class Estimates:
 
     geometric: Mapping[int, Average]  # by index: of the logarithms, as they were given
     equal_moduli: Mapping[int, Average]  # likewise, brought to one modulus
-    repeated: RepeatedCorrelation | None  # of a subject's log estimates with the SEDs of its own strokes
+    repeated: RepeatedCorrelation | None  # of a subject's log estimates with the responses to its own strokes
     left_out: tuple[str, ...]  # subjects who gave an estimate that is not above 0
 
 
@@ -56,18 +56,20 @@ def averages(table: Mapping[str, Mapping[int, float]]) -> dict[int, Average]:
     return found
 
 
-def estimates(trials: Sequence[tuple[Visit, TrialRow]]) -> Estimates | None:
-    """Return what magnitude estimates say; None where nobody gave any."""
-    given = [(v.subject, row.index, row.estimate, row.sed) for v, row in trials if row.estimate is not None]
+def estimates(trials: Sequence[tuple[Visit, TrialRow]], quantity: str) -> Estimates | None:
+    """Return what magnitude estimates say, beside that quantity of the model; None where nobody gave any."""
+    given = [
+        (v.subject, row.index, row.estimate, row.response(quantity)) for v, row in trials if row.estimate is not None
+    ]
     if not given:
         return None
     no_logarithm = {subject for subject, _, value, _ in given if value <= 0.0}
     logs: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
     pairs: list[tuple[str, float, float]] = []
-    for subject, index, value, sed in given:
+    for subject, index, value, response in given:
         if subject not in no_logarithm:
             logs[subject][index].append(math.log(value))
-            pairs += [] if sed is None else [(subject, sed, math.log(value))]
+            pairs += [] if response is None else [(subject, response, math.log(value))]
     table = {
         subject: {index: math.exp(float(np.mean(values))) for index, values in row.items()}
         for subject, row in sorted(logs.items())

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from sessions.prediction import SED
 from sessions.statistics.mixed_model import MixedModel
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.pooling.answers import ConstantStimuli
@@ -17,7 +18,7 @@ from sessions.statistics.scores import MeanScore, Relation
 from sessions.statistics.variance_components import Spread
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
 
-SED = "SED [kPa]"
+SED_TERM = "SED [kPa]"
 INDEX = "index − 50"
 FRICTION = "µ"
 DRIFT = "trials before in the block"
@@ -30,7 +31,7 @@ WITHIN = "r of score and SED within subjects"
 UNITS = {
     INDEX: "points per index",
     FRICTION: "points per unit of µ",
-    SED: "points per kPa",
+    SED_TERM: "points per kPa",
     DRIFT: "points per trial",
     CARRY_OVER: "points per index",
     LEVELS: "points",
@@ -55,9 +56,9 @@ class SurfaceMean:
     """Means over subjects of one surface; None where there is no subject's number."""
 
     index: int
-    subjects: int  # whose stroke gave an SED
+    subjects: int  # whose stroke gave a response
     mu: Average | None
-    sed: Average | None  # [MPa]
+    response: Average | None  # the quantity of the model that is held against scores [MPa or -]
     normal_force: Average | None  # measured [N]
     model_normal_force: Average | None  # of the model, pressed to its depth [N]
     matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
@@ -74,11 +75,11 @@ class DescriptorFindings:
     agreement: Agreement | None
     surfaces: tuple[SurfaceMean, ...]
     answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
-    points: tuple[tuple[str, int, float, float], ...]  # subject, index, SED [MPa], score: all of its own strokes
-    mean_relation: Relation | None  # mean SED [MPa] against mean score
-    repeated: RepeatedCorrelation | None  # of a subject's scores with the SEDs of its own strokes
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response, score: all of its own strokes
+    mean_relation: Relation | None  # mean response against mean score
+    repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
     repeated_holm: float | None  # its p, allowing for as many descriptors as have one
-    rivals: tuple[Rival, ...]  # within subjects: the SED, and what else follows a subject's scores
+    rivals: tuple[Rival, ...]  # within subjects: the response, and what else follows a subject's scores
     rivals_of_means: tuple[Rival, ...]  # likewise of the means over subjects
     without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
     normalised: Normalised
@@ -87,7 +88,9 @@ class DescriptorFindings:
     exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
     scales: tuple[PairedScale, ...]  # of choices between two, by both models; () where nobody chose
     consistence: Mapping[str, Consistence]  # of each subject who chose in every pair
-    on_sed: MixedModel | str  # score on SED [kPa], drift and carry-over; or why there is no model
+    on_response: (
+        MixedModel | str
+    )  # score on the response as people read it [kPa or 1], drift and carry-over; or why there is no model
     on_index: MixedModel | str  # score on the maker's index, drift and carry-over
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
@@ -148,6 +151,7 @@ class StudyFindings:
     friction: PlantedFriction | None
     flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
     synthetic: int | None = None  # the seed, where it is
+    response: str = SED.name  # the quantity of the model that is held against scores
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""

@@ -16,7 +16,7 @@ from sessions.statistics.pooling.findings import (
     INDEX,
     LEVELS,
     NOISE,
-    SED,
+    SED_TERM,
     SLOPES,
     WITHIN,
     DescriptorFindings,
@@ -141,9 +141,9 @@ def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recov
     if relation is None or one.repeated is None or one.repeated.people is None:
         return []
     told = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
-    if not isinstance(one.on_sed, str):
-        term = one.on_sed.term(SED)
-        told.append(Recovered(one.descriptor, SED, relation["slope"], term.estimate, term.low, term.high))
+    if not isinstance(one.on_response, str):
+        term = one.on_response.term(SED_TERM)
+        told.append(Recovered(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
     return told
 
 

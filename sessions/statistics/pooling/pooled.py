@@ -1,12 +1,14 @@
 """What the visits of a study say together: means, agreement, and how predictions go with scores. Plain data."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
+from sessions.prediction import SED, Quantity, shown_unit
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
 from sessions.statistics.multiverse import PathTrial, path_findings
@@ -18,7 +20,6 @@ from sessions.statistics.pooling.findings import (
     DRIFT,
     FRICTION,
     INDEX,
-    SED,
     DescriptorFindings,
     Normalised,
     StudyFindings,
@@ -53,11 +54,12 @@ def pooled(
     exclusions: tuple[Exclusion, ...] = (),
     planted: Mapping[str, Any] | None = None,
     options: VisitOptions | None = None,
+    quantity: Quantity = SED,
 ) -> StudyFindings:
     """Return what the visits say together; they count in the order of their names, whoever read them first.
 
-    `options` is what was asked of each visit. `planted` is what a synthetic study tells of itself: handed in, used for
-    nothing but the comparison.
+    `options` is what was asked of each visit, `quantity` that response of the model which is held against scores.
+    `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
     """
     ordered = tuple(sorted(visits, key=lambda visit: visit.session))
     copies = _copies(ordered)
@@ -66,7 +68,7 @@ def pooled(
     tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
     asked = options or VisitOptions()
     found = tuple(
-        _descriptor(name, asked, tables, [(v, row) for v, row in kept if row.descriptor == name])
+        _descriptor(name, asked, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
         for name in dict.fromkeys(row.descriptor for _, row in kept)
     )
     found = _with_holm(found)
@@ -83,6 +85,7 @@ def pooled(
         friction=None if planted is None else found_friction(ordered, planted["strokes"]),
         flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
         synthetic=None if planted is None else planted.get("seed"),
+        response=quantity.name,
     )
 
 
@@ -110,17 +113,24 @@ def _simulated(visits: Sequence[Visit]) -> str:
 
 
 def _descriptor(
-    name: str, options: VisitOptions, tables: Sequence[ScoreTable], trials: Sequence[tuple[Visit, TrialRow]]
+    name: str,
+    options: VisitOptions,
+    quantity: Quantity,
+    tables: Sequence[ScoreTable],
+    trials: Sequence[tuple[Visit, TrialRow]],
 ) -> DescriptorFindings:
     indices = tuple(sorted({row.index for _, row in trials}))
     means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
     matrix = score_matrix(tables, name)
-    surfaces = tuple(_surface(index, [(v, r) for v, r in trials if r.index == index]) for index in indices)
+    surfaces = tuple(
+        _surface(index, quantity.name, [(v, r) for v, r in trials if r.index == index]) for index in indices
+    )
     level = standardised(matrix)
-    points = [(v.subject, r, r.sed, r.score) for v, r in trials if r.sed is not None and r.score is not None]
+    answered = [(v, r, r.response(quantity.name), r.score) for v, r in trials]
+    points = [(v.subject, r, x, score) for v, r, x, score in answered if x is not None and score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
     chosen = choices(trials)
-    competing = [_rival_trial(v.subject, r, r.score) for v, r in trials if r.sed is not None and r.score is not None]
+    competing = [_rival_trial(subject, r, score) for subject, r, _, score in points]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
@@ -129,22 +139,22 @@ def _descriptor(
         agreement=agreement(matrix),
         surfaces=surfaces,
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
-        points=tuple((subject, row.index, sed, score) for subject, row, sed, score in points),
+        points=tuple((subject, row.index, x, score) for subject, row, x, score in points),
         mean_relation=_related([(p[0], p[1].index, p[2], p[3]) for p in points]),
         repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
         repeated_holm=None,
-        rivals=rivals_within(competing),
-        rivals_of_means=rivals_of_surfaces(competing),
+        rivals=rivals_within(competing, quantity.label),
+        rivals_of_means=rivals_of_surfaces(competing, quantity.label),
         without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
         normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
-        estimates=estimates(trials),
+        estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),
         scales=tuple(paired_scale(chosen, model) for model in MODELS) if chosen else (),
         consistence=consistence(chosen),
-        on_sed=_model([(p[0], p[1], p[3]) for p in points], SED),
-        on_index=_model(scored, INDEX),
-        on_friction=_model([one for one in scored if one[1].mu is not None], INDEX, FRICTION),
+        on_response=_model([(p[0], p[1], p[3]) for p in points], quantity, response_term(quantity)),
+        on_index=_model(scored, quantity, INDEX),
+        on_friction=_model([one for one in scored if one[1].mu is not None], quantity, INDEX, FRICTION),
         fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
         paths=path_findings(
             [PathTrial(v.subject, row.index, row.score, row.rule, row.paths) for v, row in trials],
@@ -159,11 +169,20 @@ def _descriptor(
 def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
     """Return a scored trial with those quantities that its row has."""
     held = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
-    held |= {label: row.responses.get(name) for label, name in RESPONSES.items()}
+    held |= {label: row.response(name) for label, name in RESPONSES.items()}
     return RivalTrial(subject, row.index, score, {name: value for name, value in held.items() if value is not None})
 
 
-def _model(trials: Sequence[tuple[str, TrialRow, float]], *what: str) -> MixedModel | str:
+def response_term(quantity: Quantity) -> str:
+    """Return the name of a quantity in mixed models, with the unit in which people read it.
+
+    >>> response_term(SED)
+    'SED [kPa]'
+    """
+    return f"{quantity.label} [{shown_unit(quantity)[0]}]"
+
+
+def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *what: str) -> MixedModel | str:
     """Return the mixed model of scores on `what`, drift and carry-over, or why there is none.
 
     Trials are subject, row and score. Subjects have slopes of their own on the first of `what`.
@@ -174,7 +193,7 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], *what: str) -> MixedMo
         return f"it takes three subjects with {own}, and there {_are(len(set(subjects)))}"
     columns = {
         INDEX: [row.index - 50.0 for row in rows],
-        SED: [1e3 * (row.sed or 0.0) for row in rows],
+        response_term(quantity): [shown_unit(quantity)[1] * (row.response(quantity.name) or 0.0) for row in rows],
         FRICTION: [row.mu or 0.0 for row in rows],
         DRIFT: [float(row.place) for row in rows],
         CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
@@ -195,24 +214,25 @@ def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
     return None if found is None else found.level
 
 
-def _surface(index: int, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
+def _surface(index: int, quantity: str, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
     """Return means over subjects, each subject's own repeats averaged first."""
 
-    def over_subjects(name: str) -> Average | None:
-        return average(by_subject([(v.subject, getattr(row, name)) for v, row in trials]))
+    def over_subjects(value: Callable[[TrialRow], float | None]) -> Average | None:
+        return average(by_subject([(v.subject, value(row)) for v, row in trials]))
 
-    names = ("mu", "sed", "normal_force", "model_normal_force", "matching_depth")
-    mu, sed, normal, model, depth = map(over_subjects, names)
-    return SurfaceMean(index, 0 if sed is None else sed.n, mu, sed, normal, model, depth)
+    response = over_subjects(lambda row: row.response(quantity))
+    names = ("mu", "normal_force", "model_normal_force", "matching_depth")
+    mu, normal, model, depth = (over_subjects(attrgetter(name)) for name in names)
+    return SurfaceMean(index, 0 if response is None else response.n, mu, response, normal, model, depth)
 
 
 def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None:
-    """Return how mean scores go with mean SEDs, of points that have both: subject, index, SED and score."""
-    seds = surface_means([(subject, index, sed) for subject, index, sed, _ in points])
+    """Return how mean scores go with mean responses, of points that have both: subject, index, response and score."""
+    responses = surface_means([(subject, index, x) for subject, index, x, _ in points])
     scores = surface_means([(subject, index, score) for subject, index, _, score in points])
-    if seds is None or scores is None:
+    if responses is None or scores is None:
         return None
-    return relation(list(seds.values()), list(scores.values()), list(seds))
+    return relation(list(responses.values()), list(scores.values()), list(responses))
 
 
 def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
@@ -227,8 +247,8 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
 
 
 def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
-    """Return what scores say that were standardised; `points` are subject, index and SED [MPa] of its own stroke."""
+    """Return what scores say that were standardised; `points` are subject, index and response to its own stroke."""
     means = averages(table)
-    both = [(subject, i, sed, table[subject][i]) for subject, i, sed in points if i in table.get(subject, {})]
+    both = [(subject, i, x, table[subject][i]) for subject, i, x in points if i in table.get(subject, {})]
     within = repeated_correlation([p[0] for p in both], [p[2] for p in both], [p[3] for p in both])
     return Normalised(means, _related(both), within)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from sessions.plan.plan import Block
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, predict
+from sessions.prediction import SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.model_facts import model_facts
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.uncertainty import with_intervals
@@ -86,6 +86,10 @@ class TrialRow:
     flaws: tuple[str, ...] = ()
     why: str = ""
     paths: Seds = ()  # SED along each of `sessions.statistics.multiverse.PATHS` [MPa], where they were asked for
+
+    def response(self, quantity: str) -> float | None:
+        """Return the model's quantity of that name [MPa or -]; None where it predicts nothing."""
+        return self.sed if quantity == SED.name else self.responses.get(quantity)
 
 
 @dataclass(frozen=True, slots=True)
