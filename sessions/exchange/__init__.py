@@ -1,6 +1,7 @@
 """Files for others: the list of exports, and what each of them is given.
 
-A format is a module with `write(source, folder, progress)`; one that can be imported again has `read(path)` too.
+A format is a module with `write(source, folder, progress)`; one that can be imported again has
+`find(path)`, which returns what it reads or None, and `read(path)` too.
 A newcomer in `FORMATS` is tested before anyone writes a test for it (`docs/how-to/add-an-export.md`).
 """
 

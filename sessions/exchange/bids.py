@@ -9,7 +9,7 @@ import gzip
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,16 +20,13 @@ from drivers.readings import ReadingBlock
 from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import write_rows
-from sessions.exchange.exported import ExportedSession, head_of
+from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.readings_text import MISSING, columns, read_rows, rows
-from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, tables
+from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
 from sessions.file_access import packed_lines, read_limited
 from sessions.json_document import json_object
-from sessions.recording import LoggedEvent, Recording
-from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
+from sessions.recording import Recording
 from sessions.recording.description import description
-from sessions.recording.event_shapes import event_data
-from sessions.strokes.decisions import DECISIONS, content_of
 
 VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]
@@ -51,42 +48,46 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     _write_table(folder / "participants", _participants(recording, names), recording)
     beh = folder / names.subject / "beh"
     beh.mkdir(parents=True)
-    found = {table.name: table for table in tables(source)}
+    by_name = {table.name: table for table in tables(source)}
     task = {"TaskName": names.task, "TaskDescription": f"protocol {recording.plan.protocol}"}
-    told = task | {"Instructions": " / ".join(block.instruction for block in recording.plan.blocks)}
-    _write_table(beh / f"{names.stem}_beh", found["trials"], recording, told)
-    whole = {"DaqAppSession": description(recording)}  # all that is needed to make the session again
-    _write_table(beh / f"{names.stem}_events", _events(recording), recording, told | whole)
+    instructions = task | {"Instructions": " / ".join(block.instruction for block in recording.plan.blocks)}
+    _write_table(beh / f"{names.stem}_beh", by_name["trials"], recording, instructions)
+    session = {"DaqAppSession": description(recording)}  # all that is needed to make the session again
+    _write_table(beh / f"{names.stem}_events", _events(recording), recording, instructions | session)
     if recording.info is not None:
         _write_readings(recording, beh, names, progress)
-    set_by_people = {DECISIONS: content_of(recording.folder), GAIN_ERROR: gain_error_content(recording.folder)}
-    for name, content in set_by_people.items():
-        if content:
-            (folder / SOURCE).mkdir(exist_ok=True)
-            (folder / SOURCE / name).write_bytes(content)
-    derived = folder / "derivatives" / PIPELINE
-    made = derived / names.subject / "beh"
-    made.mkdir(parents=True)
-    write_json(derived / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
-    (derived / "README.md").write_text(_readme(recording), encoding="utf-8")
+    for name, content in side_files(recording.folder).items():
+        (folder / SOURCE).mkdir(exist_ok=True)
+        (folder / SOURCE / name).write_bytes(content)
+    derivatives = folder / "derivatives" / PIPELINE
+    derived = derivatives / names.subject / "beh"
+    derived.mkdir(parents=True)
+    write_json(derivatives / "dataset_description.json", _dataset(recording, "derivative", source.analysis["made_by"]))
+    (derivatives / "README.md").write_text(_readme(recording), encoding="utf-8")
     for name in DERIVED:
-        if name in found:
-            _write_table(made / f"{names.stem}_desc-{name}_beh", found[name], recording, task)
+        if name in by_name:
+            _write_table(derived / f"{names.stem}_desc-{name}_beh", by_name[name], recording, task)
+
+
+def find(path: Path) -> Path | None:
+    """Return what `read` reads where `path` is a data set; None elsewhere."""
+    return path if (path / "dataset_description.json").is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
     """Return the session of a data set of one subject that `write` wrote. Raises OSError, ValueError."""
-    tables_found = sorted(path.glob("sub-*/beh/*_events.tsv"))
-    if len(tables_found) != 1:
-        raise ValueError(f"it holds the events of {len(tables_found)} sessions, and one is needed")
-    (events_file,) = tables_found
-    told = json_object(read_limited(events_file.with_suffix(".json")))
-    header, *lines = read_limited(events_file).decode().splitlines()
-    places = {name: place for place, name in enumerate(header.split("\t"))}
-    events = tuple(_event(line.split("\t"), places) for line in lines)
-    parts = sorted(events_file.parent.glob("*_physio.tsv.gz"), key=lambda part: _start(part))
-    beside = content_of(path / SOURCE), gain_error_content(path / SOURCE)
-    return ExportedSession("bids", path, head_of(told["DaqAppSession"]), events, lambda: _blocks(parts), *beside)
+    event_files = sorted(path.glob("sub-*/beh/*_events.tsv"))
+    if len(event_files) != 1:
+        raise ValueError(f"it holds the events of {len(event_files)} sessions, and one is needed")
+    (event_file,) = event_files
+    head = head_of(json_object(read_limited(event_file.with_suffix(".json")))["DaqAppSession"])
+    header, *lines = (line.split("\t") for line in read_limited(event_file).decode().splitlines())
+    rows_read = (
+        {name: "" if cell == MISSING else cell for name, cell in zip(header, line, strict=True)} for line in lines
+    )
+    events = tuple(logged_event(row, "trial_type") for row in rows_read)
+    parts = sorted(event_file.parent.glob("*_physio.tsv.gz"), key=lambda part: float(_sidecar(part)["StartTime"]))
+    return ExportedSession("bids", path, head, events, lambda: _blocks(parts), side_files(path / SOURCE))
 
 
 class _Names:
@@ -149,17 +150,6 @@ def _events(recording: Recording) -> Table:
     return Table("events", EACH_EVENT, (onset, lasts, kind, trial, number, time, readings, data))
 
 
-def _event(cells: Sequence[str], places: Mapping[str, int]) -> LoggedEvent:
-    def cell(name: str) -> str:
-        return cells[places[name]]
-
-    trial = None if cell("trial") == MISSING else int(cell("trial"))
-    data = event_data(cell("trial_type"), cell("data"))
-    return LoggedEvent(
-        int(cell("number")), int(cell("time_ns")), cell("trial_type"), trial, int(cell("readings")), data
-    )
-
-
 # ---- readings
 
 
@@ -167,7 +157,7 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
     """Write a file for each stretch of readings without a break."""
     assert recording.info is not None
     calibration = recording.info.calibration
-    told = [*columns(calibration), *([_MARK] if recording.simulated else [])]
+    described = [*columns(calibration), *([_MARK] if recording.simulated else [])]
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
     expected = max((event.readings for event in recording.events), default=0) or 1
@@ -190,15 +180,15 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
                         "PhysioType": "generic",
                         "TaskName": names.task,
-                        "Columns": [column.heading for column in told],
+                        "Columns": [column.heading for column in described],
                         "Manufacturer": recording.info.driver,
                         "ManufacturersModelName": recording.info.model,
                         "DeviceSerialNumber": recording.info.serial,
-                        **{column.heading: _described(column) for column in told},
+                        **{column.heading: _described(column) for column in described},
                     },
                 )
                 last = None
-            write_rows(file, _filled(block, last, rows(block, calibration), len(told), mark), "\t")
+            write_rows(file, _filled(block, last, rows(block, calibration), len(described), mark), "\t")
             last = int(block.sequence[-1])
             written += len(block)
             progress(min(written / expected, 1.0))
@@ -226,12 +216,12 @@ def _stretches(recording: Recording) -> Iterator[tuple[ReadingBlock, bool]]:
 
 
 def _filled(
-    block: ReadingBlock, last: int | None, found: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
+    block: ReadingBlock, last: int | None, cells: Iterable[tuple[Any, ...]], width: int, mark: tuple[int, ...]
 ) -> Iterator[tuple[Any, ...]]:
     """Yield the rows, with one of n/a for each that never arrived; what BIDS knows not (NaN, infinity) is n/a too."""
     finite = bool(np.isfinite(block.raw).all())
     expected = None if last is None else last + 1
-    for row in found:
+    for row in cells:
         if expected is not None:
             for _ in range(row[0] - expected):
                 yield (MISSING,) * (width - len(mark)) + mark
@@ -251,10 +241,6 @@ class _Packed(gzip.GzipFile):
         self._raw.close()
 
 
-def _start(part: Path) -> float:
-    return float(_sidecar(part)["StartTime"])
-
-
 def _sidecar(part: Path) -> dict[str, Any]:
     return json_object(read_limited(part.parent / part.name.replace(".tsv.gz", ".json")))
 
@@ -269,17 +255,17 @@ def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
 
 def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[str, Any] | None = None) -> None:
     """Write a table beside the description of its columns."""
-    told = table.columns
+    columns_written = table.columns
     if recording.simulated:
-        count = len(told[0].values) if told else 0
-        told = (*told, Column(_MARK.name, "", _MARK.meaning, (1,) * count))
+        count = len(columns_written[0].values) if columns_written else 0
+        columns_written = (*columns_written, Column(_MARK.name, "", _MARK.meaning, (1,) * count))
     with stem.with_name(f"{stem.name}.tsv").open("w", encoding="utf-8", newline="") as file:
-        for row in ([column.heading for column in told], *Table("", "", told).rows):
+        for row in ([column.heading for column in columns_written], *Table("", "", columns_written).rows):
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(cells) + "\n")
     head = {"SIMULATED": recording.simulated_sentence} if recording.simulated else {}
-    described = {column.heading: _described(column) for column in told if column.heading not in _KNOWN}
+    described = {column.heading: _described(column) for column in columns_written if column.heading not in _KNOWN}
     sidecar = {**head, "Description": table.meaning, **(more or {}), **described}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 

@@ -1,8 +1,33 @@
 """The unit and the meaning of every column of a session's tables: column to (unit, "" for none; meaning)."""
 
-from sessions.exchange.given_and_made import MADE_WITH
+from sessions.exchange.prediction_settings import PREDICTED_WITH
+from sessions.recording.log import OUTCOMES
+from sessions.strokes.bootstrap import NUMBERS
 
-STROKE = {
+AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
+
+TRIAL = {
+    "trial": ("", "number over the whole session"),
+    "block": ("", "name of its block"),
+    "descriptor": ("", "what was judged"),
+    "index": ("", "the maker's number of the stimulus; no score"),
+    "code": ("", "label on the stimulus"),
+    "direction": ("", "+1 proximal to distal, -1 back"),
+    "repetition": ("", "from 1"),
+    "phase": ("", "main; or practice, pre-evaluation"),
+    "compared_with": ("", "trial with the first of two"),
+    "standard": ("", "1 where the others are compared with it"),
+    "outcome": ("", OUTCOMES),
+    "score": ("", "the subject's answer, 0 to 100"),
+    "free_number": ("", "the subject's answer on a scale of its own"),
+    "choice": ("", "the subject's answer: first or second of two"),
+    "take": ("", "number of the take that counts"),
+    "start": ("ns", "first instant of that take, session clock"),
+    "stop": ("ns", "first instant after it"),
+    **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in AXES},
+}
+
+_MEASURED = {
     "trial": ("", "number of its trial"),
     "onset": ("s", "first contact, device clock"),
     "lift": ("s", "end of contact, device clock"),
@@ -29,25 +54,11 @@ STROKE = {
     "zero": ("", "where the zero of the forces came from"),
     "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
     "flaws": ("", "names of what is wrong with it"),
-    **{
-        f"{n}_bootstrap": ("", f"95 % bootstrap interval of {n}, in its unit")
-        for n in ("mu_static", "mu_dynamic", "mu_max")
-    },
-    **{
-        f"{n}_bootstrap": (unit, f"95 % bootstrap interval of {n}")
-        for n, unit in {
-            "tau_max": "MPa",
-            "speed": "mm/s",
-            "normal_force": "N",
-            "tangential_force": "N",
-            "peak_normal": "N",
-            "peak_tangential": "N",
-            "heading": "deg",
-            "onset": "s",
-            "break_away": "s",
-            "slide_onset": "s",
-        }.items()
-    },
+}
+
+STROKE = {
+    **_MEASURED,
+    **{f"{name}_bootstrap": (_MEASURED[name][0], f"95 % bootstrap interval of {name}") for name in NUMBERS},
     "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
     "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
     "contact_area": ("mm2", "by which tau_max was told"),
@@ -186,6 +197,6 @@ PREDICTION = {
     "opposite_sed": ("MPa", "slid the other way"),
     "opposite_error": ("", "relative, of opposite_sed"),
     "wall_s": ("", "time the solve took, in s"),
-    **MADE_WITH,
+    **PREDICTED_WITH,
     "reasons": ("", "for each number left out, why"),
 }

@@ -1,4 +1,4 @@
-"""A session as CSV: a file for each table, a README that tells every column, and the session's own description."""
+"""A session as CSV: a file for each table, a README that describes every column, and the session's own description."""
 
 import csv
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -9,17 +9,14 @@ from drivers.readings import ReadingBlock
 from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.csv_text import plain, write_rows
-from sessions.exchange.exported import ExportedSession, head_of
+from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.readings_text import columns, read_rows, rows
-from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, tables
+from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
 from sessions.file_access import read_limited
 from sessions.json_document import json_object
-from sessions.recording import LoggedEvent, Recording
-from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_content
+from sessions.recording import Recording
 from sessions.recording.description import description
-from sessions.recording.event_shapes import event_data
-from sessions.recording.schema import DESCRIPTION_FILE
-from sessions.strokes.decisions import DECISIONS, content_of
+from sessions.recording.schema import DESCRIPTION_FILE, SEALED_FILE
 
 READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"
 SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated", ())  # a comment would hide the header
@@ -28,36 +25,36 @@ SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated",
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the session into an empty folder."""
     recording = source.recording
-    made = [*tables(source), _events(recording)]
+    session_tables = [*tables(source), _events(recording)]
     mark = (SIMULATED,) if recording.simulated_sentence else ()
-    for table in made:
-        with _opened(folder / f"{table.name}.csv") as file:
+    for table in session_tables:
+        with _open(folder / f"{table.name}.csv") as file:
             _write_rows(file, mark, [[column.heading for column in table.columns]], table.rows)
-    told = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in made]
+    contents = [(f"{table.name}.csv", table.meaning, (*mark, *table.columns)) for table in session_tables]
     if recording.info is not None:
         meaning = "a row for each reading, in the order recorded"
-        told.append((READINGS, meaning, (*mark, *columns(recording.info.calibration))))
+        contents.append((READINGS, meaning, (*mark, *columns(recording.info.calibration))))
         _write_readings(recording, mark, folder / READINGS, progress)
     write_json(folder / DESCRIPTION_FILE, description(recording))
     for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
         if document is not None:
             head = {"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}
             write_json(folder / name, {**head, **document})
-    decided = content_of(recording.folder)
-    if decided:
-        (folder / DECISIONS).write_bytes(decided)
-    uncertain = gain_error_content(recording.folder)
-    if uncertain:
-        (folder / GAIN_ERROR).write_bytes(uncertain)
-    (folder / README).write_text(_readme(recording, told), encoding="utf-8")
+    for name, content in side_files(recording.folder).items():
+        (folder / name).write_bytes(content)
+    (folder / README).write_text(_readme(recording, contents), encoding="utf-8")
+
+
+def find(path: Path) -> Path | None:
+    """Return what `read` reads where `path` is such a folder; None elsewhere."""
+    return path if (path / DESCRIPTION_FILE).is_file() and not (path / SEALED_FILE).is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
     """Return the session that `write` put into the folder `path`. Raises OSError, ValueError."""
-    told = json_object(read_limited(path / DESCRIPTION_FILE))
-    events = tuple(_event(row) for row in _rows_of(path / EVENTS))
-    beside = content_of(path), gain_error_content(path)
-    return ExportedSession("csv", path, head_of(told), events, lambda: _read_readings(path / READINGS), *beside)
+    head = head_of(json_object(read_limited(path / DESCRIPTION_FILE)))
+    events = tuple(logged_event(row, "kind") for row in _rows_of(path / EVENTS))
+    return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
 
 
 def _events(recording: Recording) -> Table:
@@ -67,19 +64,7 @@ def _events(recording: Recording) -> Table:
     return Table("events", EACH_EVENT, (number, time, kind, trial, readings, data))
 
 
-def _event(row: dict[str, str]) -> LoggedEvent:
-    trial = row["trial"]
-    return LoggedEvent(
-        int(row["number"]),
-        int(row["time_ns"]),
-        row["kind"],
-        int(trial) if trial else None,
-        int(row["readings"]),
-        event_data(row["kind"], row["data"]),
-    )
-
-
-def _opened(path: Path) -> TextIO:
+def _open(path: Path) -> TextIO:
     return path.open("w", encoding="utf-8", newline="")
 
 
@@ -94,7 +79,7 @@ def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, pr
     calibration = recording.info.calibration
     expected = max((event.readings for event in recording.events), default=0) or 1
     written = 0
-    with _opened(path) as file:
+    with _open(path) as file:
         _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())
         for block in recording.blocks():
             _write_rows(file, mark, [], rows(block, calibration))
@@ -115,8 +100,8 @@ def _rows_of(path: Path) -> list[dict[str, str]]:
     return [{name: plain(text) for name, text in row.items()} for row in csv.DictReader(lines)]
 
 
-def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column]]]) -> str:
-    """Return the page that tells every file and column."""
+def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Column]]]) -> str:
+    """Return the page that describes every file and column."""
     simulated = recording.simulated_sentence
     lines = [
         *([simulated, ""] if simulated else []),
@@ -131,7 +116,7 @@ def _readme(recording: Recording, told: Sequence[tuple[str, str, Sequence[Column
         "are those of the transducer's own clock, 0 at its first reading.",
     ]
     row: Callable[[Column], str] = lambda c: f"| `{c.heading}` | {c.unit or '–'} | {c.meaning} |"  # noqa: E731
-    for name, meaning, found in told:
+    for name, meaning, of_file in contents:
         lines += ["", f"## {name}", "", f"{meaning[0].upper()}{meaning[1:]}.", "", "| column | unit | meaning |"]
-        lines += ["| --- | --- | --- |", *map(row, found)]
+        lines += ["| --- | --- | --- |", *map(row, of_file)]
     return "\n".join([*lines, ""])

@@ -10,6 +10,7 @@ from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.atomic_file import write_whole
 from sessions.recording.calibration_uncertainty import GAIN_ERROR
+from sessions.recording.derived import bytes_of
 from sessions.recording.digests import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
@@ -41,23 +42,28 @@ class ExportedSession:
     head: Head
     events: tuple[LoggedEvent, ...]
     blocks: Callable[[], Iterator[ReadingBlock]]  # the readings in their order, read when asked for
-    decisions: bytes = b""  # what people decided, as the file holds it
-    gain_error: bytes = b""  # how uncertain the calibration is, as somebody set it: the file
+    side_files: Mapping[str, bytes]  # what people set beside the recording, by the name of its file
+
+
+def side_files(folder: Path) -> dict[str, bytes]:
+    """Return the files that people set beside a recording, by name. Raises RecordingError where one cannot be read."""
+    contents = {name: bytes_of(folder / name) for name in (DECISIONS, GAIN_ERROR)}
+    return {name: content for name, content in contents.items() if content}
 
 
 def head_of(description: Mapping[str, Any]) -> Head:
     """Return the head that a `session.json` tells. Raises ValueError where it is none of ours, or a later one."""
-    made: Mapping[str, Any] = description.get("format") or {}
-    if made.get("name") != FORMAT or int(made.get("version", 0)) > FORMAT_VERSION:
-        raise ValueError(f"it holds {made or 'no format'}; this program reads '{FORMAT}' up to {FORMAT_VERSION}")
-    told = description["sha256"]
+    form: Mapping[str, Any] = description.get("format") or {}
+    if form.get("name") != FORMAT or int(form.get("version", 0)) > FORMAT_VERSION:
+        raise ValueError(f"it holds {form or 'no format'}; this program reads '{FORMAT}' up to {FORMAT_VERSION}")
+    digests = description["sha256"]
     return Head(
         description.get("SIMULATED"),
         description["plan"],
         description["transducer"],
         description["provenance"],
         tuple(description["losses"]),
-        Digest(description["readings"], dict(told["columns"]), told["events"]),
+        Digest(description["readings"], dict(digests["columns"]), digests["events"]),
     )
 
 
@@ -88,39 +94,38 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
     try:
         _write(exported, writer)
         writer.commit()
-        made = Recording.open(folder)
-        found = [sentence for sentence in head.losses if sentence not in made.losses]
+        restored = Recording.open(folder)
+        problems = [sentence for sentence in head.losses if sentence not in restored.losses]
         source_digest = digest_of(exported.blocks(), exported.events)
-        written = digest_of(made.blocks(), made.events)
-        found += [f"since it was exported: {told}" for told in different(head.digest or source_digest, written)]
-        if written != source_digest:
-            found.append("what was written is not what the export holds")
-        for sentence in found:
+        digest = digest_of(restored.blocks(), restored.events)
+        changes = different(head.digest or source_digest, digest)
+        problems += [f"since it was exported: {sentence}" for sentence in changes]
+        if digest != source_digest:
+            problems.append("what was written is not what the export holds")
+        for sentence in problems:
             writer.event("not_restored", data={"sentence": sentence}, commit=False)
     finally:
         writer.close()
-    if exported.decisions:
-        write_whole(folder / DECISIONS, exported.decisions)
-    if exported.gain_error:
-        write_whole(folder / GAIN_ERROR, exported.gain_error)
-    return tuple(found)
+    for name, content in exported.side_files.items():
+        write_whole(folder / name, content)
+    return tuple(problems)
 
 
 def _write(exported: ExportedSession, writer: SessionWriter) -> None:
     """Write readings and events in the order in which they were recorded."""
     blocks = exported.blocks()
     waiting = ReadingBlock.empty()
-    handed = 0
+    written = 0
     for event in exported.events:
-        while handed < event.readings:
+        while written < event.readings:
             if not len(waiting):
                 waiting = next(blocks, ReadingBlock.empty())
                 if not len(waiting):
                     break
-            count = min(len(waiting), event.readings - handed)
+            count = min(len(waiting), event.readings - written)
             writer.readings(waiting.between(0, count))
             waiting = waiting.between(count, len(waiting))
-            handed += count
+            written += count
         writer.event(event.kind, event.trial, event.data, time_ns=event.time_ns, commit=False)
     writer.readings(waiting)
     for block in blocks:

@@ -6,7 +6,6 @@
 # h5py brings no types; every array is given its type where it leaves this file.
 
 import json
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,20 +15,23 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
-from sessions.exchange.exported import ExportedSession, Head
+from sessions.exchange.exported import ExportedSession, Head, side_files
 from sessions.exchange.session_tables import Column, tables
 from sessions.file_access import LARGEST_DOCUMENT
 from sessions.json_document import json_value
 from sessions.recording import LoggedEvent
-from sessions.recording.calibration_uncertainty import gain_error_content
+from sessions.recording.calibration_uncertainty import GAIN_ERROR
 from sessions.recording.event_shapes import event_data
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 from sessions.recording.sealed_copy import DataSet, texts, write_copy
 from sessions.recording.text_column import read_texts
-from sessions.strokes.decisions import content_of
+from sessions.strokes.decisions import DECISIONS
 
 PART = 65_536  # readings at once
-DECIDED, UNCERTAIN = "derived/decisions", "derived/calibration_error"
+SIDE_FILES = {  # data set and meaning of each file that people set beside a recording
+    DECISIONS: ("derived/decisions", "decisions.jsonl, what people decided about strokes"),
+    GAIN_ERROR: ("derived/calibration_error", "calibration-error.json, as somebody set it"),
+}
 IN_THE_COPY = "trials"  # the table that the sealed copy holds itself
 
 
@@ -40,40 +42,48 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         if document is not None:
             text = json.dumps(document, allow_nan=False)
             more.append(DataSet(f"derived/{name}", texts([text]), "", f"{name}.json, made by the versions in made_by"))
-    decided = content_of(source.recording.folder).decode(errors="replace")
-    if decided:
-        more.append(DataSet(DECIDED, texts([decided]), "", "decisions.jsonl, what people decided about strokes"))
-    uncertain = gain_error_content(source.recording.folder).decode(errors="replace")
-    if uncertain:
-        more.append(DataSet(UNCERTAIN, texts([uncertain]), "", "calibration-error.json, as somebody set it"))
+    for name, content in side_files(source.recording.folder).items():
+        data_set, meaning = SIDE_FILES[name]
+        more.append(DataSet(data_set, texts([content.decode(errors="replace")]), "", meaning))
     write_copy(source.recording, folder / SEALED_FILE, more, progress)
+
+
+def find(path: Path) -> Path | None:
+    """Return the file that `read` reads where `path` is it or the folder that holds it; None elsewhere."""
+    if path.suffix in {".h5", ".hdf5"}:
+        return path
+    return path / SEALED_FILE if (path / SEALED_FILE).is_file() else None
 
 
 def read(path: Path) -> ExportedSession:
     """Return the session that a file written by `write`, or a sealed copy, holds. Raises OSError, ValueError."""
     with h5py.File(path, "r") as file:
-        made = _text(file.attrs.get("format", b"")), int(file.attrs.get("format_version", 0))
-        if made[0] != FORMAT or made[1] > FORMAT_VERSION:
-            raise ValueError(f"it holds {made[0] or 'no format'} {made[1]}; this reads '{FORMAT}' to {FORMAT_VERSION}")
+        form, version = _text(file.attrs.get("format", b"")), int(file.attrs.get("format_version", 0))
+        if form != FORMAT or version > FORMAT_VERSION:
+            raise ValueError(f"it holds {form or 'no format'} {version}; this reads '{FORMAT}' to {FORMAT_VERSION}")
         head = Head(
             _text(file.attrs["SIMULATED"]) if "SIMULATED" in file.attrs else None,
-            *(json_value(_text(_held(file, f"head/{name}")[0])) for name in ("plan", "transducer", "provenance")),
-            losses=tuple(map(_text, _held(file, "head/losses"))),
+            *(json_value(_text(_array(file, f"head/{name}")[0])) for name in ("plan", "transducer", "provenance")),
+            losses=tuple(map(_text, _array(file, "head/losses"))),
             digest=None,  # the file's own check sums guard it
         )
-        columns = [_held(file, f"events/{name}").tolist() for name in ("number", "time_ns", "trial", "readings")]
-        beside = [_text(_held(file, name)[0]).encode() if name in file else b"" for name in (DECIDED, UNCERTAIN)]
-        kinds = map(_text, _held(file, "events/kind").tolist())
+        columns = [_array(file, f"events/{name}").tolist() for name in ("number", "time_ns", "trial", "readings")]
+        side = {
+            name: _text(_array(file, data_set)[0]).encode()
+            for name, (data_set, _) in SIDE_FILES.items()
+            if data_set in file
+        }
+        kinds = map(_text, _array(file, "events/kind").tolist())
         events = tuple(
             LoggedEvent(number, time_ns, kind, trial or None, readings, event_data(kind, text.decode()))
             for number, time_ns, trial, readings, kind, text in zip(
                 *columns, kinds, read_texts(file, "events/data"), strict=True
             )
         )
-    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), *beside)
+    return ExportedSession("hdf5", path, head, events, lambda: _blocks(path), side)
 
 
-def _held(file: h5py.File, name: str) -> Any:  # noqa: ANN401  h5py brings no types
+def _array(file: h5py.File, name: str) -> Any:  # noqa: ANN401  h5py brings no types
     """Return a data set as an array. Raises ValueError where it unpacks to more than an export writes."""
     if file[name].nbytes > LARGEST_DOCUMENT:
         raise ValueError(f"{name} unpacks to more than {LARGEST_DOCUMENT / 2**20:.0f} MB")
@@ -92,14 +102,11 @@ def _blocks(path: Path) -> Iterator[ReadingBlock]:
 
 def _data_set(table: str, column: Column) -> DataSet:
     """Return a column as a data set: NaN, or an empty text, where there is nothing."""
-    values = column.values
     name, note = f"{table}/{column.name}", f"{column.meaning}; empty or NaN where unknown"
-    if any(isinstance(value, str) for value in values):
-        return DataSet(name, texts(["" if value is None else str(value) for value in values]), column.unit, note)
-    if any(value is None or isinstance(value, float) for value in values):
-        numbers = [math.nan if value is None else float(value) for value in values]
-        return DataSet(name, np.array(numbers, "<f8"), column.unit, note)
-    return DataSet(name, np.array(values, "<i8"), column.unit, note)
+    values = column.complete_values
+    if column.kind is str:
+        return DataSet(name, texts(values), column.unit, note)
+    return DataSet(name, np.array(values, "<f8" if column.kind is float else "<i8"), column.unit, note)
 
 
 def _text(value: object) -> str:

@@ -2,17 +2,18 @@
 
 import csv
 import errno
+import importlib
 import shutil
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from sessions.exchange import bids, csv_folder, hdf5
+from sessions.exchange import FORMATS
 from sessions.exchange.csv_rows import ImportRefused
 from sessions.exchange.exported import ExportedSession, restore
 from sessions.file_access import remedy
 from sessions.recording import Recording, RecordingError
-from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, SEALED_FILE
+from sessions.recording.schema import LIVE_FILE
 
 _DAMAGED = (
     *(OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError),
@@ -33,23 +34,17 @@ def exported(path: Path) -> ExportedSession | None:
     """Return the session in an export of ours; None for anything else, such as a CSV file. Raises ImportRefused."""
     if (path / LIVE_FILE).exists():
         raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
-    reader, file = None, path
-    if path.suffix in {".h5", ".hdf5"}:
-        reader = hdf5.read
-    elif (path / SEALED_FILE).is_file():
-        reader, file = hdf5.read, path / SEALED_FILE
-    elif (path / "dataset_description.json").is_file():
-        reader = bids.read
-    elif (path / DESCRIPTION_FILE).is_file():
-        reader = csv_folder.read
-    elif path.is_dir():
+    for module in map(importlib.import_module, FORMATS.values()):
+        file = module.find(path) if hasattr(module, "find") else None
+        if file is not None:
+            try:
+                return module.read(file)
+            except _DAMAGED as error:
+                sentence = f"{path} cannot be read as an export ({_sentence(error)}); {_remedy(error)}"
+                raise ImportRefused(sentence) from error
+    if path.is_dir():
         raise ImportRefused(f"{path} holds no export of this program; give one, or a CSV file")
-    if reader is None:
-        return None
-    try:
-        return reader(file)
-    except _DAMAGED as error:
-        raise ImportRefused(f"{path} cannot be read as an export ({_said(error)}); {_mended(error)}") from error
+    return None
 
 
 def import_session(source: ExportedSession, folder: Path) -> Restored:
@@ -68,18 +63,19 @@ def import_session(source: ExportedSession, folder: Path) -> Restored:
             folder.rmdir()
         part.replace(folder)
     except _DAMAGED as error:
-        raise ImportRefused(f"{source.path} is damaged ({_said(error)}); {_mended(error)}") from error
+        raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
-    made = Recording.open(folder)
-    return Restored(sum(len(block) for block in made.blocks()), len(made.events), differences)
+    restored = Recording.open(folder)
+    return Restored(sum(len(block) for block in restored.blocks()), len(restored.events), differences)
 
 
-def _mended(error: Exception) -> str:
-    told = isinstance(error, OSError) and error.errno not in (None, errno.ENOENT)
-    return remedy(error) if told else "export the session anew"
+def _remedy(error: Exception) -> str:
+    if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):
+        return remedy(error)
+    return "export the session anew"
 
 
-def _said(error: Exception) -> str:
+def _sentence(error: Exception) -> str:
     sentence = " ".join(str(error).split())
     return f"{sentence} is missing" if isinstance(error, KeyError) else sentence

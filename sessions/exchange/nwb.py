@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, tables
@@ -192,22 +191,17 @@ def _dynamic(table: Table, mark: str) -> object:
     """Return a table as NWB holds it: NaN, or an empty text, where there is nothing."""
     from hdmf.common import DynamicTable, VectorData
 
+    # Texts as objects: of a list NumPy makes an array in which each text takes the room of the longest.
     columns = [
-        VectorData(name=column.heading, description=column.meaning, data=_values(column))
+        VectorData(
+            name=column.heading,
+            description=column.meaning,
+            data=np.array(column.complete_values, object) if column.kind is str else column.complete_values,
+        )
         for column in table.columns
         if any(value not in (None, "") for value in column.values)
     ]
     return DynamicTable(name=table.name, description=f"{mark}{table.meaning}", columns=columns)
-
-
-def _values(column: Column) -> NDArray[np.object_] | list[int] | list[float]:
-    values = column.values
-    if any(isinstance(value, str) for value in values):
-        # As objects: of a list NumPy makes an array in which each text takes the room of the longest.
-        return np.array(["" if value is None else str(value) for value in values], object)
-    if any(value is None or isinstance(value, float) for value in values):
-        return [math.nan if value is None else float(value) for value in values]
-    return [int(value or 0) for value in values]
 
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:

@@ -8,7 +8,8 @@ import numpy as np
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
-from sessions.exchange.session_tables import AXES, Column
+from sessions.exchange.column_meanings import AXES
+from sessions.exchange.session_tables import Column
 
 PART = 16_384  # rows at once
 MISSING = "n/a"
@@ -23,7 +24,7 @@ STORED = _EXACT.names or ()  # what a reading is; the wrench is made from it
 def columns(calibration: Calibration) -> tuple[Column, ...]:
     """Return what the columns of a row are, without values."""
     raw_units = [unit for _, unit in AXES] if calibration.raw_unit == "N, N mm" else [calibration.raw_unit] * 6
-    told = [
+    meanings = [
         ("sequence", "", "record number given by the device; missing numbers are readings that never arrived"),
         ("counter", "", "ticks of the device's clock"),
         ("status", "", "status word as the device sent it; 0 is healthy"),
@@ -32,7 +33,7 @@ def columns(calibration: Calibration) -> tuple[Column, ...]:
         *((name, unit, "as the device sent it") for name, unit in zip(RAW, raw_units, strict=True)),
         *((axis, unit, "the finger's wrench on the stimulus: matrix · raw, nothing subtracted") for axis, unit in AXES),
     ]
-    return tuple(Column(name, unit, meaning, ()) for name, unit, meaning in told)
+    return tuple(Column(name, unit, meaning, ()) for name, unit, meaning in meanings)
 
 
 def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, ...]]:

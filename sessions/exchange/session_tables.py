@@ -1,6 +1,7 @@
 """A session as tables: trials, answers, strokes, friction, predictions; every column with its unit and its meaning."""
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -9,6 +10,7 @@ from sessions.exchange import ExportSource
 from sessions.exchange.column_meanings import (
     ALTERNATIVE,
     ANSWER,
+    AXES,
     DECISION,
     FLAW,
     FRICTION,
@@ -16,18 +18,19 @@ from sessions.exchange.column_meanings import (
     PREDICTION,
     RESPONSE,
     STROKE,
+    TRIAL,
 )
-from sessions.exchange.given_and_made import given, made_with
+from sessions.exchange.prediction_settings import predicted_with
 from sessions.recording import LoggedEvent, Recording
+from sessions.recording.event_shapes import event_data
 from sessions.recording.head import json_text
-from sessions.recording.log import ANSWERS, OUTCOMES
+from sessions.recording.log import ANSWERS
 from sessions.strokes.bootstrap import NUMBERS
 
 Cell = str | int | float | None
 
-AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 _SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
-_OTHERWISE_TOLD = ("solver", "alternatives", "interval", "opposite_interval")
+_NESTED = ("solver", "alternatives", "interval", "opposite_interval")
 _PAIRS = {
     "steady": ("start", "stop"),
     "mu_interval": ("low", "high"),
@@ -62,6 +65,19 @@ class Column:
         """
         return f"{self.name}_{_SUFFIXES.get(self.unit, self.unit)}" if self.unit else self.name
 
+    @property
+    def kind(self) -> type[str] | type[float] | type[int]:
+        """What the values are: whole numbers only where none is missing."""
+        if any(isinstance(value, str) for value in self.values):
+            return str
+        return float if any(value is None or isinstance(value, float) for value in self.values) else int
+
+    @property
+    def complete_values(self) -> list[Any]:
+        """The values as one kind; an empty text or NaN where there is nothing."""
+        kind = self.kind
+        return [("" if kind is str else math.nan) if value is None else kind(value) for value in self.values]
+
 
 @dataclass(frozen=True, slots=True)
 class Table:
@@ -79,27 +95,38 @@ class Table:
 
 def tables(source: ExportSource) -> tuple[Table, ...]:
     """Return every table of a session but those of events and readings; predictions only where they were stored."""
-    analysis, prediction = source.analysis, source.prediction
-    made = (
+    analysis = source.analysis
+    measured = (
         trials(source.recording),
         answers(source.recording),
         positions(source.recording),
-        _of("strokes", "a row for each stroke", _strokes(analysis), STROKE),
-        _of("friction", "what the model is given: a row for each trial with a stroke", given(analysis), FRICTION),
-        _of("flaws", "what is wrong with the recording or with a stroke", [_named(f) for f in analysis["flaws"]], FLAW),
+        _table("strokes", "a row for each stroke", _strokes(analysis), STROKE),
+        _table(
+            "friction", "what the model is given: a row for each trial with a stroke", _friction(analysis), FRICTION
+        ),
+        _table("flaws", "what is wrong with the recording or with a stroke", _flaws(analysis), FLAW),
     )
     if analysis.get("decisions"):
-        made = (*made, _of("decisions", "what people decided, in force", analysis["decisions"], DECISION))
-    if prediction is None:
-        return made
-    rows = [{k: v for k, v in row.items() if k not in _OTHERWISE_TOLD} for row in prediction["trials"]]
-    for row, told in zip(rows, prediction["trials"], strict=True):
-        row |= _sed_interval("sed", told.get("interval")) | _sed_interval("opposite_sed", told.get("opposite_interval"))
-        row |= _force_intervals(told.get("interval"))
-        row |= made_with(prediction, told)
-    predicted = _of("predictions", "what the finite-element finger predicts for each trial", rows, PREDICTION)
-    made = (*made, predicted, *_responses(prediction))
-    otherwise = [
+        decisions = _table("decisions", "what people decided, in force", analysis["decisions"], DECISION)
+        measured = (*measured, decisions)
+    return measured if source.prediction is None else (*measured, *_predictions(source.prediction))
+
+
+def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
+    """Yield the predictions, the quantities at the ending, and the same trials predicted otherwise, where these are."""
+    rows = [
+        {
+            **{name: cell for name, cell in row.items() if name not in _NESTED},
+            **_sed_interval("sed", row.get("interval")),
+            **_sed_interval("opposite_sed", row.get("opposite_interval")),
+            **_force_intervals(row.get("interval")),
+            **predicted_with(prediction, row),
+        }
+        for row in prediction["trials"]
+    ]
+    yield _table("predictions", "what the finite-element finger predicts for each trial", rows, PREDICTION)
+    yield from _responses(prediction)
+    variants = [
         {
             "trial": row["trial"],
             **one["variant"],
@@ -111,10 +138,11 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         for row in prediction["trials"]
         for one in row.get("alternatives", ())
     ]
-    if not otherwise:
-        return made
-    meaning = "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
-    return (*made, _of("alternatives", meaning, otherwise, ALTERNATIVE))
+    if variants:
+        meaning = (
+            "the same trials predicted otherwise: another reading of tau_max, another strain, by the measured force"
+        )
+        yield _table("alternatives", meaning, variants, ALTERNATIVE)
 
 
 def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
@@ -122,62 +150,55 @@ def _responses(prediction: Mapping[str, Any]) -> tuple[Table, ...]:
     rows: list[dict[str, Any]] = []
     for row in prediction["trials"]:
         solved: Mapping[str, Any] = row.get("solver") or {"responses": {}}
-        held: Mapping[str, Mapping[str, Any]] = solved.get("responses", {})
-        rows += [{"trial": row["trial"], "quantity": name, **found} for name, found in held.items()]
+        responses: Mapping[str, Mapping[str, Any]] = solved.get("responses", {})
+        rows += [{"trial": row["trial"], "quantity": name, **response} for name, response in responses.items()]
     meaning = "every quantity at the ending for each predicted trial"
-    return (_of("responses", meaning, rows, RESPONSE),) if rows else ()
+    return (_table("responses", meaning, rows, RESPONSE),) if rows else ()
 
 
-def _sed_interval(name: str, told: Mapping[str, Any] | None) -> dict[str, Any]:
+def _sed_interval(name: str, interval: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return the columns of an interval, where one was asked for: its ends, how it was found, or why it is none."""
-    if told is None:
+    if interval is None:
         return {}
-    ends = None if told["low"] is None else (told["low"], told["high"])
-    return {f"{name}_interval": ends, f"{name}_interval_by": told["method"] or told["reason"]}
+    ends = None if interval["low"] is None else (interval["low"], interval["high"])
+    return {f"{name}_interval": ends, f"{name}_interval_by": interval["method"] or interval["reason"]}
 
 
-def _force_intervals(told: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return the columns of the intervals of a state's forces, and of its depth where that was found."""
-    return {} if told is None else {f"{name}_interval": told.get(name) for name in ("normal_force", "tangential_force")}
+def _force_intervals(interval: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the columns of the intervals of a state's forces, where they were asked for."""
+    forces = ("normal_force", "tangential_force")
+    return {} if interval is None else {f"{name}_interval": interval.get(name) for name in forces}
 
 
 def trials(recording: Recording) -> Table:
     """Return a row for each planned trial, in the plan's order."""
-    records = recording.trials
-    zeros = [_zero(recording, record.trial.number, record.start_ns) for record in records]
-
-    def column(name: str, unit: str, meaning: str, values: Iterable[Cell]) -> Column:
-        return Column(name, unit, meaning, tuple(values))
-
-    return Table(
-        "trials",
-        "a row for each planned trial",
-        (
-            column("trial", "", "number over the whole session", (r.trial.number for r in records)),
-            column("block", "", "name of its block", (r.trial.block for r in records)),
-            column("descriptor", "", "what was judged", (r.trial.stimulus.descriptor for r in records)),
-            column(
-                "index", "", "the maker's number of the stimulus; no score", (r.trial.stimulus.index for r in records)
-            ),
-            column("code", "", "label on the stimulus", (r.trial.stimulus.code for r in records)),
-            column("direction", "", "+1 proximal to distal, -1 back", (r.trial.direction for r in records)),
-            column("repetition", "", "from 1", (r.trial.repetition for r in records)),
-            column("phase", "", "main; or practice, pre-evaluation", (r.trial.phase for r in records)),
-            column("compared_with", "", "trial with the first of two", (r.trial.compared_with for r in records)),
-            column("standard", "", "1 where the others are compared with it", (int(r.trial.standard) for r in records)),
-            column("outcome", "", OUTCOMES, (r.outcome for r in records)),
-            column("score", "", "the subject's answer, 0 to 100", (r.score for r in records)),
-            column("free_number", "", "the subject's answer on a scale of its own", (r.number for r in records)),
-            column("choice", "", "the subject's answer: first or second of two", (r.choice for r in records)),
-            column("take", "", "number of the take that counts", (r.take.number if r.take else None for r in records)),
-            column("start", "ns", "first instant of that take, session clock", (r.start_ns for r in records)),
-            column("stop", "ns", "first instant after it", (r.stop_ns for r in records)),
-            *(
-                column(f"zero_{axis}", unit, "of the wrench in the take's unloaded stretch", (z[i] for z in zeros))
-                for i, (axis, unit) in enumerate(AXES)
-            ),
-        ),
-    )
+    rows: list[dict[str, Any]] = []
+    for record in recording.trials:
+        trial, stimulus = record.trial, record.trial.stimulus
+        zero = _zero(recording, trial.number, record.start_ns)
+        rows.append(
+            {
+                "trial": trial.number,
+                "block": trial.block,
+                "descriptor": stimulus.descriptor,
+                "index": stimulus.index,
+                "code": stimulus.code,
+                "direction": trial.direction,
+                "repetition": trial.repetition,
+                "phase": trial.phase,
+                "compared_with": trial.compared_with,
+                "standard": int(trial.standard),
+                "outcome": record.outcome,
+                "score": record.score,
+                "free_number": record.number,
+                "choice": record.choice,
+                "take": record.take.number if record.take else None,
+                "start": record.start_ns,
+                "stop": record.stop_ns,
+                **{f"zero_{axis}": value for (axis, _), value in zip(AXES, zero, strict=True)},
+            }
+        )
+    return _table("trials", "a row for each planned trial", rows, TRIAL)
 
 
 def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column, Column, Column]:
@@ -191,9 +212,18 @@ def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column
     )
 
 
+def logged_event(cells: Mapping[str, str], kind: str) -> LoggedEvent:
+    """Return the event in the cells of a row, by heading; `kind` is the heading of what happened.
+
+    Raises LookupError, ValueError.
+    """
+    data = event_data(cells[kind], cells["data"])
+    trial = int(cells["trial"]) if cells["trial"] else None
+    return LoggedEvent(int(cells["number"]), int(cells["time_ns"]), cells[kind], trial, int(cells["readings"]), data)
+
+
 def answers(recording: Recording) -> Table:
     """Return a row for each answer a subject gave, with all that was recorded of it but its positions."""
-    given = [event for event in recording.events if event.kind in ANSWERS]
     rows = [
         {
             "trial": event.trial,
@@ -201,9 +231,10 @@ def answers(recording: Recording) -> Table:
             "kind": event.kind,
             **{k: v for k, v in event.data.items() if k != "positions"},
         }
-        for event in given
+        for event in recording.events
+        if event.kind in ANSWERS
     ]
-    return _of("answers", "a row for each answer, those of discarded takes too", rows, ANSWER)
+    return _table("answers", "a row for each answer, those of discarded takes too", rows, ANSWER)
 
 
 def positions(recording: Recording) -> Table:
@@ -214,7 +245,7 @@ def positions(recording: Recording) -> Table:
         if event.kind == "scored"
         for instant, position in event.data.get("positions") or ()
     ]
-    return _of("positions", "every position of the mark on the line before an answer", rows, POSITION)
+    return _table("positions", "every position of the mark on the line before an answer", rows, POSITION)
 
 
 def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float | None, ...]:
@@ -230,39 +261,63 @@ def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float
 def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the strokes with their bootstrap intervals, where the analysis holds them."""
     strokes: Sequence[dict[str, Any]] = analysis["strokes"]
-    held: Mapping[str, Any] = analysis.get("bootstrap") or {}
-    told: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
-    if not told:
+    bootstrap: Mapping[str, Any] = analysis.get("bootstrap") or {}
+    if not bootstrap.get("strokes"):
         return list(strokes)
-    drawn: Mapping[str, Any] = held["settings"]
-    calibration = {name: drawn[name] for name in ("gain_error", "gain_error_origin")}
-    ends: list[dict[str, Any]] = [
+    calibration = {name: bootstrap["settings"][name] for name in ("gain_error", "gain_error_origin")}
+    return [
         {
-            **{f"{name}_bootstrap": one[name] for name in NUMBERS},
-            "direction_agrees": one["direction_agrees"],
+            **stroke,
+            **{f"{name}_bootstrap": intervals[name] for name in NUMBERS},
+            "direction_agrees": intervals["direction_agrees"],
             **calibration,
         }
-        for one in told
+        for stroke, intervals in zip(strokes, bootstrap["strokes"], strict=True)
     ]
-    return [{**stroke, **end} for stroke, end in zip(strokes, ends, strict=True)]
 
 
-def _named(flaw: Mapping[str, Any]) -> dict[str, Any]:
-    return {"flaw": flaw["name"], **{key: value for key, value in flaw.items() if key != "name"}}
+def _friction(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the friction of each trial, with the interval of the number that the model gets, its kind named.
+
+    That of mu is of the mean or of the maximum, as `rule` says: the bootstrap's, where the analysis holds that.
+    """
+    bootstrap: Mapping[str, Any] = analysis.get("bootstrap") or {}
+    strokes: Sequence[Mapping[str, Any]] = bootstrap.get("strokes") or ()
+    rows: list[dict[str, Any]] = []
+    for friction in analysis["friction"]:
+        row = dict(friction)
+        if strokes:
+            intervals = strokes[int(row["stroke"])]
+            kind = f"{100 * bootstrap['settings']['confidence']:g} % block bootstrap"
+            for name, of in (("mu", "mu_max" if row["rule"] == "maximum" else "mu_dynamic"), ("tau_max", "tau_max")):
+                ends: Any = None if row[name] is None else intervals[of]
+                row |= {f"{name}_interval": ends, f"{name}_interval_by": None if ends is None else f"{kind} of {of}"}
+        else:
+            row["mu_interval_by"] = None if row["mu_interval"] is None else analysis["interval"]
+        rows.append(row)
+    return rows
 
 
-def _of(name: str, meaning: str, rows: Sequence[Mapping[str, Any]], told: Mapping[str, tuple[str, str]]) -> Table:
-    """Return plain data as a table: the columns told first, then any others the rows hold."""
+def _flaws(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the flaws, with the name of each under `flaw`."""
+    return [{"flaw": row["name"], **{k: v for k, v in row.items() if k != "name"}} for row in analysis["flaws"]]
+
+
+def _table(
+    name: str, meaning: str, rows: Sequence[Mapping[str, Any]], meanings: Mapping[str, tuple[str, str]]
+) -> Table:
+    """Return plain data as a table: the columns with a known meaning first, then any others the rows hold."""
     flat = [dict(_flat(row)) for row in rows]
-    names = dict.fromkeys(name for pair in map(_names, told) for name in pair)
+    names = dict.fromkeys(name for pair in map(_names, meanings) for name in pair)
     names.update(dict.fromkeys(name for row in flat for name in row))
-    found: list[Column] = []
+    columns: list[Column] = []
     for column in names:
-        unit, what = told.get(column) or told.get(column.rsplit("_", 1)[0]) or ("", "see docs/session-format.md")
-        found.append(Column(column, unit, what, tuple(row.get(column) for row in flat)))
+        known = meanings.get(column) or meanings.get(column.rsplit("_", 1)[0])
+        unit, what = known or ("", "see docs/session-format.md")
+        columns.append(Column(column, unit, what, tuple(row.get(column) for row in flat)))
     if flat:  # what is in no row of this session is left out
-        found = [column for column in found if column.name in flat[0] or any(v is not None for v in column.values)]
-    return Table(name, meaning, tuple(found))
+        columns = [one for one in columns if one.name in flat[0] or any(v is not None for v in one.values)]
+    return Table(name, meaning, tuple(columns))
 
 
 def _names(column: str) -> tuple[str, ...]:

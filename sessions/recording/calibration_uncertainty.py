@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from sessions.recording.derived import bytes_of, load_derived, store_derived
+from sessions.recording.derived import load_derived, store_derived
 from sessions.recording.errors import RecordingError
 from sessions.toml_file import SettingsError
 
@@ -23,11 +23,6 @@ def gain_error_set(folder: Path) -> float | None:
             f"{folder / GAIN_ERROR} is damaged, and what was set for the session is not known: set it anew with "
             "'daq-app analyse --calibration-error PERCENT', or delete the file to go on with what is assumed"
         ) from damaged
-
-
-def gain_error_content(folder: Path) -> bytes:
-    """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
-    return bytes_of(folder / GAIN_ERROR)
 
 
 def set_gain_error(folder: Path, gain_error: float) -> None:

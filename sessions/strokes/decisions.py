@@ -233,12 +233,7 @@ def read(folder: Path) -> Decisions:
 
     A line that is torn or damaged is left out and named. Raises RecordingError where the file cannot be read.
     """
-    return parse(content_of(folder))
-
-
-def content_of(folder: Path) -> bytes:
-    """Return the bytes of the file, none where there is no file. Raises RecordingError where it cannot be read."""
-    return bytes_of(folder / DECISIONS)
+    return parse(bytes_of(folder / DECISIONS))
 
 
 def parse(content: bytes) -> Decisions:
@@ -268,7 +263,7 @@ def append(recording: "Recording", decision: Decision) -> Decision:
     Raises DecisionError where it cannot be, RecordingError where it cannot be written.
     """
     path = recording.folder / DECISIONS
-    content = content_of(recording.folder)
+    content = bytes_of(path)
     before = parse(content)
     _check(decision, before)
     try:

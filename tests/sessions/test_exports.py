@@ -22,6 +22,7 @@ from recordings import PLAN, TRIAL, begun, ended, plainly_read, readings
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS, ExportError, ExportSource, export
+from sessions.exchange.exported import side_files
 from sessions.exchange.import_csv import ImportRefused
 from sessions.exchange.import_session import exported, import_session
 from sessions.exchange.session_tables import tables
@@ -30,7 +31,6 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.strokes import analyse
-from sessions.strokes.decisions import content_of
 
 AGAIN = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]
 
@@ -94,7 +94,7 @@ def test_an_exported_session_comes_back_whole(sources, exports, tmp_path, form, 
         np.testing.assert_equal(asdict(again.info), asdict(recorded.info))  # an unknown number is nan in both
     assert set(recorded.losses) <= set(again.losses)
     assert made.readings == len(recorded.readings())
-    assert content_of(again.folder) == content_of(recorded.folder)
+    assert side_files(again.folder) == side_files(recorded.folder)
     assert gain_error_set(again.folder) == gain_error_set(recorded.folder)
     assert [analyse(again).to_dict()[part] for part in ("strokes", "friction")] == [
         analyse(recorded).to_dict()[part] for part in ("strokes", "friction")

@@ -1,7 +1,7 @@
-"""What the model was given with the intervals of those very numbers, and what each prediction was made with."""
+"""The settings that each prediction was made with, as columns of its table."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from sessions.prediction import Scene
@@ -10,7 +10,7 @@ from sessions.toml_file import from_table, toml_text
 Cell = str | int | float | None
 
 # A prediction made otherwise than usual must not look like the usual one.
-MADE_WITH: Mapping[str, tuple[str, str]] = {
+PREDICTED_WITH: Mapping[str, tuple[str, str]] = {
     "kinematics": ("", "strain of the model: small or finite"),
     "tau_reading": ("", "of tau_max: computed, or as-printed (a hundredth)"),
     "area_law": ("", "by which the contact area of tau_max follows the normal force: fixed, hertz or power"),
@@ -25,35 +25,12 @@ MADE_WITH: Mapping[str, tuple[str, str]] = {
 }
 
 
-def given(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the friction of each trial, with the interval of the number that the model gets, its kind named.
-
-    That of mu is of the mean or of the maximum, as `rule` says: the bootstrap's, where the analysis holds that.
-    """
-    held: Mapping[str, Any] = analysis.get("bootstrap") or {}
-    strokes: Sequence[Mapping[str, Any]] = held.get("strokes") or ()
-    rows: list[dict[str, Any]] = []
-    for row in analysis["friction"]:
-        told = dict(row)
-        if strokes:
-            number = "mu_max" if row["rule"] == "maximum" else "mu_dynamic"
-            found: Mapping[str, Any] = strokes[int(row["stroke"])]
-            kind = f"{100 * held['settings']['confidence']:g} % block bootstrap"
-            for name, of in (("mu", number), ("tau_max", "tau_max")):
-                ends: Any = None if row[name] is None else found[of]
-                told |= {f"{name}_interval": ends, f"{name}_interval_by": None if ends is None else f"{kind} of {of}"}
-        else:
-            told["mu_interval_by"] = None if row["mu_interval"] is None else analysis["interval"]
-        rows.append(told)
-    return rows
-
-
-def made_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
-    """Return what one trial's prediction was made with, as cells of `MADE_WITH`."""
+def predicted_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
+    """Return what one trial's prediction was made with, as cells of `PREDICTED_WITH`."""
     options: Mapping[str, Any] = prediction.get("options") or {}
     area: Mapping[str, Any] = prediction.get("area") or {}
-    held: Mapping[str, Any] | None = prediction.get("scene")
-    scene = None if held is None else from_table(held, Scene, "scene")
+    table: Mapping[str, Any] | None = prediction.get("scene")
+    scene = None if table is None else from_table(table, Scene, "scene")
     solver: Mapping[str, Any] = row.get("solver") or {}
     return {
         "kinematics": options.get("kinematics"),
@@ -64,11 +41,7 @@ def made_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str
         "indentation_origin": "block" if options.get("indentation") is None else "set",
         "width": prediction.get("width"),
         "width_origin": prediction.get("width_origin"),
-        "scene_sha256": None if scene is None else _sha256(scene),
+        "scene_sha256": None if scene is None else hashlib.sha256(toml_text(scene).encode()).hexdigest(),
         "tolerance": None if scene is None else scene.solve.tolerance,
         "dofs": solver.get("dofs"),
     }
-
-
-def _sha256(scene: Scene) -> str:
-    return hashlib.sha256(toml_text(scene).encode()).hexdigest()
