@@ -25,7 +25,7 @@ from multiprocessing.connection import Connection
 import numpy as np
 
 from drivers.catalog import open_transducer
-from drivers.clock import Clock, PacedClock, RealClock
+from drivers.clock import clock_at
 from drivers.links import UdpLink
 from drivers.net_ft.device import NetFtTransducer
 from drivers.net_ft.wire import RECORD
@@ -72,13 +72,13 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
     if drawer is not None:
         drawer.start()
         shown.recv()
-    transducer: Transducer = open_transducer(uri, clock(factor))
+    transducer: Transducer = open_transducer(uri, clock_at(factor))
     if ready:
         there, theirs = context.Pipe()
         sender = context.Process(target=send, args=(rate, seconds + 5.0, theirs), daemon=True)
         sender.start()
         port, info = there.recv(), replace(transducer.info, rate=float(TOP))
-        transducer = NetFtTransducer(info, lambda: UdpLink("127.0.0.1", port), lambda: info, clock(factor))
+        transducer = NetFtTransducer(info, lambda: UdpLink("127.0.0.1", port), lambda: info, clock_at(factor))
     calibration = transducer.info.calibration
     transducer.start()
     ages: list[float] = []
@@ -120,7 +120,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
 
 def serve(rate: int, factor: float, pipe: Connection) -> None:
     """Be the box's process: serve until told to end. First tell its address and when its time began [s]."""
-    box = NetFtBox(Bench(1), clock(factor), rate=rate)
+    box = NetFtBox(Bench(1), clock_at(factor), rate=rate)
     box.start()
     pipe.send((box.uri, time.monotonic() - box.now() / factor))
     pipe.recv()
@@ -184,11 +184,6 @@ def draw(rate: int, pipe: Connection) -> None:
             frames += 1
     with contextlib.suppress(BrokenPipeError):
         pipe.send(frames)
-
-
-def clock(factor: float) -> Clock:
-    """Return a clock that runs `factor` times as fast as real."""
-    return RealClock() if factor == 1.0 else PacedClock(factor)
 
 
 if __name__ == "__main__":

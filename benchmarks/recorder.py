@@ -9,17 +9,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
-from daq_app.recorder.messages import (
-    Connect,
-    Device,
-    Live,
-    Report,
-    SessionBegun,
-    SessionEnded,
-    StartSession,
-    Stop,
-)
 from drivers.clock import RealClock
 from sessions.plan.protocols import plan, protocol
 from sessions.run.runner import Status
@@ -47,18 +38,18 @@ def measure(uri: str, rate: int, seconds: float, room: Path) -> None:
     """Run sessions at one rate, and print what they cost."""
     began = time.perf_counter()
     with Recorder.start() as recorder:
-        recorder.send(Connect(uri))
-        until(recorder, Device)
+        recorder.send(m.Connect(uri))
+        until(recorder, m.Device)
         print(f"{rate} Hz: connected {time.perf_counter() - began:.2f} s after the start of the process")
         stops: list[float] = []
         for number in range(STOPS):
-            recorder.send(StartSession(PLAN, str(room / str(number))))
-            until(recorder, SessionBegun)
+            recorder.send(m.StartSession(PLAN, str(room / str(number))))
+            until(recorder, m.SessionBegun)
             if number == 0:
                 listen(recorder, seconds)
             asked = time.perf_counter()
-            recorder.send(Stop())
-            until(recorder, SessionEnded)
+            recorder.send(m.Stop())
+            until(recorder, m.SessionEnded)
             stops.append(time.perf_counter() - asked)
         print(f"{rate} Hz: from a stop to the written end, median of {STOPS}: {statistics.median(stops) * 1e3:.0f} ms")
 
@@ -71,7 +62,7 @@ def listen(recorder: Recorder, seconds: float) -> None:
     worked, began = processor_time(recorder.pid), time.perf_counter()
     while time.perf_counter() - began < seconds:
         for report in recorder.poll(0.005):
-            if isinstance(report, Live):
+            if isinstance(report, m.Live):
                 ages.append((time.monotonic_ns() - int(report.received_ns[-1])) * 1e-6)
                 readings, left_out = readings + len(report.sequence), left_out + report.left_out
             elif isinstance(report, Status):
@@ -86,7 +77,7 @@ def listen(recorder: Recorder, seconds: float) -> None:
     print(f"  processor: {100 * share:.0f} % of one core")
 
 
-def until(recorder: Recorder, kind: type[Report]) -> None:
+def until(recorder: Recorder, kind: type[m.Report]) -> None:
     """Wait for a report of a kind."""
     while not any(isinstance(report, kind) for report in recorder.poll(0.01)):
         pass

@@ -68,6 +68,11 @@ class PacedClock:
             time.sleep(min(remaining, self._longest_ns) * 1e-9 / self.factor)
 
 
+def clock_at(factor: float, longest_step: float = math.inf) -> Clock:
+    """Return the machine's clock, or one that runs `factor` times as fast as it: see `PacedClock`."""
+    return RealClock() if factor == 1.0 else PacedClock(factor, longest_step)
+
+
 class ToldClock:
     """A clock that moves when it is waited on, for simulated benches only: a session takes no longer than its work.
 

@@ -3,6 +3,7 @@
 import contextlib
 import socket
 import threading
+from collections.abc import Generator
 from dataclasses import dataclass
 
 from drivers.deadline import TICK, Deadline
@@ -57,6 +58,17 @@ class UdpLink:
         self._socket.close()
 
 
+@contextlib.contextmanager
+def _named(where: str, missing: str, advice: str, deadline: Deadline) -> Generator[None]:
+    """Raise LinkLost for what goes wrong on the network inside: where, what is missing, and what to do."""
+    try:
+        yield
+    except TimeoutError:
+        raise LinkLost(f"{where} gave {missing} within {deadline.spent:.2g} s; {advice}") from None
+    except OSError as error:
+        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; {advice}") from None
+
+
 def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadline) -> bytes:
     """Return the `size` bytes that answer a request, or as many as came before the connection ended.
 
@@ -64,17 +76,13 @@ def tcp_answer(host: str, port: int, request: bytes, size: int, deadline: Deadli
     """
     where = f"{host}, TCP port {port}"
     answer = b""
-    try:
-        with _Call(host, port, deadline) as call:
-            call.send(request)
-            while len(answer) < size and (more := call.receive(size - len(answer))):
-                answer += more
-    except TimeoutError:
-        raise LinkLost(
-            f"{where} gave no whole answer within {deadline.spent:.2g} s; check the address and the tcp port"
-        ) from None
-    except OSError as error:
-        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check the address and the tcp port") from None
+    with (
+        _named(where, "no whole answer", "check the address and the tcp port", deadline),
+        _Call(host, port, deadline) as call,
+    ):
+        call.send(request)
+        while len(answer) < size and (more := call.receive(size - len(answer))):
+            answer += more
     return answer
 
 
@@ -130,16 +138,9 @@ def http_get(host: str, port: int, path: str, deadline: Deadline) -> HttpAnswer:
     or what answers is not HTTP or is longer than MOST_BODY.
     """
     where = f"http://{host}:{port}{path}"
-    try:
-        with _Call(host, port, deadline) as call:
-            call.send(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
-            return _answer(call, where)
-    except TimeoutError:
-        raise LinkLost(
-            f"{where} gave no answer within {deadline.spent:.2g} s; check power, cable and address"
-        ) from None
-    except OSError as error:
-        raise LinkLost(f"nothing answers at {where}: {_reason(error)}; check power, cable and address") from None
+    with _named(where, "no answer", "check power, cable and address", deadline), _Call(host, port, deadline) as call:
+        call.send(f"GET {path} HTTP/1.0\r\nHost: {host}\r\nConnection: close\r\n\r\n".encode("ascii"))
+        return _answer(call, where)
 
 
 def _answer(call: _Call, where: str) -> HttpAnswer:

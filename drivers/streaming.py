@@ -130,7 +130,7 @@ class StreamingTransducer(ThreadedTransducer):
     missing numbers; so is the time in which the line was pulled or the device was off.
     """
 
-    _tick = TICK
+    longest_wait = TICK
 
     def __init__(
         self,
@@ -152,15 +152,15 @@ class StreamingTransducer(ThreadedTransducer):
         self._period = 1.0 / info.rate / clock.factor  # between two records [real s]
         self._gather = _GATHER if gathers and self._period < _GATHER else 0.0
         self._pending: deque[_Arrived] = deque()
-        self._reset()
+        self.reset()
 
     @property
     def health(self) -> Health:
         """Totals since start. `restarted` counts how often the stream was lost and came back."""
-        with self._lock:
-            self._digest()
+        with self.lock:
+            self.digest()
             watch = self._numbering.watch
-            return self._health(
+            return self.totals(
                 lost=self._numbering.lost,
                 malformed=self._malformed_before + self._decoder.malformed,
                 restarted=self._restarted,
@@ -168,21 +168,21 @@ class StreamingTransducer(ThreadedTransducer):
                 rate_words=rate_words("readings come", watch.rate, watch.asked) if watch.found else "",
             )
 
-    def _has_come(self) -> bool:
+    def has_come(self) -> bool:
         """Tell whether a reading has come."""
         return self._ever
 
-    def _never_came(self, seconds: float) -> str:
+    def never_came(self, seconds: float) -> str:
         """Return why no reading came within `seconds`, in a sentence."""
         broken = self.health.malformed
         what = f"{broken} broken records and no reading" if broken else "no reading"
-        return f"{self._info.uri} sent {what} within {seconds:.1f} s; check its power, the cable and the address"
+        return f"{self.info.uri} sent {what} within {seconds:.1f} s; check its power, the cable and the address"
 
-    def _reset(self) -> None:
+    def reset(self) -> None:
         """Forget what an earlier stream left."""
-        super()._reset()
+        super().reset()
         self._pending.clear()
-        self._numbering = self._conversation.numbering(self._info.rate, self._clock.factor)
+        self._numbering = self._conversation.numbering(self.info.rate, self.clock.factor)
         self._unpaced: list[_Arrived] = []  # arrivals that the numbering keeps back
         self._restarted = 0
         self._malformed_before = 0  # by decoders that have had their day
@@ -190,10 +190,10 @@ class StreamingTransducer(ThreadedTransducer):
         self._ever = False  # a record has come
         self._heard = time.monotonic()  # when the last one did
 
-    def _run(self) -> None:
+    def run(self) -> None:
         """Be the receiving thread: bring the device to stream, take what comes, and bring it back when it is lost."""
         tries = 0
-        while not self._stopping.is_set():
+        while not self.stopping.is_set():
             try:
                 self._stream()
             except Stopped:
@@ -201,24 +201,24 @@ class StreamingTransducer(ThreadedTransducer):
             except (LinkLost, SetupError, DeviceFault) as error:
                 silent = time.monotonic() - self._heard
                 if not self._ever or isinstance(error, DeviceFault) or silent > _SILENCE + 4.0 * self._period:
-                    self._ended = error if self._info.uri in str(error) else type(error)(f"{self._info.uri}: {error}")
+                    self.ended = error if self.info.uri in str(error) else type(error)(f"{self.info.uri}: {error}")
                     break
                 tries = 0 if silent < 2.0 * _QUIET else tries + 1
-                self._stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
+                self.stopping.wait(_BACK_OFF[min(tries, len(_BACK_OFF) - 1)])
             except Exception as error:  # noqa: BLE001 - an error of ours must not look like a device that is silent
-                self._ended = LinkLost(f"{self._info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
+                self.ended = LinkLost(f"{self.info.uri}: unexpected {type(error).__name__} ({error}); open it anew")
                 break
-        self._arrived.set()
+        self.news.set()
 
     def _stream(self) -> None:
         """Stream over one opening of the line until told to stop. Raises LinkLost when no records come any more."""
-        limit = Deadline(CONNECTING, self._stopping) if self._ever else self._begin_by
+        limit = Deadline(CONNECTING, self.stopping) if self._ever else self.begin_by
         link = self._connect(limit)
         try:
             first = self._conversation.begin(limit.bound(link))
             if self._ever:
-                self._pending.append(_Arrived(None, self._clock.now_ns()))
-            with self._lock:
+                self._pending.append(_Arrived(None, self.clock.now_ns()))
+            with self.lock:
                 self._malformed_before += self._decoder.malformed
                 self._decoder = self._conversation.decoder()
             try:
@@ -233,26 +233,26 @@ class StreamingTransducer(ThreadedTransducer):
         begun = time.monotonic()
         quiet = (_QUIET if self._ever else _FIRST) + 4.0 * self._period
         while True:
-            received_ns = self._clock.now_ns()
+            received_ns = self.clock.now_ns()
             records = decoder.feed(data) if data else None
             now = time.monotonic()
             if records is not None and len(records.status):
                 self._pending.append(_Arrived(records, received_ns))
                 self._heard, self._ever = now, True
                 quiet = _QUIET + 4.0 * self._period
-                if not self._arrived.is_set():
-                    self._arrived.set()
-            if self._stopping.is_set():
+                if not self.news.is_set():
+                    self.news.set()
+            if self.stopping.is_set():
                 return
             if now - max(self._heard, begun) > quiet:
                 raise LinkLost(
-                    f"{self._info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
+                    f"{self.info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
                 )
             if self._gather and data and len(data) < _LUMP:
                 time.sleep(self._gather)
             data = link.receive(TICK)
 
-    def _digest(self, *, end: bool = False) -> None:
+    def digest(self, *, end: bool = False) -> None:
         """Turn pending records into readings. The lock is held."""
         while self._pending:
             arrived = self._pending.popleft()
@@ -273,7 +273,7 @@ class StreamingTransducer(ThreadedTransducer):
         arrivals, self._unpaced = self._unpaced, []
         parts = [(a.records, a.received_ns) for a in arrivals if a.records is not None]
         status = np.concatenate([records.status for records, _ in parts])
-        self._hand_over(
+        self.hand_over(
             ReadingBlock(
                 sequence=paced.sequence,
                 counter=paced.sequence,

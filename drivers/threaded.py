@@ -16,26 +16,26 @@ _LEAVING = 0.9  # for the thread to end, until it is left alone with a device th
 
 
 class ThreadedTransducer(ABC):
-    """One device whose thread, begun by `start`, takes what comes until `_stopping` is set."""
+    """One device whose thread, begun by `start`, takes what comes until `stopping` is set."""
 
-    _tick = 0.05  # longest wait, and so for a stop [real s]
+    longest_wait = 0.05  # longest wait, and so for a stop [real s]
 
     def __init__(self, info: TransducerInfo, clock: Clock, opening: Deadline | None = None) -> None:
         """Take an identified device. What its opening took is taken off the time for its first start."""
         self._spent = 0.0 if opening is None else opening.spent
-        self._info = info
-        self._clock = clock
-        self._lock = threading.Lock()  # over all that _digest touches
-        self._arrived = threading.Event()  # something is pending, or the stream has ended
-        self._stopping = threading.Event()
+        self.info = info  # as found at opening
+        self.clock = clock
+        self.lock = threading.Lock()  # over all that `digest` touches
+        self.news = threading.Event()  # something is pending, or the stream has ended
+        self.stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._ended: Exception | None = None  # why the stream ended, when nobody had stopped it
+        self.ended: Exception | None = None  # why the stream ended, when nobody had stopped it
         self._ready: list[ReadingBlock] = []
         self._received = 0
         self._statuses = StatusCount(info.status)
         self._lag_ms = 0.0
 
-    def _health(self, **counts: Any) -> Health:  # noqa: ANN401 - fields of Health
+    def totals(self, **counts: Any) -> Health:  # noqa: ANN401 - fields of Health
         """Return totals: those that all drivers count, and `counts`. The lock is held."""
         statuses = self._statuses
         return Health(
@@ -48,76 +48,71 @@ class ThreadedTransducer(ABC):
             **counts,
         )
 
-    def _hand_over(self, block: ReadingBlock) -> None:
+    def hand_over(self, block: ReadingBlock) -> None:
         """Let these readings be read. The lock is held."""
         self._received += len(block)
         self._statuses.take(block.status)
         self._ready.append(block)
 
-    @property
-    def info(self) -> TransducerInfo:
-        """Identity, calibration and settings, as found at opening."""
-        return self._info
-
     def start(self) -> None:
         """Bring the device to stream. Raises LinkLost, SetupError or DeviceFault when no reading comes in time."""
-        self._reset()
+        self.reset()
         patience, self._spent = deadline.CONNECTING - self._spent, 0.0
-        waiting, self._begin_by = Deadline(patience), Deadline(patience, self._stopping)
-        name = f"{self._info.driver} {self._info.serial}".strip()
-        thread = self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        waiting, self.begin_by = Deadline(patience), Deadline(patience, self.stopping)
+        name = f"{self.info.driver} {self.info.serial}".strip()
+        thread = self._thread = threading.Thread(target=self.run, name=name, daemon=True)
         thread.start()
         try:
-            while not self._has_come() and self._ended is None and thread.is_alive():
+            while not self.has_come() and self.ended is None and thread.is_alive():
                 if waiting.left <= 0.0:
-                    self._ended = LinkLost(self._never_came(waiting.spent))
-                self._arrived.wait(deadline.TICK)
-                self._arrived.clear()
-            self._check_first()
+                    self.ended = LinkLost(self.never_came(waiting.spent))
+                self.news.wait(deadline.TICK)
+                self.news.clear()
+            self.check_first()
         except BaseException:
             self.stop()
             raise
 
-    def _check_first(self) -> None:
+    def check_first(self) -> None:
         """Raise why the stream cannot be used, where it cannot. A loss after readings came is left to `read`."""
-        if self._ended is not None and not (isinstance(self._ended, LinkLost) and self._has_come()):
-            raise self._ended
+        if self.ended is not None and not (isinstance(self.ended, LinkLost) and self.has_come()):
+            raise self.ended
 
     def read(self, timeout: float) -> ReadingBlock:
         """Return all readings not yet handed over, waiting up to `timeout` session seconds for the first."""
-        deadline = time.monotonic() + timeout / self._clock.factor
+        deadline = time.monotonic() + timeout / self.clock.factor
         while True:
-            self._arrived.clear()
+            self.news.clear()
             streaming = self._thread is not None and self._thread.is_alive()
-            with self._lock:
-                self._digest(end=not streaming)
+            with self.lock:
+                self.digest(end=not streaming)
                 blocks, self._ready = self._ready, []
             if blocks:
                 block = ReadingBlock.joined(blocks)
-                self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
+                self._lag_ms = (self.clock.now_ns() - int(block.received_ns[-1])) * 1e-6
                 return block
-            if not streaming and self._ended is not None:
-                raise LinkLost(str(self._ended))
+            if not streaming and self.ended is not None:
+                raise LinkLost(str(self.ended))
             remaining = deadline - time.monotonic()
             if not streaming or remaining <= 0.0:
                 return ReadingBlock.empty()
-            self._arrived.wait(min(remaining, self._tick))
+            self.news.wait(min(remaining, self.longest_wait))
 
-    def _reset(self) -> None:
+    def reset(self) -> None:
         """Forget what an earlier stream left. Raises SetupError while one runs."""
         if self._thread is not None:
-            raise SetupError(f"{self._info.uri} is streaming already; stop it before starting it again")
-        self._arrived.clear()
-        self._stopping.clear()
-        self._ended = None
+            raise SetupError(f"{self.info.uri} is streaming already; stop it before starting it again")
+        self.news.clear()
+        self.stopping.clear()
+        self.ended = None
         self._ready = []
         self._received = 0
-        self._statuses = StatusCount(self._info.status)
+        self._statuses = StatusCount(self.info.status)
         self._lag_ms = 0.0
 
     def stop(self) -> None:
         """End streaming; what had arrived can still be read. Harmless when repeated."""
-        self._stopping.set()
+        self.stopping.set()
         if self._thread is not None:
             self._thread.join(_LEAVING)
             self._thread = None
@@ -127,17 +122,17 @@ class ThreadedTransducer(ABC):
         self.stop()
 
     @abstractmethod
-    def _run(self) -> None:
-        """Be the thread: bring the device to stream by `_begin_by`, and put down in `_ended` why the stream ended."""
+    def run(self) -> None:
+        """Be the thread: bring the device to stream by `begin_by`, and put down in `ended` why the stream ended."""
 
     @abstractmethod
-    def _has_come(self) -> bool:
+    def has_come(self) -> bool:
         """Tell whether a reading has come."""
 
     @abstractmethod
-    def _never_came(self, seconds: float) -> str:
+    def never_came(self, seconds: float) -> str:
         """Return why no reading came within `seconds`, in a sentence."""
 
     @abstractmethod
-    def _digest(self, *, end: bool = False) -> None:
+    def digest(self, *, end: bool = False) -> None:
         """Turn what the thread has taken into readings that are ready; nothing more comes at the `end`. Lock held."""

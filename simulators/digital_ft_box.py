@@ -55,7 +55,7 @@ class DigitalFtBox(LineBox):
         self._rated = np.array(bench.settings.rated)
         self._gauges = np.linalg.inv(FT32831) * COUNTS_PER_VOLT  # counts for one N or N mm
         self._stored = self._calibration()
-        self._power_up(0.0)
+        self.power_up(0.0)
         self._deaf_until = 0.0
         self._streaming_since = 0.0 if streaming else None
 
@@ -75,9 +75,9 @@ class DigitalFtBox(LineBox):
         numbers = struct.pack(">36f", *stated.ravel()) + bytes([2, 3]) + struct.pack(">6f", *ratings)
         return names + numbers + struct.pack(">ii12H", _COUNTS, _COUNTS, *_GAINS_AND_OFFSETS)
 
-    def _power_up(self, now: float) -> None:
+    def power_up(self, now: float) -> None:
         """Forget what is not kept over power-off."""
-        self._on = True
+        self.is_on = True
         self._unlocked = False
         self._registers = bytearray(2 * _SIZE)
         self._registers[2 * _CALIBRATION : 2 * _CALIBRATION + len(self._stored)] = self._stored
@@ -88,7 +88,7 @@ class DigitalFtBox(LineBox):
         self._deaf_until = now + _START_UP
         self._last = bytes(13)
 
-    def _work(self, port: PseudoTerminal, now: float) -> None:
+    def work(self, port: PseudoTerminal, now: float) -> None:
         """Send packets and answer requests; while it streams, whatever is heard jams it."""
         self._send_due(port, now)
         wait = _NAP if self._streaming_since is None else _SHORTEST_NAP
@@ -106,27 +106,27 @@ class DigitalFtBox(LineBox):
         """Send the packets that are due, and whatever was delayed until now."""
         if self._streaming_since is None:
             return
-        since, age = self._faults.aged(np.array([self._streaming_since, now])).tolist()
+        since, age = self.faults.aged(np.array([self._streaming_since, now])).tolist()
         due = int((age - since) * self._rate)
         if due - self._sent > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
             self._sent = due - _BURST
         numbers = np.arange(self._sent, due, dtype=np.float64)
-        times = self._faults.instants(since + numbers / self._rate)
+        times = self.faults.instants(since + numbers / self._rate)
         self._sent = due
-        port.say(b"".join(self._faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
+        port.say(b"".join(self.faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
-        felt = self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
+        felt = self.faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
         gauges = np.rint(felt @ self._gauges.T)
-        forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
+        forced = np.array([self.faults.active("saturate", time) for time in times.tolist()], bool)
         gauges[forced] = 32767
         over = np.any(np.abs(gauges) >= 32767, axis=1)
         gauges = np.clip(gauges, -32768, 32767)[:, [0, 2, 4, 1, 3, 5]].astype(">i2")
         packets: list[bytes] = []
         for time, six, above in zip(times.tolist(), gauges, over.tolist(), strict=True):
-            if not self._faults.active("stall", time):
-                body, fault = six.tobytes(), above or self._faults.status(time) != 0
+            if not self.faults.active("stall", time):
+                body, fault = six.tobytes(), above or self.faults.status(time) != 0
                 self._last = body + bytes([sum(body) & 0x7F | (0x80 if fault else 0)])
             packets.append(self._last)
         return packets
@@ -162,7 +162,7 @@ class DigitalFtBox(LineBox):
         place = slice(2 * first, 2 * (first + count))
         if not (1 <= count <= 64 and first + count <= _SIZE):
             return bytes([function | 0x80, 2])
-        self._registers[2 * _STATUS : 2 * _STATUS + 2] = struct.pack(">H", self._faults.status(self.now()) & 0xFFFF)
+        self._registers[2 * _STATUS : 2 * _STATUS + 2] = struct.pack(">H", self.faults.status(self.now()) & 0xFFFF)
         if function == 0x03:
             return bytes([3, 2 * count]) + bytes(self._registers[place])
         if not self._unlocked or len(data) != 5 + 2 * count:

@@ -5,7 +5,6 @@ import os
 import selectors
 import socket
 import struct
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,6 +15,7 @@ from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.net_ft_electronics import Electronics
 from simulators.net_ft_pages import AXIA, NET_FT, Product
+from simulators.served_box import ServedBox
 
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
@@ -35,7 +35,7 @@ class _Stream:
     waiting: list[bytes] = field(default_factory=list[bytes])  # records of a datagram not yet full
 
 
-class NetFtBox:
+class NetFtBox(ServedBox):
     """A box on loopback, with a simulated bench behind it. Its time, and the bench's, begins when it is started.
 
     One thread serves all its ports. It tells that it is simulated in the product name on its page.
@@ -61,10 +61,9 @@ class NetFtBox:
         `product` says which box it is. `first_tick` is its counter when it starts, as if it had run for long;
         `first_record` the first number of the first stream. Both serve to see them wrap.
         """
-        self._clock = clock
-        self._faults = faults or Faults()
+        super().__init__(clock, faults)
         self._inside = Electronics(
-            bench, self._faults, rate=rate, rate_error=rate_error, first_tick=first_tick, product=product
+            bench, self.faults, rate=rate, rate_error=rate_error, first_tick=first_tick, product=product
         )
         self._wanted = ((socket.SOCK_DGRAM, "rdt", rdt_port), (socket.SOCK_STREAM, "tcp", tcp_port))
         self._wanted += ((socket.SOCK_STREAM, "http", http_port),)
@@ -73,14 +72,7 @@ class NetFtBox:
         self._stream: _Stream | None = None
         self._selector = selectors.SelectSelector()  # the one whose waits are finer than a millisecond
         self._bound: list[socket.socket] = []
-        self._closing = threading.Event()
-        self._thread: threading.Thread | None = None
-        self._origin_ns = 0
         self.uri = ""  # the address to open it at; known once it is started
-
-    def now(self) -> float:
-        """Return the box's and the bench's time [s]: 0 when it was started."""
-        return (self._clock.now_ns() - self._origin_ns) * 1e-9
 
     def start(self) -> None:
         """Open the ports and begin to serve. Raises SetupError when a port is in use."""
@@ -94,35 +86,33 @@ class NetFtBox:
             self._selector.register(bound, selectors.EVENT_READ, serve)
         rdt, tcp, http = (bound.getsockname()[1] for bound in self._bound)
         self.uri = f"net-ft://{HOST}?rdt={rdt}&tcp={tcp}&http={http}"
-        self._origin_ns = self._clock.now_ns()
-        self._thread = threading.Thread(target=self._serve, name="simulated net-ft box")
-        self._thread.start()
+        self.serve(self._serve, "net-ft box")
 
     def close(self) -> None:
         """Switch the box off and give back its ports. Harmless when repeated."""
-        self._closing.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-            self._release()
+        super().close()
+        self._release()
 
     def _release(self) -> None:
+        if not self._bound:
+            return
         opened = [key.fileobj for key in self._selector.get_map().values()]
         for port in {*opened, *self._bound}:
             assert isinstance(port, socket.socket)
             port.close()
+        self._bound.clear()
         self._selector.close()
 
     def _serve(self) -> None:
         """Be the box until closed: send what is due, then wait for the next due record or a request."""
-        while not self._closing.is_set():
+        while not self.closing.is_set():
             now = self.now()
             if not self._has_power(now):
-                self._closing.wait(_NAP)
+                self.closing.wait(_NAP)
                 continue
             self._send_due(now)
-            if self._faults.active("unplug", now):  # it hears nothing either
-                self._closing.wait(self._until_due())
+            if self.faults.active("unplug", now):  # it hears nothing either
+                self.closing.wait(self._until_due())
                 continue
             for key, _ in self._selector.select(self._until_due()):
                 key.data(key.fileobj)
@@ -131,12 +121,12 @@ class NetFtBox:
         """Return how long nothing has to be sent [real s]."""
         if self._stream is None:
             return _NAP
-        due = (self._inside.time(self._stream.tick) - self.now()) / self._clock.factor
+        due = (self._inside.time(self._stream.tick) - self.now()) / self.clock.factor
         return min(max(due, _SHORTEST_NAP), _NAP)
 
     def _has_power(self, now: float) -> bool:
         """Follow the timetable's reboots; return whether the box is on."""
-        on = not self._faults.active("reboot", now)
+        on = not self.faults.active("reboot", now)
         if on and not self._on:
             self._inside.reboot(now)
             self._stream = None
@@ -166,10 +156,10 @@ class NetFtBox:
         if stream.left == 0:
             datagrams += [(now, b"".join(stream.waiting))] if stream.waiting else []
             self._stream = None
-        if self._faults.active("steal", now):  # another client has it; whoever asks next takes it back
+        if self.faults.active("steal", now):  # another client has it; whoever asks next takes it back
             self._stream = None
             return False
-        for datagram in self._faults.route(now, datagrams):
+        for datagram in self.faults.route(now, datagrams):
             with contextlib.suppress(BlockingIOError, ConnectionError):  # a network drops what it cannot carry
                 self._bound[0].sendto(datagram, stream.to)
         return self._stream is not None and count < due

@@ -42,7 +42,7 @@ class SerialFtBox(LineBox):
         self._baud = baud
         self._rated = np.array(bench.settings.rated)
         self._counts = np.repeat([COUNTS_PER_N, COUNTS_PER_NM / 1000.0], 3)  # in one N or N mm
-        self._power_up(0.0)
+        self.power_up(0.0)
 
     @property
     def uri(self) -> str:
@@ -58,9 +58,9 @@ class SerialFtBox(LineBox):
     def _serial(self) -> str:
         return f"SIM{self._bench.seed:05d}"
 
-    def _power_up(self, now: float) -> None:
+    def power_up(self, now: float) -> None:
         """Forget what is not kept over power-off."""
-        self._on = True
+        self.is_on = True
         self._binary = False
         self._mask = 0x3F
         self._biases: list[Array] = []
@@ -70,7 +70,7 @@ class SerialFtBox(LineBox):
         self._last = (0, [0] * 6)
         self._ready_at: float | None = now + _START_UP  # when the banner comes, after power-up
 
-    def _work(self, port: PseudoTerminal, now: float) -> None:
+    def work(self, port: PseudoTerminal, now: float) -> None:
         """Send the banner and records that are due, and answer bytes as they come."""
         if self._ready_at is not None and now >= self._ready_at:
             self._ready_at = None
@@ -94,7 +94,7 @@ class SerialFtBox(LineBox):
         if self._streaming_since is None:
             return _NAP
         due = self._ended(self._sent + 1)
-        return min(max((due - self.now()) / self._clock.factor, _SHORTEST_NAP), _NAP)
+        return min(max((due - self.now()) / self.clock.factor, _SHORTEST_NAP), _NAP)
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
         """Send the records whose last byte would be through by now, and whatever was delayed until now."""
@@ -106,24 +106,24 @@ class SerialFtBox(LineBox):
             self._sent += count - _BURST
             count = _BURST
         numbers = self._sent + np.arange(max(count, 0), dtype=np.float64)
-        times = self._faults.instants(since + numbers * self._period)
+        times = self.faults.instants(since + numbers * self._period)
         self._sent += len(times)
-        for record in self._faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
+        for record in self.faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
             self._say(port, record)
 
     def _age(self, time: float) -> float:
         """Return how far the box's own clock has come at `time`."""
-        return float(self._faults.aged(np.array([time]))[0])
+        return float(self.faults.aged(np.array([time]))[0])
 
     def _ended(self, record: int) -> float:
         """Return when the last byte of a record of this stream is through."""
         since = 0.0 if self._streaming_since is None else self._age(self._streaming_since)
-        return float(self._faults.instants(np.array([since + record * self._period]))[0])
+        return float(self.faults.instants(np.array([since + record * self._period]))[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
         """Take one byte from the line."""
         if byte == 0x17:
-            self._power_up(self.now())
+            self.power_up(self.now())
         elif byte == 0x14:
             self._say(port, self._one())
         elif byte == 0x0D:
@@ -168,15 +168,15 @@ class SerialFtBox(LineBox):
         """Return a record as bytes for each of `times` (n,) [s]."""
         if not len(times):
             return []
-        wrench = self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
+        wrench = self.faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
         packed: list[bytes] = []
         over = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)
         counts = np.rint((np.clip(wrench, -self._rated, self._rated) - bias) * self._counts)
         counts = np.clip(counts, -32768, 32767).astype(int)
         for time, above, six in zip(times.tolist(), over.tolist(), counts.tolist(), strict=True):
-            if not self._faults.active("stall", time):
-                self._last = (self._faults.status(time) or int(above or self._faults.active("saturate", time)), six)
+            if not self.faults.active("stall", time):
+                self._last = (self.faults.status(time) or int(above or self.faults.active("saturate", time)), six)
             error, values = self._last
             if self._binary:
                 packed.append(struct.pack(">B6h", error, *values))

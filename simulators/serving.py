@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from drivers.clock import Clock, PacedClock, RealClock
+from drivers.clock import clock_at
 from drivers.transducer import SetupError
 from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Faults
@@ -31,7 +31,7 @@ def serve_net_ft(
     def box(port: int) -> NetFtBox:
         return NetFtBox(
             ScriptedBench(seed, timetable),
-            _clock(factor),
+            clock_at(factor),
             rate=rate,
             rdt_port=rdt_port,
             tcp_port=tcp_port,
@@ -60,7 +60,7 @@ def serve_serial_ft(
     Raises SetupError where there are no pseudo-terminals or the script is missing, TimetableError when it is wrong.
     """
     timetable = _timetable(script)
-    box = SerialFtBox(ScriptedBench(seed, timetable), _clock(factor), baud=baud, faults=_faults(timetable, seed))
+    box = SerialFtBox(ScriptedBench(seed, timetable), clock_at(factor), baud=baud, faults=_faults(timetable, seed))
     box.start()
     return box
 
@@ -68,17 +68,13 @@ def serve_serial_ft(
 def serve_digital_ft(*, seed: int = 0, factor: float = 1.0, script: Path | None = None) -> DigitalFtBox:
     """Return an RS-485 transducer that serves on a pseudo-terminal until it is closed. Raises as `serve_serial_ft`."""
     timetable = _timetable(script)
-    box = DigitalFtBox(ScriptedBench(seed, timetable), _clock(factor), faults=_faults(timetable, seed))
+    box = DigitalFtBox(ScriptedBench(seed, timetable), clock_at(factor), faults=_faults(timetable, seed))
     box.start()
     return box
 
 
 def _timetable(script: Path | None) -> Timetable:
     return usual_timetable() if script is None else load_timetable(script)
-
-
-def _clock(factor: float) -> Clock:
-    return RealClock() if factor == 1.0 else PacedClock(factor)
 
 
 def _faults(timetable: Timetable, seed: int) -> Faults:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("sessions", "daq_app")
+PACKAGES = ("sessions", "daq_app", "drivers", "simulators")
 
 
 def is_private(name: str) -> bool:

@@ -4,22 +4,8 @@ from dataclasses import dataclass
 
 from daq_app.cli.terminal import Terminal
 from daq_app.console import DONE, FLAWED, Console, WrongValue
+from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
-from daq_app.recorder.messages import (
-    Connect,
-    Device,
-    Failed,
-    Gone,
-    LinkDown,
-    Report,
-    ResumeSession,
-    Sealed,
-    Sealing,
-    SessionBegun,
-    SessionEnded,
-    StartSession,
-    Stop,
-)
 from drivers.transducer import LinkLost, SetupError
 from sessions.recording import RecordingError
 from sessions.run.interruptions import Interruptions, interruptions
@@ -32,7 +18,7 @@ _WRONG = frozenset({"AddressError", "NotNow"})  # failures that come of the comm
 
 
 @dataclass(frozen=True, slots=True)
-class Attended:
+class Outcome:
     """How a session came out."""
 
     folder: str  # where it lies: another folder than asked for where that was taken away meanwhile
@@ -46,21 +32,21 @@ class Attended:
         return DONE if self.end.complete and not (health.lost or health.doubtful or health.off_units) else FLAWED
 
 
-def opened(recorder: Recorder, uri: str) -> Device:
+def open_device(recorder: Recorder, uri: str) -> m.Device:
     """Have the recorder open a transducer. Raises as the driver does, KeyboardInterrupt when somebody stops it."""
     with interruptions() as interrupted:
-        recorder.send(Connect(uri))
+        recorder.send(m.Connect(uri))
         while True:
             for report in recorder.poll(LOOK):
-                if isinstance(report, Device):
+                if isinstance(report, m.Device):
                     return report
                 _raise_failure(report)
             if interrupted.heard:
-                recorder.send(Stop())
+                recorder.send(m.Stop())
                 raise KeyboardInterrupt
 
 
-def attended(recorder: Recorder, asked: StartSession | ResumeSession, console: Console) -> Attended:
+def attend_session(recorder: Recorder, asked: m.StartSession | m.ResumeSession, console: Console) -> Outcome:
     """Attend a session until it is sealed, or cut short; people answer at this terminal unless they are simulated.
 
     A stop is passed on at once; a second one no longer waits: for the sealing, which the recorder finishes alone, or
@@ -79,27 +65,27 @@ class _Attendance:
         self._console = console
         self._interrupted = interrupted
         self._terminal: Terminal | None = None
-        self._begun: SessionBegun | None = None
+        self._begun: m.SessionBegun | None = None
         self._folder = ""
         self._end: SessionEnd | None = None
         self._stopping = False
         self._silent = False
 
-    def to_the_end(self) -> Attended:
+    def to_the_end(self) -> Outcome:
         while True:
             for report in self._recorder.poll(LOOK):
-                if (outcome := self._took(report)) is not None:
+                if (outcome := self._take(report)) is not None:
                     return outcome
             if self._interrupted.heard:
                 self._interrupted.heard = False
                 if self._end is not None:
                     self._console.note("the recorder goes on sealing the session by itself")
-                    return Attended(self._folder, self._end, sealed=False)
+                    return Outcome(self._folder, self._end, sealed=False)
                 if self._stopping:
                     raise KeyboardInterrupt
                 self._stopping = True
                 self._console.note("stopping")
-                self._recorder.send(Stop())
+                self._recorder.send(m.Stop())
             self._watch_silence()
             if self._terminal is not None:
                 for event in self._terminal.poll():
@@ -120,27 +106,27 @@ class _Attendance:
                 else "the recorder answers again"
             )
 
-    def _took(self, report: Report) -> Attended | None:
+    def _take(self, report: m.Report) -> Outcome | None:
         """Take a report, and return the outcome when it is the last."""
         match report:
-            case SessionBegun():
+            case m.SessionBegun():
                 self._begin(report)
             case Status():
-                self._tell(report)
-            case SessionEnded(folder, end, resumable):
+                self._show_status(report)
+            case m.SessionEnded(folder, end, resumable):
                 self._folder, self._end = folder, end
                 self._terminal = None
-                return Attended(folder, end, sealed=False) if resumable else None
-            case Sealing(folder):
+                return Outcome(folder, end, sealed=False) if resumable else None
+            case m.Sealing(folder):
                 self._console.note(f"sealing {folder}")
-            case Sealed():
+            case m.Sealed():
                 assert self._end is not None
-                return Attended(self._folder, self._end, sealed=True)
-            case LinkDown(sentence) if self._begun is None:
+                return Outcome(self._folder, self._end, sealed=True)
+            case m.LinkDown(sentence) if self._begun is None:
                 raise LinkLost(sentence)  # it was opened, and does not stream
-            case Failed() if self._stopping and self._begun is None:
+            case m.Failed() if self._stopping and self._begun is None:
                 raise KeyboardInterrupt  # as wanted, before anything was recorded
-            case Failed() | Gone():
+            case m.Failed() | m.Gone():
                 _raise_failure(report)
             case _ if isinstance(report, Command) and self._terminal is not None:
                 self._terminal.show(report)
@@ -148,26 +134,26 @@ class _Attendance:
                 pass
         return None
 
-    def _begin(self, begun: SessionBegun) -> None:
+    def _begin(self, begun: m.SessionBegun) -> None:
         self._begun = begun
         if begun.people == "people":
             self._terminal = Terminal(forces=begun.plan.forces)
 
-    def _tell(self, status: Status) -> None:
+    def _show_status(self, status: Status) -> None:
         if self._terminal is None and self._begun is not None:
             done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
             who = self._begun.plan.subject
             self._console.progress(done, f"{who}: {status.state}, {status.safe.readings} readings safe")
 
 
-def _raise_failure(report: Report) -> None:
+def _raise_failure(report: m.Report) -> None:
     """Raise what a report tells of as the command line tells it."""
     match report:
-        case Failed(_, sentence, kind):
+        case m.Failed(_, sentence, kind):
             if kind in _WRONG:
                 raise WrongValue(sentence)
             raise {"LinkLost": LinkLost, "SetupError": SetupError}.get(kind, RecordingError)(sentence)
-        case Gone(_, sentence):
+        case m.Gone(_, sentence):
             raise RecordingError(sentence)
         case _:
             pass

@@ -29,11 +29,11 @@ class Inbox:
         self.leaving = threading.Event()  # a shutdown was asked for, or nobody is left to ask
         threading.Thread(target=self._read, name="requests", daemon=True).start()
 
-    def taken(self) -> tuple[Request, ...]:
+    def take_requests(self) -> tuple[Request, ...]:
         """Return what was asked for since the last call, in order."""
         return tuple(self._arrived.popleft() for _ in range(len(self._arrived)))
 
-    def stop_answered(self) -> None:
+    def answer_stop(self) -> None:
         """End the nudging: what comes next is not to be broken off."""
         with self._nudging:
             self.stop_wanted.clear()

@@ -9,23 +9,12 @@ import signal
 import sys
 from collections.abc import Callable
 
+from daq_app.recorder import messages as m
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import (
-    AcknowledgeOverloads,
-    Connect,
-    Disconnect,
-    Failed,
-    Request,
-    ResumeSession,
-    Shutdown,
-    StartSession,
-    Stop,
-    Tare,
-)
 from daq_app.recorder.pipes import Inbox, Outbox
-from daq_app.recorder.session import Prepared, begun, gone_on, run
-from drivers.clock import LONGEST_STEP, Clock, PacedClock, RealClock
+from daq_app.recorder.session import Prepared, begin, resume, run
+from drivers.clock import LONGEST_STEP, Clock, clock_at
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from sessions.recording import RecordingError
 
@@ -42,7 +31,7 @@ def main(arguments: list[str]) -> None:
     pace = float(arguments[0]) if arguments else 1.0
     outbox = Outbox(writing)
     inbox = Inbox(reading)
-    clock = RealClock() if pace == 1.0 else PacedClock(pace, LONGEST_STEP)
+    clock = clock_at(pace, LONGEST_STEP)
     try:
         Recorder(inbox, outbox, clock).serve()
     finally:
@@ -67,26 +56,26 @@ class Recorder:
         while not self._inbox.leaving.is_set():
             self._attempt("Tare", self._bench.look)
             self._display.look(self._bench.health)
-            for request in self._inbox.taken():
+            for request in self._inbox.take_requests():
                 self._attempt(type(request).__name__, lambda asked=request: self._do(asked))
         self._bench.disconnect()
 
-    def _do(self, request: Request) -> None:
+    def _do(self, request: m.Request) -> None:
         match request:
-            case Connect(uri):
+            case m.Connect(uri):
                 self._bench.connect(uri)
-            case Disconnect():
+            case m.Disconnect():
                 self._bench.disconnect()
-            case Tare(duration):
+            case m.Tare(duration):
                 self._bench.begin_tare(duration)
-            case AcknowledgeOverloads():
+            case m.AcknowledgeOverloads():
                 self._display.acknowledge()
-            case StartSession():
-                self._session(lambda: begun(request, self._bench, self._clock))
-            case ResumeSession():
-                self._session(lambda: gone_on(request, self._bench, self._clock))
-            case Stop() | Shutdown():
-                self._inbox.stop_answered()
+            case m.StartSession():
+                self._session(lambda: begin(request, self._bench, self._clock))
+            case m.ResumeSession():
+                self._session(lambda: resume(request, self._bench, self._clock))
+            case m.Stop() | m.Shutdown():
+                self._inbox.answer_stop()
                 self._bench.end_tare()
             case _:
                 raise NotNow("no session is running")
@@ -96,7 +85,7 @@ class Recorder:
         try:
             run(prepare(), self._bench, self._display, self._inbox, self._send)
         finally:
-            self._inbox.stop_answered()
+            self._inbox.answer_stop()
             self._bench.stream()
 
     def _attempt(self, name: str, work: Callable[[], None]) -> None:
@@ -104,6 +93,6 @@ class Recorder:
         try:
             work()
         except EXPECTED as error:
-            self._send(Failed(name, " ".join(str(error).split()), type(error).__name__))
+            self._send(m.Failed(name, " ".join(str(error).split()), type(error).__name__))
         except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
-            self._send(Failed(name, f"unexpected {type(error).__name__} ({error})", type(error).__name__))
+            self._send(m.Failed(name, f"unexpected {type(error).__name__} ({error})", type(error).__name__))

@@ -11,21 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from daq_app.recorder import messages as m
 from daq_app.recorder.client import Recorder
-from daq_app.recorder.messages import (
-    Connect,
-    Device,
-    Failed,
-    Gone,
-    Live,
-    People,
-    Report,
-    ResumeSession,
-    SessionBegun,
-    SessionEnded,
-    StartSession,
-    Stop,
-)
 from drivers.calibration import Calibration
 from drivers.clock import RealClock
 from drivers.readings import ReadingBlock
@@ -49,7 +36,7 @@ QUOTA = 4 * 2**20  # [bytes]
 RATE = 7000  # of the made-up readings that fill it [Hz]
 PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
 Progress = Callable[[float, str], None]
-AReport = TypeVar("AReport", bound=Report)
+AReport = TypeVar("AReport", bound=m.Report)
 
 
 class SelfTestFailed(Exception):
@@ -118,7 +105,7 @@ class _Watched:
         self.safe = 0  # readings acknowledged
         self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
         self._over = False
-        self._waiting: list[Report] = []
+        self._waiting: list[m.Report] = []
 
     def until(self, kind: type[AReport]) -> AReport:
         """Note reports until one of a kind comes, and return it."""
@@ -130,7 +117,7 @@ class _Watched:
                 self._note(report)
                 if isinstance(report, kind):
                     return report
-                if isinstance(report, Failed | Gone):
+                if isinstance(report, m.Failed | m.Gone):
                     raise SelfTestFailed(report.sentence)
         raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
 
@@ -151,19 +138,19 @@ class _Watched:
             self._waiting = []
             for report in reports:
                 self._note(report)
-            if any(isinstance(report, Gone) for report in reports):
+            if any(isinstance(report, m.Gone) for report in reports):
                 return
         raise SelfTestFailed("a recorder that was killed did not end")
 
-    def _note(self, report: Report) -> None:
+    def _note(self, report: m.Report) -> None:
         match report:
             case LoggedEvent():
                 self.events.append(report)
             case Status(safe=safe):
                 self.safe = max(self.safe, safe.readings)
-            case Live(received_ns=received_ns) if len(received_ns) and not self._over:
+            case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
                 self.shown_ns = int(received_ns[-1])
-            case SessionEnded():
+            case m.SessionEnded():
                 self._over = True  # what is shown from now on is not recorded
             case _:
                 pass
@@ -197,13 +184,13 @@ def _killed(room: Path, chance: random.Random, progress: Progress) -> tuple[Kill
 def _begun_or_resumed(watched: _Watched, folder: Path) -> int | None:
     """Have a session running, and return the trial at which it was resumed."""
     if not folder.exists():
-        watched.recorder.send(Connect("sim:?seed=1"))
-        watched.until(Device)
-        watched.recorder.send(StartSession(PLAN, str(folder), People("simulated people", 1), any_folder=True))
-        watched.until(SessionBegun)
+        watched.recorder.send(m.Connect("sim:?seed=1"))
+        watched.until(m.Device)
+        watched.recorder.send(m.StartSession(PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
+        watched.until(m.SessionBegun)
         return None
-    watched.recorder.send(ResumeSession(str(folder)))
-    watched.until(SessionBegun)
+    watched.recorder.send(m.ResumeSession(str(folder)))
+    watched.until(m.SessionBegun)
     return watched.until(Status).trial
 
 
@@ -230,8 +217,8 @@ def _stopped(room: Path) -> float:
             _begun_or_resumed(watched, room / str(number))
             watched.hear(0.3)
             began = time.monotonic()
-            watched.recorder.send(Stop())
-            watched.until(SessionEnded)
+            watched.recorder.send(m.Stop())
+            watched.until(m.SessionEnded)
             took.append(time.monotonic() - began)
         if Recording.open(room / str(number)).end is None:
             raise SelfTestFailed("a session that was stopped had no written end")

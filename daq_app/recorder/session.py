@@ -8,27 +8,11 @@ from pathlib import Path
 
 import msgspec
 
+from daq_app.recorder import messages as m
 from daq_app.recorder.awake import awake
 from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display
-from daq_app.recorder.messages import (
-    AcknowledgeOverloads,
-    Connect,
-    Disconnect,
-    Failed,
-    People,
-    Report,
-    ResumeSession,
-    Sealed,
-    Sealing,
-    SessionBegun,
-    SessionEnded,
-    Shutdown,
-    StartSession,
-    Stop,
-    Tare,
-)
 from daq_app.recorder.pipes import Inbox
 from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself
 from drivers.clock import Clock
@@ -60,7 +44,7 @@ LIFT_PATIENCE_NS = 30_000_000_000  # for a finger that touches when the client g
 CLIENT_GONE = "the window or terminal that ran the session is gone"
 ANY_FOLDER = "recorded in an unsafe folder"  # name of a setting
 PLANTED = "planted friction"  # likewise: descriptor, index and friction of simulated surfaces
-Send = Callable[[Report], None]
+Send = Callable[[m.Report], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,24 +54,24 @@ class Prepared:
     plan: SessionPlan
     writer: SessionWriter
     clock: Clock
-    people: People
+    people: m.People
     info: TransducerInfo | None
     clock_offset_ns: int = 0
     resumed: Resumed | None = None
     before: tuple[LoggedEvent, ...] = ()  # all that was recorded before
 
 
-def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
+def begin(request: m.StartSession, bench: Bench, clock: Clock) -> Prepared:
     """Begin to record in a new folder. Raises RecordingError, SetupError or NotNow."""
     plan, people = request.plan, request.people
     if plan.forces and bench.connected is None:
         raise NotNow("a session with forces needs a transducer, and none is connected; connect one")
-    info = _told_of(bench) if plan.forces else None
+    info = _transducer_info(bench) if plan.forces else None
     folder = Path(request.folder)
     _check_people(people, plan, bench, folder)
     check_room(folder, need(plan, None if info is None else info.rate))
-    settings = [*request.settings, *_told(people, bench.uri if info is not None else None)]
-    settings += _allowed(folder, any_folder=request.any_folder)
+    settings = [*request.settings, *_people_settings(people, bench.uri if info is not None else None)]
+    settings += _folder_settings(folder, any_folder=request.any_folder)
     writer = SessionWriter.create(
         folder,
         plan,
@@ -100,7 +84,7 @@ def begun(request: StartSession, bench: Bench, clock: Clock) -> Prepared:
     return Prepared(plan, writer, clock, people, info)
 
 
-def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
+def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     """Go on with a session that was cut short; its transducer is opened again, on the session's clock.
 
     Raises RecordingError, NotNow, and what opening the transducer raises.
@@ -111,7 +95,7 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     fold_log(Recording.open(folder))  # fails while another recorder writes: its transducer is left alone then
     recording = Recording.open(folder)
     check_resumable(recording)
-    _allowed(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))
+    _folder_settings(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))
     check_room(folder, need(recording.plan, None if recording.info is None else recording.info.rate))
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
@@ -121,7 +105,7 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     people = recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, planted=people.planted)
-    info = _opened_again(request, recording, bench, going_on)
+    info = _reopen(request, recording, bench, going_on)
     _check_people(people, recording.plan, bench, folder)
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
@@ -135,12 +119,12 @@ def gone_on(request: ResumeSession, bench: Bench, clock: Clock) -> Prepared:
 def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
     """Run the session to its end, send all that happens in it, and seal it unless it can go on."""
     writer = prepared.writer
-    course = _Course(prepared, bench, display, inbox, send)
-    writer.safe = course.told
+    operator = _Operator(prepared, bench, display, inbox, send)
+    writer.safe = operator.take_safe
     simulated = simulated_sentence(prepared.info, prepared.people.kind != "people")
     kind, offset_ns = prepared.people.kind, prepared.clock_offset_ns
     send(
-        SessionBegun(
+        m.SessionBegun(
             str(writer.folder), prepared.plan, kind, simulated, offset_ns, prepared.clock.factor, prepared.before
         )
     )
@@ -148,15 +132,15 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
         end = run_session(
             prepared.plan,
             writer,
-            course,
+            operator,
             bench.lent() if prepared.plan.forces else None,
             prepared.clock,
             resumed=prepared.resumed,
-            stop=course.stop,
-            progress=course.progress,
+            stop=operator.stop,
+            progress=operator.progress,
         )
     resumable = end.cause in RESUMABLE
-    send(SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
+    send(m.SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
     if end.cause == "device":
         bench.lost(end.reason)
     if not resumable:
@@ -167,18 +151,20 @@ def seal(folder: Path, send: Send) -> None:
     """Seal an ended session. Raises RecordingError."""
     from sessions.recording.archive import seal as sealed  # HDF5 is slow to load, and nothing waits for it now
 
-    send(Sealing(str(folder)))
+    send(m.Sealing(str(folder)))
     sealed(folder)
-    send(Sealed(str(folder)))
+    send(m.Sealed(str(folder)))
 
 
-def recorded_people(recording: Recording) -> People:
+def recorded_people(recording: Recording) -> m.People:
     """Return who did what was asked for when the session began."""
-    told = {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
+    values = {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
     with suppress(msgspec.DecodeError, msgspec.ValidationError):
-        planted = msgspec.json.decode(told.get(PLANTED, "[]"))
-        return msgspec.convert({"kind": told["people"], "seed": told.get("people seed", 0), "planted": planted}, People)
-    return People()
+        planted = msgspec.json.decode(values.get(PLANTED, "[]"))
+        return msgspec.convert(
+            {"kind": values["people"], "seed": values.get("people seed", 0), "planted": planted}, m.People
+        )
+    return m.People()
 
 
 def recorded_device(recording: Recording) -> str | None:
@@ -187,7 +173,7 @@ def recorded_device(recording: Recording) -> str | None:
     return None if setting is None else str(setting["value"])
 
 
-class _Course:
+class _Operator:
     """Client and simulated people as the runner's operator."""
 
     def __init__(self, prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
@@ -211,15 +197,15 @@ class _Course:
         """Return what was done; say no to what is not for now."""
         self._display.look(self._bench.health)
         acts: list[Event] = []
-        for request in self._inbox.taken():
+        for request in self._inbox.take_requests():
             match request:
-                case AcknowledgeOverloads():
+                case m.AcknowledgeOverloads():
                     self._display.acknowledge()
-                case Stop() | Shutdown():
+                case m.Stop() | m.Shutdown():
                     pass  # `stop` sees them
-                case Connect() | Disconnect() | Tare() | StartSession() | ResumeSession():
+                case m.Connect() | m.Disconnect() | m.Tare() | m.StartSession() | m.ResumeSession():
                     name = type(request).__name__
-                    self._send(Failed(name, f"a session is running: {name} has to wait for its end"))
+                    self._send(m.Failed(name, f"a session is running: {name} has to wait for its end"))
                 case _:
                     acts.append(request)
         return acts if self._helper is None else (*acts, *self._helper.poll())
@@ -240,7 +226,7 @@ class _Course:
         """Send it on."""
         self._send(status)
 
-    def told(self, events: Sequence[LoggedEvent]) -> None:
+    def take_safe(self, events: Sequence[LoggedEvent]) -> None:
         """Send what became safe, and remember whether a finger touches."""
         for event in events:
             self._send(event)
@@ -276,7 +262,7 @@ def _knowing(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
     return itself if key is None else key.of
 
 
-def _check_people(people: People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
+def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
     """Raise NotNow where simulated people would have to stroke a real bench, or cannot tell stimuli apart."""
     if people.kind != "people":
         _knowing(plan, folder)
@@ -287,7 +273,7 @@ def _check_people(people: People, plan: SessionPlan, bench: Bench, folder: Path)
         raise NotNow("a simulated hand strokes the simulated bench only: connect sim:, and record forces")
 
 
-def _told(people: People, uri: str | None) -> list[Setting]:
+def _people_settings(people: m.People, uri: str | None) -> list[Setting]:
     """Return what a resumption needs to know and nobody should have to say again."""
     settings = [Setting("people", people.kind, "", "set")]
     if people.kind != "people":
@@ -299,7 +285,7 @@ def _told(people: People, uri: str | None) -> list[Setting]:
     return settings
 
 
-def _allowed(folder: Path, *, any_folder: bool) -> list[Setting]:
+def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
     """Return what is to be recorded of a folder that is not safe. Raises RecordingError unless any is allowed."""
     sentence = unsafe(folder)
     if sentence is None:
@@ -309,8 +295,8 @@ def _allowed(folder: Path, *, any_folder: bool) -> list[Setting]:
     return [Setting(ANY_FOLDER, sentence.partition(";")[0].replace(str(folder.resolve()), "the folder"), "", "set")]
 
 
-def _opened_again(
-    request: ResumeSession, recording: Recording, bench: Bench, clock: ContinuedClock
+def _reopen(
+    request: m.ResumeSession, recording: Recording, bench: Bench, clock: ContinuedClock
 ) -> TransducerInfo | None:
     """Open the transducer of the session anew, and return who it is; None for a visit that only scores."""
     if recording.info is None:
@@ -318,12 +304,12 @@ def _opened_again(
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
     bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock, streaming=False)
-    info = _told_of(bench)
+    info = _transducer_info(bench)
     check_same_transducer(recording.info, info)
     return info
 
 
-def _told_of(bench: Bench) -> TransducerInfo:
+def _transducer_info(bench: Bench) -> TransducerInfo:
     """Return who the transducer is, as it is written down."""
     assert bench.connected is not None
     info = bench.connected.transducer.info

@@ -58,19 +58,19 @@ class NetFtTransducer(ThreadedTransducer):
         self._step = round(info.counter_rate / info.rate) if info.rate > 0.0 else None  # nan: learn it
         self._period = 1.0 / info.rate / clock.factor if info.rate > 0.0 else 0.0  # between two readings [real s]
         self._pending: deque[tuple[bytes, int]] = deque()  # datagrams with their arrival [ns], from the thread
-        self._reset()
+        self.reset()
 
     @property
     def health(self) -> Health:
         """Totals since start, of all that has arrived up to now."""
-        with self._lock:
-            self._digest()
+        with self.lock:
+            self.digest()
             account = self._account
             found = [self._rate_found()] if account.changed else []
             found += (
-                [rate_words("its clock runs", self._watch.rate, self._info.counter_rate)] if self._watch.found else []
+                [rate_words("its clock runs", self._watch.rate, self.info.counter_rate)] if self._watch.found else []
             )
-            return self._health(
+            return self.totals(
                 lost=account.lost,
                 repeated=account.repeated,
                 late=account.late,
@@ -82,36 +82,36 @@ class NetFtTransducer(ThreadedTransducer):
                 off_units=0 if self._settings.fault is None else sum(count for _, count in self._unconfirmed),
             )
 
-    def _has_come(self) -> bool:
+    def has_come(self) -> bool:
         """Tell whether a reading has come."""
         return self.health.received > 0
 
-    def _check_first(self) -> None:
+    def check_first(self) -> None:
         """Raise why the stream cannot be used, where it cannot; DeviceFault when its rate is wrong."""
-        super()._check_first()
+        super().check_first()
         if self._step is not None and self._account.step not in (None, self._step):
             raise DeviceFault(
-                f"{self._info.uri} is set to {self._info.rate:g} Hz but sends "
-                f"{self._info.counter_rate / (self._account.step or 1):g} Hz; switch it off and on, then open it again"
+                f"{self.info.uri} is set to {self.info.rate:g} Hz but sends "
+                f"{self.info.counter_rate / (self._account.step or 1):g} Hz; switch it off and on, then open it again"
             )
 
-    def _reset(self) -> None:
+    def reset(self) -> None:
         """Forget what an earlier stream left."""
-        super()._reset()
+        super().reset()
         self._pending.clear()
-        self._account = SequenceAccount(self._step, self._info.counter_rate)
-        self._watch = RateWatch(self._info.counter_rate, self._clock.factor, _SILENT_TICKS * self._clock.factor)
+        self._account = SequenceAccount(self._step, self.info.counter_rate)
+        self._watch = RateWatch(self.info.counter_rate, self.clock.factor, _SILENT_TICKS * self.clock.factor)
         self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
         self._held: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
-        self._settings = SettingsWatch(self._info, self._who, self._clock)
+        self._settings = SettingsWatch(self.info, self._who, self.clock)
         self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
 
-    def _run(self) -> None:
+    def run(self) -> None:
         """Be the receiving thread: ask for the stream, take what comes, ask again when it falls silent, and end it."""
         try:
-            link = self._connect(self._begin_by)
+            link = self._connect(self.begin_by)
             try:
                 self._settings.start()
                 self._listen(link)
@@ -119,11 +119,11 @@ class NetFtTransducer(ThreadedTransducer):
                 self._take_leave(Deadline(ENDING).bound(link))
                 self._settings.end()
         except (LinkLost, SetupError, DeviceFault) as error:
-            self._ended = error
+            self.ended = error
         except Stopped:
             pass
         finally:
-            self._arrived.set()
+            self.news.set()
 
     def _take_leave(self, link: Link) -> None:
         """Bring the stream to an end, and take what had been sent."""
@@ -131,25 +131,25 @@ class NetFtTransducer(ThreadedTransducer):
             link.send(STOP)
             link.send(STOP)  # it is not acknowledged and may be lost; a second one does no harm
             while (datagram := link.receive(0.0)) is not None:
-                self._pending.append((datagram, self._clock.now_ns()))
+                self._pending.append((datagram, self.clock.now_ns()))
         link.close()
 
     def _listen(self, link: Link) -> None:
         """Take datagrams until told to stop, or until the box has been silent for too long."""
-        receive, keep, now_ns = link.receive, self._pending.append, self._clock.now_ns
+        receive, keep, now_ns = link.receive, self._pending.append, self.clock.now_ns
         link.send(self._request)
         # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
         silence = asked = 0.0
         streaming = ever = False
         returns: deque[float] = deque(maxlen=_THEFTS)
-        while not self._stopping.is_set():
+        while not self.stopping.is_set():
             if self._settings.fault is not None:
                 raise self._settings.fault
             datagram = receive(_TICK)
             if datagram is not None:
                 keep((datagram, now_ns()))
-                if not self._arrived.is_set():
-                    self._arrived.set()
+                if not self.news.is_set():
+                    self.news.set()
                 silence, asked, streaming, ever = 0.0, 0.0, True, True
                 continue
             silence += _TICK
@@ -161,14 +161,14 @@ class NetFtTransducer(ThreadedTransducer):
                 returns.append(time.monotonic())
                 if len(returns) == _THEFTS and returns[-1] - returns[0] < _THEFT_SPAN:
                     raise LinkLost(
-                        f"{self._info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
+                        f"{self.info.uri} stopped sending {_THEFTS} times within {_THEFT_SPAN:g} s; "
                         "another program on the network probably takes its stream: end that program"
                     )
             if not ever or self._settings.is_the_same():
                 link.send(self._request)
             asked, streaming = silence, False
 
-    def _digest(self, *, end: bool = False) -> None:
+    def digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
         if not self._pending and not (end and self._held):
             return
@@ -192,12 +192,12 @@ class NetFtTransducer(ThreadedTransducer):
         arrived_ns = np.array(received_ns, np.int64)[verdict.kept]
         self._compare_clocks(verdict.counter, arrived_ns)
         self._compare_settings(int(arrived_ns[-1]), len(kept))
-        self._hand_over(
+        self.hand_over(
             ReadingBlock(
                 sequence=verdict.sequence,
                 counter=verdict.counter,
                 status=status,
-                time=(verdict.counter - self._zero) / self._info.counter_rate,
+                time=(verdict.counter - self._zero) / self.info.counter_rate,
                 received_ns=arrived_ns,
                 raw=kept["counts"].astype(np.float64),
             )
@@ -226,22 +226,22 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _rate_found(self) -> str:
         """Return at which rate the box sends now."""
-        return rate_words("it sends", self._info.counter_rate / (self._account.step or 1), self._info.rate)
+        return rate_words("it sends", self.info.counter_rate / (self._account.step or 1), self.info.rate)
 
-    def _never_came(self, seconds: float) -> str:
+    def never_came(self, seconds: float) -> str:
         """Return why a start failed."""
         health = self.health
         if senseless := health.malformed + health.repeated + health.late + len(self._held):
             return (
-                f"{self._info.uri} sent {senseless} records within {seconds:.1f} s of which none is a reading: of a "
+                f"{self.info.uri} sent {senseless} records within {seconds:.1f} s of which none is a reading: of a "
                 "wrong length, or numbers that stand still; switch the box off and on, and check the rdt port"
             )
         if self._answers():
             return (
-                f"{self._info.uri} answers on its web page but sent no reading within {seconds:.1f} s; "
+                f"{self.info.uri} answers on its web page but sent no reading within {seconds:.1f} s; "
                 "check that no firewall holds back its UDP datagrams"
             )
-        return f"{self._info.uri} sent no reading within {seconds:.1f} s; check its power and network cable"
+        return f"{self.info.uri} sent no reading within {seconds:.1f} s; check its power and network cable"
 
     def _answers(self) -> bool:
         """Tell whether somebody answers on the web page."""
@@ -254,7 +254,7 @@ class NetFtTransducer(ThreadedTransducer):
         """Return why a running stream was given up."""
         if self._answers():
             return (
-                f"{self._info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "
+                f"{self.info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "
                 "end any other program that reads it, and check for a firewall"
             )
-        return f"{self._info.uri} has sent nothing for {seconds:.1f} s; check its power and network cable"
+        return f"{self.info.uri} has sent nothing for {seconds:.1f} s; check its power and network cable"

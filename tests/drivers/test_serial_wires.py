@@ -126,7 +126,7 @@ def survives(device, kind):
     begin = device.box.now() + 0.3
     end = begin + (0.8 if kind in ("reboot", "unplug", "lose") else 0.4) * device.clock.factor
     share = 0.05 if kind in ("corrupt", "shorten") else 1.0
-    device.box._faults = Faults([Fault(kind, begin, end, share=share)], seed=1)
+    device.box.faults = Faults([Fault(kind, begin, end, share=share)], seed=1)
     block, deadline = ReadingBlock.empty(), end + 20.0 * device.clock.factor
     while (device.heard(block) < end + 0.3) and device.box.now() < deadline:
         block = ReadingBlock.joined([block, transducer.read(0.1)])
@@ -150,7 +150,7 @@ def test_a_stop_ends_even_a_device_that_is_being_brought_back(simulator):
     device = simulator()
     transducer = device.open()
     transducer.start()
-    device.box._faults = Faults([Fault("reboot", 0.0, 1e9)])
+    device.box.faults = Faults([Fault("reboot", 0.0, 1e9)])
     while len(transducer.read(0.5 * device.clock.factor)):
         pass
     transducer.close()

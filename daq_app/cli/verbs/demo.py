@@ -15,7 +15,7 @@ from daq_app.batch.derived import analyse_session, predict_session
 from daq_app.cli.options import LARGEST_SEED, within
 from daq_app.console import DONE, FLAWED, Console, number, table
 from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
-from drivers.clock import LONGEST_STEP, PacedClock, RealClock
+from drivers.clock import LONGEST_STEP, clock_at
 from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.recording import Recording
 from sessions.statistics.scores import mean_scores
@@ -43,7 +43,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Run the study and print its table."""
     began = time.monotonic()
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
-    clock = RealClock() if options.real_time else PacedClock(PACE, LONGEST_STEP)
+    clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)
     console.say(f"SIMULATED study, seed {options.seed}; time runs {clock.factor:g} times as fast as real")
     try:
         study = simulated_study(out, options.seed, clock, console)

@@ -7,7 +7,7 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from daq_app.cli.attending import attended
+from daq_app.cli.attending import attend_session
 from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     simulated = options.simulate_subject
     people = None if simulated is None else People("simulated people", simulated)
     with Recorder.start(factor, debug=options.debug) as recorder:
-        outcome = attended(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
+        outcome = attend_session(recorder, ResumeSession(str(folder.absolute()), options.device, people), console)
     end, folder = outcome.end, Path(outcome.folder)
     gap = next(event.data["gap"] for event in reversed(Recording.open(folder).events) if event.kind == "resumed")
     console.result({"session": str(folder), "end": asdict(end), "sealed": outcome.sealed, "gap": gap})

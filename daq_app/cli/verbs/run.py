@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
-from daq_app.cli.attending import attended, opened
+from daq_app.cli.attending import attend_session, open_device
 from daq_app.cli.body_options import add_body_arguments, body_of, own_sentence
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -82,12 +82,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
     people = People() if simulated is None else People("simulated people", simulated, chosen.planted_friction)
     settings = (Setting("seed", seed, "", "default" if options.seed is None else "set"),)
     with Recorder.start(options.pace, debug=options.debug) as recorder:
-        bench = opened(recorder, options.device) if options.device else None
+        bench = open_device(recorder, options.device) if options.device else None
         frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
         asked = StartSession(
             replace(planned, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
         )
-        outcome = attended(recorder, asked, console)
+        outcome = attend_session(recorder, asked, console)
     end = outcome.end
     if Path(outcome.folder) != folder.absolute():  # it was taken away meanwhile
         folder = Path(outcome.folder)

@@ -256,13 +256,13 @@ def test_a_link_that_breaks_is_lost_after_all_it_brought_was_read():
 
 def test_a_link_that_breaks_before_start_looks_loses_no_reading(monkeypatch):
     transducer = opened(MemoryLink([*line(0, 10), LinkLost("the cable is out")]))
-    has_come = transducer._has_come
+    has_come = transducer.has_come
 
     def look_late():
         transducer._thread.join()
         return has_come()
 
-    monkeypatch.setattr(transducer, "_has_come", look_late)
+    monkeypatch.setattr(transducer, "has_come", look_late)
     transducer.start()
     assert readings_until_lost(transducer, "the cable is out") == 10
     transducer.close()
