@@ -22,8 +22,8 @@ from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
 from solver.prediction import ROW
 from solver.response.fields import fields_of
-from solver.response.live_picture import LivePicture
-from solver.response.stepper import Stepper, stepper_and_picture
+from solver.response.live_picture import LivePicture, stepper_and_picture
+from solver.response.stepper import Stepper
 
 TOUCH = 0.05  # less normal force is no touch [N]
 FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]

@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
-from solver.accuracy.finite_ends import end, relaxes, steps_asked
 from solver.continuation.existence import refuse_far_beyond, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finger import FiniteFinger, forces_of, sliding_load
-from solver.equilibrium.load_path import Steps
+from solver.equilibrium.load_path import Steps, march
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -220,3 +219,33 @@ def on_nested(
     given = None if relaxes(scene) else forces_of(scene, shape.load)
     (values,), (changes,) = edge_changes(finger.newton, [(shape, given)], finger.numbers_and_row)
     return nested_numbers(values, changes, steps), steps
+
+
+def relaxes(scene: Scene) -> bool:
+    """Return whether the course of a scene is marched in time."""
+    return scene.materials.relax and scene.solve.course == "history"
+
+
+def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> EquilibriumState:
+    """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
+    if relaxes(scene):
+        return march(scene, finger, times, relaxing=True, stop=stop).last
+    return course(scene, finger, stop, times).last
+
+
+def steps_asked(
+    scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], shape: EquilibriumState | None = None
+) -> Steps | None:
+    """Return the load steps that a scene asks for, judged on a mesh, on which it may have led to `shape` already.
+
+    None where that is a settled slide. Raises NotConverged, Cancelled.
+    """
+    usual = end(finger, scene, stop) if shape is None else shape
+    if not depends_on_way(scene, usual):
+        return None
+
+    def after(times: float) -> EquilibriumState:
+        settled_only = shape is not None and relaxes(scene)
+        return usual if times == 1.0 and not settled_only else end(finger, scene, stop, times)
+
+    return Steps.asked(after, finger.all_numbers, scene.solve.tolerance)

@@ -21,7 +21,7 @@ LEAST = 1e-5  # part of the numbers below which nobody minds
 NOTICED = 1e-3  # part of a force or depth that a sensor may tell
 
 
-def together(scenes: Sequence[Scene]) -> list[list[int]]:
+def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
     """Return the sets of scenes that are compared: two or more surfaces of one finger, pressed and moved alike.
 
     Scenes asked for with quick evidence are variants of one surface, whose differences have their own ways
@@ -34,14 +34,14 @@ def together(scenes: Sequence[Scene]) -> list[list[int]]:
     return [numbers for numbers in sets.values() if len({scenes[n] for n in numbers}) > 1]
 
 
-class Off(NamedTuple):
+class ContrastError(NamedTuple):
     """By how much of their range differences between surfaces may be off."""
 
     share: float  # in SED, at worst [-]
     warning: str = ""  # a sentence where that is too much of it, or of a force or depth
 
 
-def off(found: Sequence[Prediction]) -> Off:
+def contrast_error(found: Sequence[Prediction]) -> ContrastError:
     """Return what differences between these surfaces may be off by.
 
     Of forces and depth only what is off by more than sensors tell is warned of. A surface that has no state on the
@@ -49,7 +49,7 @@ def off(found: Sequence[Prediction]) -> Off:
     """
     known = [(one, one.nested) for one in found if one.nested is not None]
     if len(known) < 2:
-        return Off(0.0)
+        return ContrastError(0.0)
     count = len(NAMES)
     numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in known])
     change = np.abs([nested.numbers[:count] for _, nested in known]) - numbers
@@ -63,7 +63,7 @@ def off(found: Sequence[Prediction]) -> Off:
     minded[0] = True
     warned = np.where((shares > WARNED) & minded, shares, 0.0)
     first = int(warned.argmax())
-    return Off(float(shares[0]), _in_a_sentence(NAMES[first], float(warned[first])) if warned.any() else "")
+    return ContrastError(float(shares[0]), _in_a_sentence(NAMES[first], float(warned[first])) if warned.any() else "")
 
 
 def _in_a_sentence(name: str, share: float) -> str:

@@ -10,9 +10,8 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
+from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine, steps_asked
 from solver.accuracy.audits import audits, course_audits, forces_missed, refuse_unsound, unbalanced
-from solver.accuracy.finite_ends import steps_asked
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach

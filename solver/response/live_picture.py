@@ -1,4 +1,4 @@
-"""The whole finger as a picture, as fast as it moves: where its elements are, and what energy they hold."""
+"""A live finger: its warm stepper, and the whole of it as a picture, with the energy that its elements hold."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -10,11 +10,18 @@ from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes
+from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesh import Mesh
+from solver.mesh.mesher import Sizing
+from solver.response.finite_stepper import FiniteStepper
+from solver.response.small_stepper import Condensed, SmallStepper
+from solver.response.stepper import Stepper
 from solver.scene.scene import Scene
 
+FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
+MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
 # A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
@@ -111,3 +118,32 @@ class FinitePicture(LivePicture):
     def sed(self, state: EquilibriumState) -> Array:
         """Return the SED in the middle of each face (f,) [MPa]."""
         return self._at.energy(state.u)
+
+
+def stepper(scene: Scene) -> Stepper:
+    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation or force.
+
+    Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
+    """
+    return stepper_and_picture(scene, picture=False)[0]
+
+
+def stepper_and_picture(scene: Scene, *, picture: bool = True) -> tuple[Stepper, LivePicture | None]:
+    """Return a stepper, and the picture of its finger where that is asked for. Raises as `stepper`."""
+    kind = scene.solve.kinematics
+    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
+    mu, tau = float(scene.friction.mu), scene.friction.cap
+    drawn: LivePicture | None = None
+    if kind == "finite":
+        finite = FiniteFinger.of(scene, sizing)
+        drawn = FinitePicture.of(finite, scene) if picture else None
+        follower: Stepper = FiniteStepper(finite, mu, tau)
+    else:
+        finger = LinearFinger.of(scene, sizing)
+        drawn = SmallPicture.of(finger) if picture else None
+        follower = SmallStepper(Condensed.of(finger), mu, tau)
+    follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
+    if drawn is not None:
+        drawn.sed(follower.state)
+    follower.forget()
+    return follower, drawn

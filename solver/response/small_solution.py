@@ -23,18 +23,18 @@ from solver.accuracy.audits import (
     refuse_unsound,
     unbalanced,
 )
-from solver.accuracy.small_errors import on_nested, steps_asked
+from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.arrays import Array
 from solver.continuation.small_existence import direct
-from solver.continuation.small_states import depends_on_way, gives_way, in_tissue, marched, refined
+from solver.continuation.small_states import depends_on_way, end, gives_way, in_tissue, marched, nearest, refined
 from solver.continuation.wedging import WIDE
-from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.finger import LinearFinger, forces_of
 from solver.equilibrium.load_path import Instant, Steps, times_on_way
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
-from solver.prediction import FORCES_AND_PLACES, Prediction
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, report_part
 from solver.response.answer import Solved, history, prediction
 from solver.scene.scene import Scene, SceneError
@@ -252,3 +252,35 @@ def _balanced(
         state, displacement = refined(scene, finger, state, displacement)
         checks = audits(finger, state, displacement)
     return state, displacement, checks
+
+
+def steps_asked(scene: Scene, finger: LinearFinger) -> Steps:
+    """Return the load steps that a scene asks for whose end depends on its way, judged on a mesh."""
+    try:
+        return Steps.asked(lambda times: end(scene, finger, times), finger.all_numbers, scene.solve.tolerance)
+    except SolveFailure:
+        return Steps(1, np.zeros(COUNT), np.zeros(COUNT))  # nor will there be an estimate
+
+
+def on_nested(mesh: LinearFinger, asked: Sequence[tuple[Scene, Steps | None]]) -> list[NestedNumbers | None]:
+    """Return the numbers of scenes on the nested `mesh`, None where one has no state there.
+
+    Each comes with the load steps that it takes where its state depends on its way. Numbers of all are made at once.
+    """
+    states = [_nested_state(scene, mesh, steps) for scene, steps in asked]
+    held = [number for number, state in enumerate(states) if state is not None]
+    out: list[NestedNumbers | None] = [None] * len(asked)
+    known = [state for state in states if state is not None]
+    if not known:
+        return out
+    forced = [(state, forces_of(asked[n][0], state.load)) for n, state in zip(held, known, strict=True)]
+    for number, values, changes in zip(held, *edge_changes(mesh.newton, forced, mesh.numbers_and_row), strict=True):
+        out[number] = nested_numbers(values, changes, asked[number][1])
+    return out
+
+
+def _nested_state(scene: Scene, mesh: LinearFinger, steps: Steps | None) -> EquilibriumState | None:
+    try:
+        return nearest(scene, mesh) if steps is None else end(scene, mesh)
+    except SolveFailure:
+        return None

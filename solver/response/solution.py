@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import TYPE_CHECKING
 
-from solver.accuracy import contrasts as differences
-from solver.accuracy.contrasts import Off
+from solver.accuracy.contrasts import ContrastError, compared_sets, contrast_error
 from solver.accuracy.measured_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
 from solver.contact.law import STEEP
@@ -149,7 +148,7 @@ def _solve_group(
     fineness = FIRST if asked else DEFAULT[kind]
     on_mesh = _Meshing(depth, progress, Fingers(scenes[0]))
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
-    if marched and (asked or differences.together(scenes)):
+    if marched and (asked or compared_sets(scenes)):
         return _marched(scenes, fineness, on_mesh, watch)
     found = _refined(scenes, fineness, on_mesh, watch, rough)
     return [_warned(answer, more) for answer, more in zip(found.answers, found.warnings, strict=True)]
@@ -190,7 +189,7 @@ def _refined(
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
     is the answer if it `_stands`.
     """
-    surfaces = differences.together(scenes)
+    surfaces = compared_sets(scenes)
     first, kind = fineness, scenes[0].solve.kinematics
     found: dict[int, Answer] = {}
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
@@ -205,7 +204,7 @@ def _refined(
                 found[i] = answer
         missed = [0.0 if i in lost else _missed(found[i], limits=fineness >= DEFAULT[kind]) for i in range(len(scenes))]
         apart = [
-            differences.off([p for i in together if isinstance(p := found[i], Prediction)]) for together in surfaces
+            contrast_error([p for i in together if isinstance(p := found[i], Prediction)]) for together in surfaces
         ]
         contrasts = [
             max((off.share / asked for i in together if (asked := scenes[i].solve.contrast_tolerance)), default=0.0)
@@ -267,7 +266,7 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
 
 
-def _undone(off: Off | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
+def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
     """Return what is to be said of an answer for what the finest mesh has left undone."""
     warnings: list[str] = []
     if lost is not None:

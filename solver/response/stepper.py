@@ -1,26 +1,16 @@
-"""What a live view asks of a warm stepper, and how one is made for a scene: forces in, the state and its SED out."""
+"""The warm stepper of a live view: forces in, the state of the finger and its SED out."""
 
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from solver._kernels import SLIP, STICK
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
-from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.newton import EquilibriumState, LoadState
-from solver.mesh.mesher import Sizing
-from solver.scene.scene import Scene
 
-if TYPE_CHECKING:
-    from solver.response.live_picture import LivePicture
-
-FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
-MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
 
@@ -28,6 +18,7 @@ LIGHT = 1e-7  # N/mm: less than this is no touch
 class Stepper(ABC):
     """Follows one finger on one surface, reading by reading; holds the last state and memory of fixed size.
 
+    >>> from solver import stepper
     >>> from solver.scene.published import SLIPPERINESS, scene
     >>> follows = stepper(scene(SLIPPERINESS[0]))
     >>> sed = [follows.step(0.001 * n, -0.0002 * n) for n in range(1, 50)]
@@ -90,37 +81,3 @@ class Stepper(ABC):
         senses = np.full(len(state), sense, np.int32) if slides else last.sense.copy()
         load = LoadState(load.depth, self.mu, self.tau, sense if slides else 0, load.travel)
         return replace(last, state=state, sense=senses, load=load)
-
-
-def stepper(scene: Scene) -> Stepper:
-    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation or force.
-
-    Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
-    """
-    return stepper_and_picture(scene, picture=False)[0]
-
-
-def stepper_and_picture(scene: Scene, *, picture: bool = True) -> "tuple[Stepper, LivePicture | None]":
-    """Return a stepper, and the picture of its finger where that is asked for. Raises as `stepper`."""
-    kind = scene.solve.kinematics
-    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
-    mu, tau = float(scene.friction.mu), scene.friction.cap
-    # Imported here: both kinds are steppers themselves, and only what is asked for is loaded.
-    from solver.response.finite_stepper import FiniteStepper
-    from solver.response.live_picture import FinitePicture, SmallPicture
-    from solver.response.small_stepper import Condensed, SmallStepper
-
-    drawn: LivePicture | None = None
-    if kind == "finite":
-        finite = FiniteFinger.of(scene, sizing)
-        drawn = FinitePicture.of(finite, scene) if picture else None
-        follower: Stepper = FiniteStepper(finite, mu, tau)
-    else:
-        finger = LinearFinger.of(scene, sizing)
-        drawn = SmallPicture.of(finger) if picture else None
-        follower = SmallStepper(Condensed.of(finger), mu, tau)
-    follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
-    if drawn is not None:
-        drawn.sed(follower.state)
-    follower.forget()
-    return follower, drawn

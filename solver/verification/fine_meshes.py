@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
-from solver.accuracy.finite_ends import end as finite_end
-from solver.accuracy.finite_ends import relaxes
+from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, relaxes, solution_on
+from solver.accuracy.adaptivity import end as finite_end
 from solver.arrays import Array
 from solver.continuation import small_states
 from solver.continuation.wedging import WIDE

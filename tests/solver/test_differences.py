@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, solve_many
-from solver.accuracy.contrasts import off, together
+from solver.accuracy.contrasts import compared_sets, contrast_error
 from solver.scene.published import STICKINESS, scene
 
 
@@ -20,22 +20,22 @@ def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
 def test_what_halving_the_elements_changes_alike_in_all_surfaces_falls_out_of_their_differences():
     one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
     alike = [surface(each, np.array(each) + 0.3) for each in (one, other)]
-    assert off(alike).share == pytest.approx(0.0, abs=1e-12)
+    assert contrast_error(alike).share == pytest.approx(0.0, abs=1e-12)
     # four thirds of what it changes in their difference, by their range
     changed = [alike[0], surface(other, np.add(other, [0.33, 0.3, 0.3, 0.3]))]
-    assert off(changed).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
+    assert contrast_error(changed).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
 
 
 def test_edges_of_contact_put_differences_off_by_half_of_what_a_node_changes_in_each_surface():
     one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
     found = [surface(one, one, (0.03, 0.0, 0.0, 0.0)), surface(other, other, (0.04, 0.0, 0.0, 0.0))]
-    assert off(found).share == pytest.approx(0.5 * 0.05 / 0.2)
+    assert contrast_error(found).share == pytest.approx(0.5 * 0.05 / 0.2)
 
 
 @pytest.mark.parametrize(("changed", "warned"), [(0.004, True), (0.0005, False)])
 def test_of_forces_only_what_a_sensor_could_tell_is_warned_of(changed, warned):
     one, other = (1.0, 1.0, 0.3, 2.0), (1.1, 1.01, 0.3, 2.0)
-    found = off([surface(one, one), surface(other, np.add(other, [0.0, changed, 0.0, 0.0]))])
+    found = contrast_error([surface(one, one), surface(other, np.add(other, [0.0, changed, 0.0, 0.0]))])
     assert ("Differences in normal force" in found.warning) == warned
 
 
@@ -43,8 +43,8 @@ def test_variants_of_one_surface_and_surfaces_pressed_otherwise_are_not_told_apa
     one, other = scene(STICKINESS[0]), scene(STICKINESS[2])
     deeper = replace(other, loading=Loading(1.0, "+x"))
     variant = replace(other, solve=Solve(evidence="quick"))
-    assert together([one, deeper, variant, other]) == [[0, 3]]
-    assert together([one, deeper, variant, one]) == []
+    assert compared_sets([one, deeper, variant, other]) == [[0, 3]]
+    assert compared_sets([one, deeper, variant, one]) == []
 
 
 # Three surfaces for one finger, whose normal forces (finite strain) or SED (small) differ by 2 and 0.6 %: indentation,

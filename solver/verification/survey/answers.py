@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.contrasts import off
+from solver.accuracy.contrasts import contrast_error
 from solver.arrays import Array
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
@@ -66,7 +66,7 @@ def _difference(answers: Sequence[Prediction], tolerance: float, solves: Array) 
     sed = np.array([answer.sed_ending for answer in answers])
     error, doubt = apart(sed, solves[:, :, 0])
     first = answers[0]
-    title, estimate = first.scene.title, off(answers).share
+    title, estimate = first.scene.title, contrast_error(answers).share
     return Estimate(first.scene.solve.kinematics, title, NUMBERS[0], tolerance, first.dofs, estimate, error, doubt)
 
 
