@@ -96,6 +96,6 @@ def remedy(error: Exception) -> str:
         code: int | None = getattr(error, "sqlite_errorcode", None)  # none where Python itself found the fault
         return _DAMAGED if code is None else _BY_SQLITE.get(code & 0xFF, _DAMAGED)  # the low byte is the kind
     number: int | None = getattr(error, "errno", None)
-    if number is None and (named := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
-        number = int(named.group(1))
+    if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
+        number = int(match.group(1))
     return _BY_ERRNO.get(number or 0, _OTHER)

@@ -12,10 +12,10 @@ T = TypeVar("T")
 
 def json_object(text: str | bytes) -> dict[str, Any]:
     """Return the object in a JSON text. Raises ValueError for anything else, nan and nesting without end included."""
-    found = json_value(text)
-    if not isinstance(found, dict):
+    value = json_value(text)
+    if not isinstance(value, dict):
         raise ValueError("it holds no names")
-    return cast("dict[str, Any]", found)
+    return cast("dict[str, Any]", value)
 
 
 def json_value(text: str | bytes) -> object:
@@ -48,20 +48,20 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
 
     A name may be missing only where nothing is known under it. Raises ValueError as `converted` does.
     """
-    held = converted(document, form)
-    for name in _missing(document, msgspec.to_builtins(held)):
+    typed = converted(document, form)
+    for name in _missing(document, msgspec.to_builtins(typed)):
         raise ValueError(f"Object missing required field `{name}`")
-    return held
+    return typed
 
 
-def _missing(document: object, held: object, where: str = "") -> Iterator[str]:
-    """Yield the path of each name that `document` lacks and for which `held` has a default other than None."""
-    if isinstance(held, list | tuple):
-        for at, (found, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", held), strict=True)):
+def _missing(document: object, complete: object, where: str = "") -> Iterator[str]:
+    """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
+    if isinstance(complete, list | tuple):
+        for at, (found, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
             yield from _missing(found, item, f"{where}[{at}]")
-    elif isinstance(held, dict):
+    elif isinstance(complete, dict):
         found = cast("Mapping[str, Any]", document)
-        for name, item in cast("dict[str, Any]", held).items():
+        for name, item in cast("dict[str, Any]", complete).items():
             path = f"{where}.{name}" if where else name
             if name in found:
                 yield from _missing(found[name], item, path)

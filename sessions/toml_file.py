@@ -44,8 +44,8 @@ def load_toml(path: Path, cls: type[T]) -> T:
 def text_of(path: Path) -> str:
     """Return the text of a TOML file, which may be a pipe. Raises as `load_toml` does."""
     if path.is_dir() or not path.exists():
-        found = "this is a folder" if path.is_dir() else "there is no such file"
-        raise FileNotFoundError(f"{path}: {found}; give the path of a TOML file")
+        what = "this is a folder" if path.is_dir() else "there is no such file"
+        raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
     try:
         return read_limited(path, LARGEST_TEXT).decode(
             "utf-8-sig"
@@ -94,11 +94,11 @@ def from_table(table: Mapping[str, Any], cls: type[T], where: str) -> T:
             raise _Wrong(where, key, f"{key} = {value} is not allowed: it must be a finite number")
         nested = _nested(form)
         if isinstance(value, Mapping) and isinstance(nested, inspect.DataclassType):
-            known = [field.name for field in nested.fields]
+            allowed = [field.name for field in nested.fields]
             for name in cast("Mapping[str, Any]", value):
-                if name not in known:
+                if name not in allowed:
                     full = _joined(key, name)
-                    raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(known)}")
+                    raise _Wrong(where, full, f"{full} is not known; allowed here: {', '.join(allowed)}")
     try:
         return msgspec.convert(table, cls)
     except msgspec.ValidationError as error:
@@ -145,14 +145,14 @@ def _sentence(error: msgspec.ValidationError, places: Mapping[str, tuple[Any, in
         value, form = places[path]
         if missing := re.match(r"Object missing required field `(.*?)`", message):
             return path, f"{_joined(path, missing[1])} is missing; it must be {_in_words(_inside(form, missing[1]))}"
-        return path, f"{path} = {shown(value)} is not allowed: it must be {_in_words(form)}"
+        return path, f"{path} = {toml_value(value)} is not allowed: it must be {_in_words(form)}"
     # A dataclass that checks itself names the key, in full or from itself on.
     key = str(getattr(cause, "key", ""))
     if not key:
         return path, f"{path or 'this'}: {cause}"
     full = key if not path or key == path or key.startswith((f"{path}.", f"{path}[")) else f"{path}.{key}"
     allowed = str(getattr(cause, "allowed", cause)).rstrip(".")
-    return full, f"{full} = {shown(getattr(cause, 'value', None))} is not allowed: {allowed}"
+    return full, f"{full} = {toml_value(getattr(cause, 'value', None))} is not allowed: {allowed}"
 
 
 def _joined(key: str, name: str) -> str:
@@ -161,8 +161,8 @@ def _joined(key: str, name: str) -> str:
     >>> _joined("finger", "tip_radius"), _joined("", ""), _joined("a", "a b")
     ('finger.tip_radius', '""', 'a."a b"')
     """
-    written = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
-    return f"{key}.{written}" if key else written
+    bare_or_quoted = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+    return f"{key}.{bare_or_quoted}" if key else bare_or_quoted
 
 
 def _in_words(form: inspect.Type | None) -> str:
@@ -193,9 +193,9 @@ _WORDS: Mapping[type[inspect.Type | None], str] = {
 }
 
 
-def toml_text(made: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
+def toml_text(value: Any) -> str:  # noqa: ANN401  any dataclass of texts, numbers, tuples and dataclasses
     """Return the TOML text from which `from_toml` makes the same dataclass; what is None is left out."""
-    return "\n".join(_lines(msgspec.to_builtins(made), "")) + "\n"
+    return "\n".join(_lines(msgspec.to_builtins(value), "")) + "\n"
 
 
 def _lines(table: Mapping[str, Any], name: str) -> Iterator[str]:
@@ -217,8 +217,8 @@ def _inline(value: Any) -> str:  # noqa: ANN401  as above
     ('["a", 1e-05, true]', '{g = 0.2}')
     """
     if isinstance(value, Mapping):
-        held = cast("Mapping[str, Any]", value)
-        return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in held.items() if item is not None) + "}"
+        table = cast("Mapping[str, Any]", value)
+        return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in table.items() if item is not None) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_inline, cast("tuple[Any, ...]", value))) + "]"
     if isinstance(value, str):
@@ -247,10 +247,10 @@ class _Wrong(SettingsError):
         self.sentence = sentence
 
 
-def shown(value: object) -> str:
+def toml_value(value: object) -> str:
     """Return a value as TOML writes it, cut short.
 
-    >>> shown("a"), shown(True), shown([1, 2.5]), shown(date(2026, 1, 1))
+    >>> toml_value("a"), toml_value(True), toml_value([1, 2.5]), toml_value(date(2026, 1, 1))
     ('"a"', 'true', '[1, 2.5]', '2026-01-01')
     """
     if value is None:
@@ -261,15 +261,15 @@ def shown(value: object) -> str:
 
 def _line_of(text: str, key: str) -> int | None:
     """Return the line of a TOML text on which a dotted key is set or its table begins; None when not found."""
-    counted: dict[str, int] = {}
+    tables: dict[str, int] = {}
     here = ""
     best: int | None = None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*\[\[?\s*([\w.\-]+)\s*\]\]?\s*(#.*)?$", line):
             here = header.group(1)
             if line.lstrip().startswith("[["):
-                counted[here] = counted.get(here, -1) + 1
-                here += f"[{counted[here]}]"
+                tables[here] = tables.get(here, -1) + 1
+                here += f"[{tables[here]}]"
             if key == here or key.startswith((f"{here}.", f"{here}[")):
                 best = number  # where nothing better comes: a key that is missing is missed in its table
         elif assigned := re.match(r"\s*([\w.\-]+)\s*=", line):

@@ -19,7 +19,7 @@ from sessions.recording.calibration_uncertainty import checked_gain_error, gain_
 from sessions.recording.derived import load_derived, store_derived
 from sessions.recording.provenance import software_versions
 from sessions.recording.unblinding import revealed
-from sessions.recording.verification import differences, told, why
+from sessions.recording.verification import differences, first_sentences, why
 from sessions.recording.visits import force_visit
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import intervals_document, stroke_intervals
@@ -187,7 +187,7 @@ def repeat(
 
 def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
-    found = told(list(differences(stored, json.loads(json.dumps(fresh)), name)))
+    found = first_sentences(list(differences(stored, json.loads(json.dumps(fresh)), name)))
     return [*found, why(name, stored, software_versions())] if found else []
 
 

@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.toml_file import SettingsError, shown
+from sessions.toml_file import SettingsError, toml_value
 from solver import Scene, SolveFailure, solve
 from solver.scene import TISSUES
 
@@ -99,7 +99,7 @@ def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tu
         numbers = [float(end) for end in pair if isinstance(end, int | float) and abs(end) <= sys.float_info.max]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
             allowed = "[least, greatest], least below greatest"
-            raise SettingsError(f"{where}: {name} = {shown(given)} is not allowed: {allowed}")
+            raise SettingsError(f"{where}: {name} = {toml_value(given)} is not allowed: {allowed}")
         found[name] = (numbers[0], numbers[1])
     if len(found) < 2:
         raise SettingsError(f"{where}: a design needs two numbers at least")

@@ -51,17 +51,17 @@ def columns(
     `header` is its first row, None where that holds numbers already. `axes` names the columns from the first on ("-"
     for one that is neither), and `units` those of forces and torques, as stated. Raises ColumnsUnknown.
     """
-    found = dict(_stated(axes, width)) if axes is not None else dict(_headed(header))
-    missing = [axis for axis in AXES if axis not in found]
+    places = dict(_stated(axes, width)) if axes is not None else dict(_headed(header))
+    missing = [axis for axis in AXES if axis not in places]
     if missing:
         raise ColumnsUnknown(
             f"no column for {', '.join(missing)} is named: give --axes, such as --axes t,Fx,Fy,Fz,Tx,Ty,Tz, "
             "with - for a column that is none of these"
         )
-    told = {axis: _unit(header[found[axis]]) for axis in found} if header is not None else {}
-    force = _agreed("forces", {told.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
-    torque = _agreed("torques", {told.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
-    time_unit = told.get(TIME) or "s"
+    headed = {axis: _unit(header[places[axis]]) for axis in places} if header is not None else {}
+    force = _agreed("forces", {headed.get(axis) for axis in AXES[:3]}, units[0] if units else None, FORCE_UNITS)
+    torque = _agreed("torques", {headed.get(axis) for axis in AXES[3:]}, units[1] if units else None, TORQUE_UNITS)
+    time_unit = headed.get(TIME) or "s"
     if time_unit not in TIME_UNITS:
         raise ColumnsUnknown(
             f'the time is in "{time_unit}", which is none of {", ".join(TIME_UNITS)}: convert the file'
@@ -70,9 +70,9 @@ def columns(
     stated = units is not None or axes is not None
     return Columns(
         names,
-        found.get(TIME),
+        places.get(TIME),
         time_unit,
-        tuple(found[axis] for axis in AXES),
+        tuple(places[axis] for axis in AXES),
         (force, torque),
         "set" if stated else "header",
     )
@@ -96,13 +96,13 @@ def _headed(header: Sequence[str] | None) -> list[tuple[str, int]]:
 def _stated(axes: Sequence[str], width: int) -> list[tuple[str, int]]:
     if len(axes) > width:
         raise ColumnsUnknown(f"--axes names {len(axes)} columns, but the file has {width}")
-    found = [(name, position) for position, name in enumerate(axes) if name != SKIPPED]
-    for name, _ in found:
+    places = [(name, position) for position, name in enumerate(axes) if name != SKIPPED]
+    for name, _ in places:
         if name not in {TIME, *AXES}:
             raise ColumnsUnknown(f'--axes names "{name}", which is none of t, {", ".join(AXES)} or -')
-        if [other for other, _ in found].count(name) > 1:
+        if [other for other, _ in places].count(name) > 1:
             raise ColumnsUnknown(f"--axes names {name} twice")
-    return found
+    return places
 
 
 def _unit(heading: str) -> str | None:
@@ -112,17 +112,17 @@ def _unit(heading: str) -> str | None:
     return re.sub(r"[\s·.*_]", "", unit)[:20] if unit else None
 
 
-def _agreed(what: str, headed: set[str | None], stated: str | None, known: Mapping[str, float]) -> str:
+def _agreed(what: str, headed: set[str | None], stated: str | None, factors: Mapping[str, float]) -> str:
     """Return the one unit in which the forces, or the torques, are."""
     names = headed - {None}
-    units = ", ".join(known)
+    units = ", ".join(factors)
     if len(names) > 1 or (names and None in headed and stated is None):
         raise ColumnsUnknown(f"the header does not name one unit for all {what}: make the file's columns agree")
     (headed_unit,) = names or (None,)
     unit = headed_unit or stated
     if unit is None:
         raise ColumnsUnknown(f"nothing says in which unit the {what} are: give --units, such as --units N,Nmm")
-    if unit not in known:
+    if unit not in factors:
         raise ColumnsUnknown(f'the {what} are in "{unit}", which is none of {units}')
     if stated is not None and stated != unit:
         raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {stated}: give one of the two up")

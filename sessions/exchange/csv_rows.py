@@ -37,7 +37,7 @@ def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
         raise ImportRefused(f"{path}, line {reader.line_num}: this is no CSV ({error}); save the file anew") from error
 
 
-def shown(cell: str) -> str:
+def cell_text(cell: str) -> str:
     """Return what a cell holds, on one line and not too long."""
     return " ".join(cell.split())[:40]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.exchange.csv_rows import ImportRefused, number_in, records, shown
+from sessions.exchange.csv_rows import ImportRefused, cell_text, number_in, records
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def displacement_log(path: Path) -> DisplacementLog:
     if clock is None or DISPLACEMENT not in names:
         raise ImportRefused(
             f"{path} needs a header with {DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
-            f"calls them; it has {', '.join(map(shown, names)) or 'none'}"
+            f"calls them; it has {', '.join(map(cell_text, names)) or 'none'}"
         )
     places = [names.index(name) for name in (clock, DISPLACEMENT)]
     of_width = names.index(WIDTH) if WIDTH in names else None

@@ -15,7 +15,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.atomic_file import write_whole
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
-from sessions.exchange.csv_rows import COMMENT, ImportRefused, number_in, records, shown
+from sessions.exchange.csv_rows import COMMENT, ImportRefused, cell_text, number_in, records
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.recording.provenance import Setting, provenance
@@ -77,9 +77,9 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         content = read_limited(path, LARGEST_TABLE)
     except OSError as error:
         raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
-    told, rows, lines = _table(path, content, stated)
-    time, rate, rate_origin = _times(path, told, rows, lines, stated)
-    raw = rows[:, list(told.axes)]
+    layout, rows, lines = _table(path, content, stated)
+    time, rate, rate_origin = _times(path, layout, rows, lines, stated)
+    raw = rows[:, list(layout.axes)]
     block = _block(time, raw)
     digest = hashlib.sha256(content).hexdigest()
     clock = StillClock(int(block.received_ns[-1]))
@@ -88,9 +88,9 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
         "bytes": len(content),
         "sha256": digest,
         "kept_as": ORIGINAL_FILE,
-        "columns": list(told.names),
-        "extra_columns": list(told.extra),
-        "first_time_s": float(rows[0, told.time]) * TIME_UNITS[told.time_unit] if told.time is not None else None,
+        "columns": list(layout.names),
+        "extra_columns": list(layout.extra),
+        "first_time_s": float(rows[0, layout.time]) * TIME_UNITS[layout.time_unit] if layout.time is not None else None,
     }
     frame = Frame(
         stated.normal or Frame().normal,
@@ -101,8 +101,8 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer = SessionWriter.create(
         folder,
         SessionPlan("import", stated.subject, 0, "none", (), forces=True, frame=frame),
-        _info(path, told, rate, rate_origin, stated, simulated=_says_simulated(content, told.names)),
-        {**provenance(clock, _settings(told, frame, rate, rate_origin, stated)), "imported": source},
+        _info(path, layout, rate, rate_origin, stated, simulated=_says_simulated(content, layout.names)),
+        {**provenance(clock, _settings(layout, frame, rate, rate_origin, stated)), "imported": source},
         clock=clock,
     )
     write_whole(folder / ORIGINAL_FILE, content)
@@ -111,7 +111,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     writer.readings(block)
     writer.event("ended", data={"reason": "the file ends", "cause": "finished", "readings": len(block)})
     writer.close()
-    return Imported(folder, len(block), rate, _defaults(frame), told.extra)
+    return Imported(folder, len(block), rate, _defaults(frame), layout.extra)
 
 
 def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, Array, list[int]]:
@@ -123,11 +123,11 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
     line, cells = first
     header = None if all(number_in(cell) is not None for cell in cells) else [cell.strip() for cell in cells]
     try:
-        told = columns(header, stated.axes, stated.units, len(cells))
+        layout = columns(header, stated.axes, stated.units, len(cells))
     except ColumnsUnknown as unknown:
         raise SettingsError(f"{path}, line {line}: {unknown}") from unknown
     body = rest if header is not None else _with(first, rest)
-    used = {position: told.names[position] for position in (*told.axes, told.time) if position is not None}
+    used = {position: layout.names[position] for position in (*layout.axes, layout.time) if position is not None}
     rows: list[list[float]] = []
     lines: list[int] = []
     for number, record in body:
@@ -135,7 +135,7 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
         lines.append(number)
     if len(rows) < _FEWEST:
         raise ImportRefused(f"{path} holds {len(rows)} readings: give a file with at least {_FEWEST}")
-    return told, np.array(rows), lines
+    return layout, np.array(rows), lines
 
 
 def _with(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
@@ -153,22 +153,21 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
     for position, name in used.items():
         value = number_in(cells[position])
         if value is None or not math.isfinite(value):
-            raise ImportRefused(
-                f'{path}, line {line}: {name} is "{shown(cells[position])}", which is no number; mend or remove the row'
-            )
+            cell = cell_text(cells[position])
+            raise ImportRefused(f'{path}, line {line}: {name} is "{cell}", which is no number; mend or remove the row')
         row[position] = value
     return row
 
 
 def _times(
-    path: Path, told: Columns, rows: Array, lines: list[int], stated: ImportOptions
+    path: Path, layout: Columns, rows: Array, lines: list[int], stated: ImportOptions
 ) -> tuple[Array, float, Origin]:
     """Return times (n,) [s] from 0 on, the rate [Hz], and where that is from."""
-    if told.time is None:
+    if layout.time is None:
         if stated.rate is None:
             raise SettingsError(f"{path} has no column of times: give --rate, the readings a second")
         return np.arange(len(rows)) / stated.rate, stated.rate, "set"
-    time = rows[:, told.time] * TIME_UNITS[told.time_unit]
+    time = rows[:, layout.time] * TIME_UNITS[layout.time_unit]
     steps = np.diff(time)
     if (steps <= 0.0).any():
         wrong = int(np.argmax(steps <= 0.0)) + 1
@@ -195,7 +194,7 @@ def _times(
 def _says_simulated(content: bytes, names: Sequence[str]) -> bool:
     """Say whether a comment at the file's head, or a column, says that it came from a simulator."""
     head = [line for line in content[:4096].decode(errors="replace").splitlines() if line.startswith(COMMENT)]
-    return any(_SIMULATED in told for told in (*head, *names))
+    return any(_SIMULATED in layout for layout in (*head, *names))
 
 
 def _block(time: Array, raw: Array) -> ReadingBlock:
@@ -205,14 +204,14 @@ def _block(time: Array, raw: Array) -> ReadingBlock:
 
 
 def _info(
-    path: Path, told: Columns, rate: float, rate_origin: Origin, stated: ImportOptions, *, simulated: bool
+    path: Path, layout: Columns, rate: float, rate_origin: Origin, stated: ImportOptions, *, simulated: bool
 ) -> TransducerInfo:
     calibration = Calibration(
         serial="unknown",
         raw_unit="N, N mm",
-        matrix=np.diag(told.scales),
+        matrix=np.diag(layout.scales),
         rated=np.full(6, np.nan),
-        source=f"none: the file holds a wrench, forces in {told.units[0]} and torques in {told.units[1]}",
+        source=f"none: the file holds a wrench, forces in {layout.units[0]} and torques in {layout.units[1]}",
     )
     settings = {"rate": "from the file's times" if rate_origin == "measured" else "stated, the file has no times"}
     if stated.zeroed:
@@ -230,11 +229,11 @@ def _info(
     )
 
 
-def _settings(told: Columns, frame: Frame, rate: float, rate_origin: Origin, stated: ImportOptions) -> list[Setting]:
-    units: Origin = "measured" if told.units_from == "header" else "set"
+def _settings(layout: Columns, frame: Frame, rate: float, rate_origin: Origin, stated: ImportOptions) -> list[Setting]:
+    units: Origin = "measured" if layout.units_from == "header" else "set"
     return [
-        Setting("force unit", told.units[0], "", units),
-        Setting("torque unit", told.units[1], "", units),
+        Setting("force unit", layout.units[0], "", units),
+        Setting("torque unit", layout.units[1], "", units),
         Setting("normal", frame.normal, "", frame.normal_origin),
         Setting("height", frame.height, "mm", frame.height_origin),
         Setting("rate", rate, "Hz", rate_origin),
@@ -247,9 +246,9 @@ def _origin(stated: object) -> Origin:
 
 
 def _defaults(frame: Frame) -> tuple[str, ...]:
-    told: list[str] = []
+    sentences: list[str] = []
     if frame.normal_origin == "default":
-        told.append(f"the normal force is taken along {frame.normal} (default; --normal states another)")
+        sentences.append(f"the normal force is taken along {frame.normal} (default; --normal states another)")
     if frame.height_origin == "default":
-        told.append(f"the face's height is taken as {frame.height:g} mm (default; --height states another)")
-    return tuple(told)
+        sentences.append(f"the face's height is taken as {frame.height:g} mm (default; --height states another)")
+    return tuple(sentences)

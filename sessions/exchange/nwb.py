@@ -50,11 +50,11 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     recording = source.recording
     plan = recording.plan
     mark = f"{recording.simulated_sentence}. " if recording.simulated_sentence else ""
-    told = description(recording)
+    document = description(recording)
     first_ns = recording.events[0].time_ns if recording.events else 0
     file = pynwb.NWBFile(
         session_description=f"{mark}A subject strokes surfaces over a six-axis force transducer and judges them.",
-        identifier=hashlib.sha256(json_text(told["sha256"]).encode()).hexdigest(),
+        identifier=hashlib.sha256(json_text(document["sha256"]).encode()).hexdigest(),
         session_start_time=_utc(recording, first_ns),
         experiment_description=f"{mark}Protocol {plan.protocol}, stimulus order {plan.order_rule}, seed {plan.seed}.",
         session_id=plan.subject,
@@ -62,7 +62,11 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
         source_script=f"daq-app {source.analysis['made_by'].get('daq-app', '')}",
         source_script_file_name="daq-app export",
         notes=json_text(  # all that the file lacks
-            {**told, "log": [asdict(event) for event in recording.events], "calibration_error": _calibration(source)}
+            {
+                **document,
+                "log": [asdict(event) for event in recording.events],
+                "calibration_error": _calibration(source),
+            }
         ),
         subject=Subject(
             subject_id=plan.subject,
@@ -78,10 +82,10 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     events = _events(recording, first_ns)
     if events.rows:
         file.add_acquisition(_dynamic(events, mark))
-    made = [_dynamic(table, mark) for table in tables(source) if table.rows]
-    if made:
+    numbers = [_dynamic(table, mark) for table in tables(source) if table.rows]
+    if numbers:
         module = file.create_processing_module("behavior", f"{mark}What was answered, and what was made of it.")
-        for table in made:
+        for table in numbers:
             module.add(table)
     progress(0.5)
     with pynwb.NWBHDF5IO(folder / FILE, "w") as io:
@@ -91,8 +95,8 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
 
 def _calibration(source: ExportSource) -> dict[str, Any]:
     """Return how uncertain each axis' gain is, which the intervals hold, and whether somebody set that."""
-    drawn: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
-    return {name: drawn.get(name) for name in ("gain_error", "gain_error_origin")}
+    settings: Mapping[str, Any] = (source.analysis.get("bootstrap") or {}).get("settings") or {}
+    return {name: settings.get(name) for name in ("gain_error", "gain_error_origin")}
 
 
 def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: str) -> None:
@@ -135,8 +139,8 @@ def _add_readings(file: "NWBFile", recording: Recording, first_ns: int, mark: st
 
 def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
     """Add the span of each trial's take that counts; all trials stand in the table of that name."""
-    taken = [record for record in recording.trials if record.take is not None and record.take.stop_ns is not None]
-    if not taken:
+    records = [record for record in recording.trials if record.take is not None and record.take.stop_ns is not None]
+    if not records:
         return
     for name, what in (
         ("number", "of the trial"),
@@ -146,7 +150,7 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
         ("score", "the subject's answer, 0 to 100; NaN: none"),
     ):
         file.add_trial_column(name, what)
-    for record in taken:
+    for record in records:
         start, stop = record.start_ns or 0, record.stop_ns or 0
         file.add_trial(
             start_time=(start - first_ns) * 1e-9,
@@ -170,12 +174,12 @@ def _events(recording: Recording, first_ns: int) -> Table:
             Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
             Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events)),
             Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-            Column("data", "", "what else is known, for people; exact in the notes", tuple(map(_told, events))),
+            Column("data", "", "what else is known, for people; exact in the notes", tuple(map(_event_text, events))),
         ),
     )
 
 
-def _told(event: LoggedEvent) -> str:
+def _event_text(event: LoggedEvent) -> str:
     return "; ".join(f"{name}: {value}" for name, value in _flat(event.data))
 
 
@@ -206,8 +210,8 @@ def _dynamic(table: Table, mark: str) -> object:
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:
     """Return the date of an instant of the session clock; told time that moves when waited on passes as the date's."""
-    known = datetime.fromisoformat(str(recording.provenance["created_utc"]))
+    created = datetime.fromisoformat(str(recording.provenance["created_utc"]))
     clock = recording.provenance.get("clock")
     if clock is None:  # how the session clock goes with the date was not recorded: only when it began
-        return known
-    return known + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))
+        return created
+    return created + timedelta(seconds=(instant_ns - int(clock["now_ns"])) * 1e-9 / (float(clock["factor"]) or 1.0))

@@ -51,13 +51,13 @@ def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Ite
     Raises ValueError.
     """
     places = [_place(name, names) for name in STORED]
-    kept = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
-    while part := list(islice(kept, PART)):
+    arrived = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
+    while part := list(islice(arrived, PART)):
         # usecols picks the columns in the order given, whatever their order in the file.
         table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))
         raw = np.column_stack([table[name] for name in RAW])
-        whole = {name: np.ascontiguousarray(table[name]) for name in STORED[:5]}
-        yield ReadingBlock(whole["sequence"], whole["counter"], whole["status"], whole["time"], whole["received"], raw)
+        sequence, counter, status, time, received = (np.ascontiguousarray(table[name]) for name in STORED[:5])
+        yield ReadingBlock(sequence, counter, status, time, received, raw)
 
 
 def _place(name: str, names: Sequence[str]) -> int:

@@ -28,9 +28,9 @@ def next_comparison(candidates: Sequence[Stimulus], answers: Sequence[tuple[Stim
     """Return which of the candidates is compared next, from answers: what was compared, and whether it was chosen."""
     chance = _chances(tuple(one.known_index for one in candidates))
     belief = np.zeros(chance.shape[0])
-    for compared, chosen in answers:
+    for compared, choice in answers:
         p = chance[:, candidates.index(compared)]
-        belief += np.log(p if chosen else 1.0 - p)
+        belief += np.log(p if choice else 1.0 - p)
     weight = np.exp(belief - belief.max())
     return candidates[int(np.argmin(np.round(_expected_entropy(weight / weight.sum(), chance) / _SAME)))]
 
@@ -55,11 +55,11 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
 def with_mounted(plan: SessionPlan, codes: Mapping[int, str]) -> SessionPlan:
     """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
     for block in plan.blocks:
-        held = {one.code: one for one in block.candidates}
+        by_code = {one.code: one for one in block.candidates}
         trials = tuple(
-            replace(trial, stimulus=held.get(codes.get(trial.number, ""), trial.stimulus)) for trial in block.trials
+            replace(trial, stimulus=by_code.get(codes.get(trial.number, ""), trial.stimulus)) for trial in block.trials
         )
-        plan = _with_block(plan, replace(block, trials=trials)) if held else plan
+        plan = _with_block(plan, replace(block, trials=trials)) if by_code else plan
     return plan
 
 
@@ -88,9 +88,9 @@ def _normal(z: float) -> float:
 
 def _expected_entropy(weight: Array, chance: Array) -> Array:
     """Return the entropy of what is possible that is left after an answer to each comparison, on average [nat]."""
-    left = np.zeros(chance.shape[1])
+    entropy_left = np.zeros(chance.shape[1])
     for p in (chance, 1.0 - chance):
         joint = weight[:, None] * p
         likely = joint.sum(axis=0)
-        left -= (joint * np.log(np.maximum(joint / likely, 1e-300))).sum(axis=0)
-    return left
+        entropy_left -= (joint * np.log(np.maximum(joint / likely, 1e-300))).sum(axis=0)
+    return entropy_left

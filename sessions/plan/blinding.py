@@ -52,10 +52,10 @@ class Key:
 
     def of(self, trial: Trial) -> Trial:
         """Return a trial with the index of its stimulus. Raises ValueError where the key lacks its code."""
-        found = self.stimuli.get(trial.stimulus.code)
-        if found is None:
+        stimulus = self.stimuli.get(trial.stimulus.code)
+        if stimulus is None:
             raise ValueError(f"the key has no stimulus {trial.stimulus.code}")
-        return replace(trial, stimulus=replace(trial.stimulus, index=found[1]))
+        return replace(trial, stimulus=replace(trial.stimulus, index=stimulus[1]))
 
     def plan(self, plan: SessionPlan) -> SessionPlan:
         """Return a blinded plan with the index of every stimulus."""

@@ -22,7 +22,7 @@ def shuffled(items: Sequence[Item], seed: int, name: str) -> tuple[Item, ...]:
     return tuple(sorted(items, key=lambda item: _digest(f"{seed}/{name}/{item}")))
 
 
-def drawn(
+def draw(
     items: Sequence[Item], seed: int, name: str, meets: Callable[[Sequence[Item]], bool]
 ) -> tuple[Item, ...] | None:
     """Return the first order that `meets` a constraint; None where none of many draws does.
@@ -61,12 +61,12 @@ def pairs(items: Sequence[Item], seed: int, name: str) -> tuple[tuple[Item, Item
     """
     circle = shuffled(items, seed, f"{name}/first")
     count = len(circle)
-    found = {
+    orders = {
         f"{a},{b}": (a, b)
         for i, j in combinations(range(count), 2)
         for a, b in [(circle[i], circle[j]) if 2 * (j - i) <= count else (circle[j], circle[i])]
     }
-    return tuple(found[str(key)] for key in shuffled(tuple(found), seed, name))
+    return tuple(orders[str(key)] for key in shuffled(tuple(orders), seed, name))
 
 
 def pairs_with(

@@ -52,15 +52,15 @@ class Study:
     @property
     def members(self) -> dict[str, Member]:
         """Return everybody who was ever enrolled, by code, in the order of enrolment."""
-        found: dict[str, Member] = {}
+        members: dict[str, Member] = {}
         for event in self.events:
             if event.kind == "enrolled":
-                held = {"subject": event.subject, "slot": event.data["slot"], "body": event.data["body"]}
-                found[event.subject] = msgspec.convert(held, Member)
+                entry = {"subject": event.subject, "slot": event.data["slot"], "body": event.data["body"]}
+                members[event.subject] = msgspec.convert(entry, Member)
             elif event.kind == "withdrawn":
-                before = found[event.subject]
-                found[event.subject] = Member(before.subject, before.slot, before.body, str(event.data["reason"]))
-        return found
+                before = members[event.subject]
+                members[event.subject] = Member(before.subject, before.slot, before.body, str(event.data["reason"]))
+        return members
 
     @property
     def unblinded(self) -> bool:
@@ -89,8 +89,8 @@ class Study:
         """
         if self.rows is None:
             return slot + 1
-        done, within = divmod(slot, self.rows)
-        return int(shuffled(range(self.rows), self.seed, f"rows/{done}")[within]) + 1
+        cycles, within = divmod(slot, self.rows)
+        return int(shuffled(range(self.rows), self.seed, f"rows/{cycles}")[within]) + 1
 
     def session_seed(self, slot: int) -> int:
         """Return the seed of what else chance decides for a slot: the same for all visits of a subject."""
@@ -106,8 +106,8 @@ class Study:
 
 def free_slot(members: Sequence[Member]) -> int:
     """Return the first slot that nobody holds: one that was given back comes first."""
-    taken = {member.slot for member in members if member.withdrawn is None}
-    return next(slot for slot in count() if slot not in taken)
+    slots = {member.slot for member in members if member.withdrawn is None}
+    return next(slot for slot in count() if slot not in slots)
 
 
 def labels_of(key: Key) -> Labels:

@@ -83,7 +83,7 @@ def enrol(folder: Path, subject: str, body: Body) -> Member:
     """Reserve a place for a subject, and return it. Raises StudyError, SettingsError for a value out of range."""
     check_code("the subject", subject)
 
-    def chosen(study: Study) -> tuple[str, Mapping[str, Any]]:
+    def choose(study: Study) -> tuple[str, Mapping[str, Any]]:
         try:
             check_body(body, study.protocol)
         except NotAllowed as error:
@@ -92,7 +92,7 @@ def enrol(folder: Path, subject: str, body: Body) -> Member:
             raise StudyError(f"{subject} was enrolled in {study.name} before: every subject has a code of its own")
         return "enrolled", {"slot": free_slot(list(study.members.values())), "body": msgspec.to_builtins(body)}
 
-    return _changed(folder, subject, chosen).members[subject]
+    return _changed(folder, subject, choose).members[subject]
 
 
 def withdraw(folder: Path, subject: str, reason: str) -> Member:
@@ -100,10 +100,10 @@ def withdraw(folder: Path, subject: str, reason: str) -> Member:
     if not reason.strip():
         raise StudyError("say why the subject is withdrawn")
 
-    def chosen(study: Study) -> tuple[str, Mapping[str, Any]]:
+    def choose(study: Study) -> tuple[str, Mapping[str, Any]]:
         return "withdrawn", {"slot": study.member(subject).slot, "reason": reason}
 
-    return _changed(folder, subject, chosen).members[subject]
+    return _changed(folder, subject, choose).members[subject]
 
 
 def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
@@ -135,11 +135,11 @@ def _new_key(protocol: Protocol) -> Key:
     return Key(secrets.token_hex(16), dict(zip(codes, stimuli, strict=True)))
 
 
-def _changed(folder: Path, subject: str, chosen: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
+def _changed(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
     """Add the event that `chosen` makes of the study as it stands, while nobody else can change it."""
     open_study(folder)  # says what is wrong where it is none
     with _changing(folder) as connection:
-        _tell(connection, *_ordered(subject, *chosen(_study(connection, folder))))
+        _tell(connection, *_ordered(subject, *choose(_study(connection, folder))))
         return _study(connection, folder)
 
 

@@ -84,34 +84,34 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
     if not path.is_file():
         return  # the manifest tells
     try:
-        told = json_value(read_limited(path))
+        stored = json_value(read_limited(path))
     except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
     expected: dict[str, Any] = json.loads(json.dumps(description(recording)))
     yield from (
-        f"{where} of {DESCRIPTION_FILE} is not what the live file tells" for where in _unlike(told, expected, "")
+        f"{where} of {DESCRIPTION_FILE} is not what the live file tells" for where in _unlike(stored, expected, "")
     )
 
 
-def _unlike(told: object, expected: object, where: str) -> Iterator[str]:
-    """Yield the places where `told` is not what is expected; names that an older version did not tell are left out."""
-    if isinstance(told, dict) and isinstance(expected, dict):
-        held, fresh = cast("dict[str, Any]", told), cast("dict[str, Any]", expected)
-        for name, value in held.items():
+def _unlike(stored: object, expected: object, where: str) -> Iterator[str]:
+    """Yield the places where `stored` is not as expected; names that an older version did not tell are left out."""
+    if isinstance(stored, dict) and isinstance(expected, dict):
+        stored_table, fresh = cast("dict[str, Any]", stored), cast("dict[str, Any]", expected)
+        for name, value in stored_table.items():
             place = f"{where}.{name}" if where else name
             if name in fresh:
                 yield from _unlike(value, fresh[name], place)
             else:
                 yield place
-    elif isinstance(told, list) and isinstance(expected, list):
-        entries, others = cast("list[Any]", told), cast("list[Any]", expected)
-        if len(entries) != len(others):
+    elif isinstance(stored, list) and isinstance(expected, list):
+        entries, expected_entries = cast("list[Any]", stored), cast("list[Any]", expected)
+        if len(entries) != len(expected_entries):
             yield where
         else:
-            for i, (value, other) in enumerate(zip(entries, others, strict=True)):
+            for i, (value, other) in enumerate(zip(entries, expected_entries, strict=True)):
                 yield from _unlike(value, other, f"{where}[{i}]")
-    elif told != expected:
+    elif stored != expected:
         yield where or "all"
 
 

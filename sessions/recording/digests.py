@@ -39,15 +39,15 @@ def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> 
     log = sha256()
     for event in events:
         log.update(json_text([event.time_ns, event.kind, event.trial, dict(event.data)]).encode() + b"\n")
-    return Digest(count, {name: found.hexdigest() for name, found in sums.items()}, log.hexdigest())
+    return Digest(count, {name: digest.hexdigest() for name, digest in sums.items()}, log.hexdigest())
 
 
-def different(told: Digest, found: Digest) -> Iterable[str]:
+def different(stored: Digest, computed: Digest) -> Iterable[str]:
     """Yield a sentence for each part in which two digests differ."""
-    if told.readings != found.readings:
-        yield f"there were {told.readings} readings and there are {found.readings}"
-    for name, digest in told.columns.items():
-        if digest != found.columns.get(name):
+    if stored.readings != computed.readings:
+        yield f"there were {stored.readings} readings and there are {computed.readings}"
+    for name, digest in stored.columns.items():
+        if digest != computed.columns.get(name):
             yield f"{name} of the readings is not what it was"
-    if told.events != found.events:
+    if stored.events != computed.events:
         yield "the event log is not what it was"

@@ -41,17 +41,17 @@ class Need:
 def need(plan: SessionPlan, rate: float | None) -> Need:
     """Return what a session is expected to take, `rate` [Hz] being nan where unknown, None without a transducer."""
     duration = len(plan.trials) * TRIAL_TIME + len(plan.blocks) * BLOCK_TIME
-    told = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
-    return Need(duration, told, round(COPIES * duration * told * BYTES_A_READING) + MARGIN)
+    rows_a_second = 0.0 if rate is None else rate if isfinite(rate) else RATE_UNKNOWN
+    return Need(duration, rows_a_second, round(COPIES * duration * rows_a_second * BYTES_A_READING) + MARGIN)
 
 
-def check_room(folder: Path, wanted: Need) -> None:
+def check_room(folder: Path, need: Need) -> None:
     """Raise RecordingError where the disk `folder` is to lie on has less room than wanted."""
     there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     free = shutil.disk_usage(there).free
-    if free < wanted.size:
+    if free < need.size:
         raise RecordingError(
-            f"{folder} has {free / 1e6:.0f} MB of room, and the session may need {wanted.sentence}; "
+            f"{folder} has {free / 1e6:.0f} MB of room, and the session may need {need.sentence}; "
             "free space on the disk, or record on another"
         )
 

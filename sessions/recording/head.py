@@ -110,7 +110,7 @@ def plan_from_dict(data: Mapping[str, Any]) -> SessionPlan:
 
 def identity(info: TransducerInfo) -> dict[str, Any]:
     """Return what tells a transducer from others, and its rate [Hz]; null where that is unknown."""
-    return {name: getattr(info, name) for name in _IDENTITY} | {"rate": _known(info.rate)}
+    return {name: getattr(info, name) for name in _IDENTITY} | {"rate": _none_for_nan(info.rate)}
 
 
 def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
@@ -118,7 +118,7 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
     calibration = info.calibration
     return {
         **identity(info),
-        "counter_rate": _known(info.counter_rate),
+        "counter_rate": _none_for_nan(info.counter_rate),
         "settings": dict(info.settings),
         "harmless": info.status.harmless,
         "summary": info.status.summary,
@@ -127,7 +127,7 @@ def info_to_dict(info: TransducerInfo) -> dict[str, Any]:
             "serial": calibration.serial,
             "raw_unit": calibration.raw_unit,
             "matrix": calibration.matrix.tolist(),
-            "rated": [_known(value) for value in calibration.rated.tolist()],
+            "rated": [_none_for_nan(value) for value in calibration.rated.tolist()],
             "source": calibration.source,
             "tool": list(calibration.tool),
             "sha256": calibration_hash(calibration),
@@ -177,7 +177,7 @@ def calibration_hash(calibration: Calibration) -> str:
     return hashlib.sha256(np.ascontiguousarray(calibration.matrix, "<f8").tobytes()).hexdigest()
 
 
-def _known(value: float) -> float | None:
+def _none_for_nan(value: float) -> float | None:
     """Return None for nan."""
     return None if math.isnan(value) else value
 

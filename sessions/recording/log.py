@@ -98,13 +98,13 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
             case _:
                 pass
     counts = takes[kept] if kept is not None else None
-    others = tuple(take for take in takes.values() if take is not counts)
+    other_takes = tuple(take for take in takes.values() if take is not counts)
     answer = answers.get(in_hand)
     return TrialRecord(
         trial,
         outcome,
         counts,
-        others,
+        other_takes,
         score=answer if outcome == "scored" else None,
         number=answer if outcome == "numbered" else None,
         choice=answer if outcome == "chosen" else None,

@@ -40,22 +40,22 @@ def changed_files(folder: Path, simulated: str | None, form: Mapping[str, Any]) 
 
     `simulated` and `form` are what the live file says at its head.
     """
-    found: list[str] = []
+    problems: list[str] = []
     try:
         files = _files(folder)
     except RecordingError as damaged:
         return (str(damaged),)
-    for name, told in files.items():
+    for name, digest in files.items():
         path = folder / name
         if not path.is_file():
-            found.append(f"{name} is listed in {MANIFEST_FILE} and missing")
-        elif file_sha256(path) != told["sha256"] or path.stat().st_size != told["bytes"]:
-            found.append(
+            problems.append(f"{name} is listed in {MANIFEST_FILE} and missing")
+        elif file_sha256(path) != digest["sha256"] or path.stat().st_size != digest["bytes"]:
+            problems.append(
                 f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
             )
     if _head_of(folder) != {**_simulated(simulated), "format": form}:
-        found.append(f"the head of {MANIFEST_FILE} is not what the live file tells")
-    return tuple(found)
+        problems.append(f"the head of {MANIFEST_FILE} is not what the live file tells")
+    return tuple(problems)
 
 
 def _simulated(sentence: str | None) -> dict[str, Any]:

@@ -55,9 +55,9 @@ def without_home(address: str) -> str:
     'nidaq://Dev1?cal=~/FT12345.cal'
     """
     home = str(Path.home())
-    for written in (home, quote(home, safe=""), quote(home)):
-        if len(written) > 1:
-            address = address.replace(written, "~")
+    for spelling in (home, quote(home, safe=""), quote(home)):
+        if len(spelling) > 1:
+            address = address.replace(spelling, "~")
     return address
 
 
@@ -82,15 +82,15 @@ def software_versions() -> dict[str, str]:
 
     `blas` and `simd` too: the last bits of a number depend on who adds, and on what the processor adds at once.
     """
-    known = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
+    versions = {"daq-app": _version("daq-app") or "not installed", "python": platform.python_version()}
     libraries = {name: _version(name) for name in (*LIBRARIES, *OPTIONAL)}
     arithmetic: Any = np.show_config(mode="dicts")
     blas = arithmetic.get("Build Dependencies", {}).get("blas", {})
     simd = arithmetic.get("SIMD Extensions", {})
     return {
-        **known,
+        **versions,
         "sqlite": sqlite3.sqlite_version,
-        **{name: told for name, told in libraries.items() if told is not None},
+        **{name: version for name, version in libraries.items() if version is not None},
         "blas": f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip(),
         "simd": " ".join(map(str, [*simd.get("baseline", []), *simd.get("found", [])])) or "unknown",
     }

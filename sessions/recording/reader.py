@@ -133,9 +133,9 @@ class Recording:
         for record in self.trials:
             allowed = self.plan.strokes_allowed(record.trial)
             if record.take and record.take.strokes > allowed:
-                asked = "one was" if allowed == 1 else f"{allowed} were"
+                allowed_words = "one was" if allowed == 1 else f"{allowed} were"
                 trouble.append(
-                    f"trial {record.trial.number} holds {record.take.strokes} strokes where {asked} asked for"
+                    f"trial {record.trial.number} holds {record.take.strokes} strokes where {allowed_words} asked for"
                 )
         return tuple(trouble)
 
@@ -149,16 +149,16 @@ class Recording:
     def readings(self, trial: int | None = None) -> ReadingBlock:
         """Return all readings, or those of the take of `trial` that counts (none where no take does)."""
         if trial is None:
-            return self._whole()
+            return self._all_readings()
         record = self.trial(trial)
         if record.start_ns is None:
             return ReadingBlock.empty()
         return self.readings_between(record.start_ns, record.stop_ns)
 
-    def _whole(self) -> ReadingBlock:
+    def _all_readings(self) -> ReadingBlock:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
         path = self.folder / LIVE_FILE
-        bytes_held = sum(side.stat().st_size for side in (path, _beside(path, "-wal")) if side.is_file())
+        bytes_held = sum(side.stat().st_size for side in (path, _side_file(path, "-wal")) if side.is_file())
         most = min(bytes_held // BYTES_A_READING, self._stored())
         room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in COLUMNS.items()}
         count = 0
@@ -276,10 +276,10 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
             sound = False
         if not sound:
             raise RecordingError(f"{path}: {name} in its head is damaged (CRC-32 differs); restore it from a copy")
-    made: Any = head.get("format")
-    if not _readable(made):
+    form: Any = head.get("format")
+    if not _readable(form):
         raise RecordingError(
-            f"{path} holds {made or 'no format'}; this program reads '{FORMAT}' up to version {FORMAT_VERSION}:"
+            f"{path} holds {form or 'no format'}; this program reads '{FORMAT}' up to version {FORMAT_VERSION}:"
             " use a later program"
         )
     return head
@@ -302,7 +302,7 @@ def _readable(made: Any) -> bool:  # noqa: ANN401  any JSON value
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
     """Return the undamaged events, and name the others in `losses`."""
-    found: list[LoggedEvent] = []
+    events: list[LoggedEvent] = []
     expected = 1
     rows = connection.execute("SELECT number, time_ns, kind, trial, readings, data, crc32 FROM events ORDER BY number")
     for number, *row in rows:
@@ -310,10 +310,10 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
             losses.append(f"events {expected} to {number - 1} are missing")
         expected = number + 1
         try:
-            found.append(_event(number, row))
+            events.append(_event(number, row))
         except ValueError as error:
             losses.append(f"event {number} is damaged and left out ({error})")
-    return tuple(found)
+    return tuple(events)
 
 
 def _event(number: int, row: Sequence[object]) -> LoggedEvent:
@@ -326,7 +326,7 @@ def _event(number: int, row: Sequence[object]) -> LoggedEvent:
 
 def torn_log(path: Path) -> Iterator[str]:
     """Name what a crash tore off the end of the live file's write-ahead log."""
-    log = _beside(path, "-wal")
+    log = _side_file(path, "-wal")
     if log.is_file():
         with log.open("rb", buffering=0) as file:
             torn = log_tail(file).torn_bytes
@@ -340,7 +340,7 @@ def torn_log(path: Path) -> Iterator[str]:
 @contextmanager
 def _connected(path: Path) -> Generator[sqlite3.Connection]:
     """Open the file for reading, in place where SQLite can do so without writing to it, else as a copy."""
-    sides = (_beside(path, "-wal"), _beside(path, "-journal"))
+    sides = (_side_file(path, "-wal"), _side_file(path, "-journal"))
     left_over = [side for side in sides if side.is_file() and side.stat().st_size]
     address = f"{path.resolve().as_uri()}?mode=ro"
     path.open("rb").close()  # says why it cannot be read, which SQLite does not
@@ -371,6 +371,6 @@ def _answers(connection: sqlite3.Connection) -> bool:
     return True
 
 
-def _beside(path: Path, ending: str) -> Path:
+def _side_file(path: Path, ending: str) -> Path:
     """Return the side file SQLite keeps next to `path`."""
     return path.with_name(path.name + ending)

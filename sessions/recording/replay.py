@@ -31,12 +31,12 @@ class RecordedReadings:
 
     def up_to(self, position: int | None) -> ReadingBlock:
         """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
-        taken: list[ReadingBlock] = []
+        blocks: list[ReadingBlock] = []
         while (position is None or self.position < position) and self._look():
             first = self._waiting[0]
             count = len(first) if position is None else min(len(first), position - self.position)
-            taken.append(self._take(count))
-        return ReadingBlock.joined(taken)
+            blocks.append(self._take(count))
+        return ReadingBlock.joined(blocks)
 
     def received_by(self, instant_ns: int) -> ReadingBlock:
         """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""

@@ -75,11 +75,11 @@ def write_copy(
                 kind = h5py.string_dtype("ascii" if plain else "utf-8", kind.itemsize)
             # An empty data set has no chunks, and so nothing to protect.
             protected = {"chunks": made.values.shape, "fletcher32": True} if made.values.size else {}
-            written = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
-            _describe(written, made.unit, made.note)
+            data_set = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
+            _describe(data_set, made.unit, made.note)
         column = event_data(recording)
-        written, ends = write_texts(file, column)
-        _describe(written, "", column.note)
+        data_set, ends = write_texts(file, column)
+        _describe(data_set, "", column.note)
         _describe(ends, "bytes", f"where each text of {column.name} ends; it begins where the one before ends")
 
 
@@ -129,11 +129,11 @@ def _calibration(recording: Recording) -> Iterator[DataSet]:
 
 def _events(recording: Recording) -> Iterator[DataSet]:
     events = recording.events
-    yield DataSet("events/number", _whole([e.number for e in events]), "", "from 1")
-    yield DataSet("events/time_ns", _whole([e.time_ns for e in events]), "ns", "session clock")
+    yield DataSet("events/number", _int64([e.number for e in events]), "", "from 1")
+    yield DataSet("events/time_ns", _int64([e.time_ns for e in events]), "ns", "session clock")
     yield DataSet("events/kind", texts([e.kind for e in events]), "", "what happened")
-    yield DataSet("events/trial", _whole([e.trial or 0 for e in events]), "", "number of the trial; 0 for none")
-    yield DataSet("events/readings", _whole([e.readings for e in events]), "", "readings recorded before it")
+    yield DataSet("events/trial", _int64([e.trial or 0 for e in events]), "", "number of the trial; 0 for none")
+    yield DataSet("events/readings", _int64([e.readings for e in events]), "", "readings recorded before it")
 
 
 def event_data(recording: Recording) -> TextColumn:
@@ -149,39 +149,39 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
     stimuli = [trial.stimulus for trial in trials]
     scores = np.array([math.nan if r.score is None else r.score for r in records], "<f8")
     numbers = np.array([math.nan if r.number is None else r.number for r in records], "<f8")
-    choices = _whole([{None: 0, "first": 1, "second": 2}[r.choice] for r in records])
-    yield DataSet("trials/number", _whole([t.number for t in trials]), "", "from 1, in the planned order")
+    choices = _int64([{None: 0, "first": 1, "second": 2}[r.choice] for r in records])
+    yield DataSet("trials/number", _int64([t.number for t in trials]), "", "from 1, in the planned order")
     yield DataSet("trials/block", texts([t.block for t in trials]), "", "name of the block")
     yield DataSet("trials/descriptor", texts([s.descriptor for s in stimuli]), "", "what was judged")
-    indices = _whole([-1 if s.index is None else s.index for s in stimuli])
+    indices = _int64([-1 if s.index is None else s.index for s in stimuli])
     yield DataSet("trials/index", indices, "", "the maker's number of the stimulus, 0 to 100; -1 where it was sealed")
     yield DataSet("trials/code", texts([s.code for s in stimuli]), "", "label on the stimulus")
-    yield DataSet("trials/direction", _whole([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
-    yield DataSet("trials/repetition", _whole([t.repetition for t in trials]), "", "from 1")
+    yield DataSet("trials/direction", _int64([t.direction for t in trials]), "", "+1 proximal to distal, -1 back")
+    yield DataSet("trials/repetition", _int64([t.repetition for t in trials]), "", "from 1")
     yield DataSet("trials/phase", texts([t.phase for t in trials]), "", "main; or practice, pre-evaluation")
     yield DataSet("trials/outcome", texts([r.outcome for r in records]), "", OUTCOMES)
     yield DataSet("trials/score", scores, "", "0 to 100; NaN unless the outcome is scored")
     yield DataSet("trials/free_number", numbers, "", "on the subject's own scale; NaN unless the outcome is numbered")
     yield DataSet("trials/choice", choices, "", "1 or 2 of the two compared; 0 unless the outcome is chosen")
     compared = [t.compared_with or 0 for t in trials]
-    yield DataSet("trials/compared_with", _whole(compared), "", "number of the first of two; 0 for none")
+    yield DataSet("trials/compared_with", _int64(compared), "", "number of the first of two; 0 for none")
     yield DataSet(
-        "trials/take", _whole([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
+        "trials/take", _int64([r.take.number if r.take else 0 for r in records]), "", "that counts; 0 for none"
     )
-    yield DataSet("trials/start_ns", _whole([r.start_ns or 0 for r in records]), "ns", "of that take, session clock")
-    yield DataSet("trials/stop_ns", _whole([r.stop_ns or 0 for r in records]), "ns", "of that take, session clock")
+    yield DataSet("trials/start_ns", _int64([r.start_ns or 0 for r in records]), "ns", "of that take, session clock")
+    yield DataSet("trials/stop_ns", _int64([r.stop_ns or 0 for r in records]), "ns", "of that take, session clock")
 
 
 def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
     """Make the data sets of the readings, which grow block by block."""
-    made: dict[str, h5py.Dataset] = {}
+    data_sets: dict[str, h5py.Dataset] = {}
     for name, kind in COLUMNS.items():
         width = (6,) if name == "raw" else ()
-        made[name] = file.create_dataset(
+        data_sets[name] = file.create_dataset(
             f"readings/{name}", (0, *width), kind, maxshape=(None, *width), chunks=(CHUNK, *width), fletcher32=True
         )
-        made[name].attrs["unit"], made[name].attrs["note"] = map(_attribute, READING_NOTES[name])
-    return made
+        data_sets[name].attrs["unit"], data_sets[name].attrs["note"] = map(_attribute, READING_NOTES[name])
+    return data_sets
 
 
 def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
@@ -203,19 +203,19 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
 def _different_texts(column: TextColumn, file: h5py.File) -> Iterator[str]:
     """Compare text by text."""
     pairs = zip_longest(read_texts(file, column.name), column.texts())
-    if any(found is None or text is None or found != text.encode() for found, text in pairs):
+    if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
         yield f"{column.name} of {SEALED_FILE} differs from the live file"
 
 
-def _describe(written: h5py.Dataset, unit: str, note: str) -> None:
-    written.attrs["unit"], written.attrs["note"] = _attribute(unit), _attribute(note)
+def _describe(data_set: h5py.Dataset, unit: str, note: str) -> None:
+    data_set.attrs["unit"], data_set.attrs["note"] = _attribute(unit), _attribute(note)
 
 
-def _same(found: NDArray[Any], expected: NDArray[Any]) -> bool:
-    return found.shape == expected.shape and found.astype(expected.dtype).tobytes() == expected.tobytes()
+def _same(stored: NDArray[Any], expected: NDArray[Any]) -> bool:
+    return stored.shape == expected.shape and stored.astype(expected.dtype).tobytes() == expected.tobytes()
 
 
-def _whole(values: Sequence[int]) -> NDArray[np.int64]:
+def _int64(values: Sequence[int]) -> NDArray[np.int64]:
     return np.array(values, "<i8")
 
 

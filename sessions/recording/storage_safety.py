@@ -101,11 +101,11 @@ def sync_folder_above(place: PurePath) -> str | None:
 
 def linux_mounts(table: str) -> tuple[Mount, ...]:
     """Return what /proc/self/mounts tells; blanks in names are written as octal numbers there."""
-    found: list[Mount] = []
+    mounts: list[Mount] = []
     for line in table.splitlines():
         source, at, kind = (re.sub(r"\\([0-7]{3})", lambda m: chr(int(m[1], 8)), word) for word in line.split()[:3])
-        found.append(Mount(kind, PurePath(at), source))
-    return tuple(found)
+        mounts.append(Mount(kind, PurePath(at), source))
+    return tuple(mounts)
 
 
 def mac_mounts(table: str) -> tuple[Mount, ...]:
@@ -126,10 +126,10 @@ def _mounts() -> Sequence[Mount]:
     if table.exists():
         return linux_mounts(table.read_text(errors="surrogateescape"))
     try:
-        said = subprocess.run(["/sbin/mount"], capture_output=True, text=True, timeout=5, check=False).stdout
+        output = subprocess.run(["/sbin/mount"], capture_output=True, text=True, timeout=5, check=False).stdout
     except (OSError, subprocess.TimeoutExpired):
         return ()
-    return mac_mounts(said)
+    return mac_mounts(output)
 
 
 def _windows_network(place: Path) -> bool:
@@ -143,7 +143,7 @@ def _windows_network(place: Path) -> bool:
 
 
 def _synchronised(place: Path, environment: Mapping[str, str]) -> str | None:
-    program = sync_folder_above(place) or _marked(place) or _named(place, environment)
+    program = sync_folder_above(place) or _marked(place) or _sync_service(place, environment)
     return None if program is None else f"{place} is kept in step with a cloud by {program}; {MOVE}"
 
 
@@ -162,7 +162,7 @@ def _marked(place: Path) -> str | None:
     return None
 
 
-def _named(place: Path, environment: Mapping[str, str]) -> str | None:
+def _sync_service(place: Path, environment: Mapping[str, str]) -> str | None:
     for variable in SYNC_VARIABLES:
         root = environment.get(variable)
         if root and place.is_relative_to(Path(root)):

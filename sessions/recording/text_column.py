@@ -30,17 +30,19 @@ class TextColumn:
 
 def write_texts(file: h5py.File, column: TextColumn) -> tuple[h5py.Dataset, h5py.Dataset]:
     """Write a column, and return its two data sets: uint8 bytes, int64 ends."""
-    written = file.create_dataset(column.name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True)
+    data_set = file.create_dataset(
+        column.name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True
+    )
     waiting, ends, end = bytearray(), list[int](), 0
     for text in column.texts():
         waiting += text.encode("ascii")
         end += len(text)
         ends.append(end)
         if len(waiting) >= CHUNK_BYTES:
-            _append(written, waiting)
-    _append(written, waiting)
+            _append(data_set, waiting)
+    _append(data_set, waiting)
     protected = {"chunks": (len(ends),), "fletcher32": True} if ends else {}
-    return written, file.create_dataset(column.name + END, data=np.array(ends, "<i8"), **protected)
+    return data_set, file.create_dataset(column.name + END, data=np.array(ends, "<i8"), **protected)
 
 
 def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
@@ -57,9 +59,9 @@ def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
         begin = end
 
 
-def _append(written: h5py.Dataset, waiting: bytearray) -> None:
-    length = len(written)
-    written.resize(length + len(waiting), axis=0)
+def _append(data_set: h5py.Dataset, waiting: bytearray) -> None:
+    length = len(data_set)
+    data_set.resize(length + len(waiting), axis=0)
     if waiting:
-        written[length:] = np.frombuffer(bytes(waiting), np.uint8)
+        data_set[length:] = np.frombuffer(bytes(waiting), np.uint8)
         waiting.clear()

@@ -18,12 +18,12 @@ def revealed(recording: Recording) -> Recording:
     """
     if not recording.plan.blinded:
         return recording
-    told = load_derived(recording.folder, UNBLINDING)
-    if told is None:
+    stored = load_derived(recording.folder, UNBLINDING)
+    if stored is None:
         return recording
     path = recording.folder / UNBLINDING
     try:
-        key = Key.from_dict(told["key"])
+        key = Key.from_dict(stored["key"])
         if key.sha256 != recording.plan.key_sha256:
             raise ValueError("its SHA-256 is not that in the plan")
         plan = key.plan(recording.plan)

@@ -52,8 +52,8 @@ def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
     >>> why("a.json", {"made_by": {"numpy": "1", "scipy": "2"}}, {"numpy": "1", "scipy": "3"})
     'a.json was made by other versions: scipy 2 then and 3 now'
     """
-    made: Any = stored.get(MADE_BY)
-    then: Mapping[str, Any] = cast("Mapping[str, Any]", made) if isinstance(made, Mapping) else {}
+    software: Any = stored.get(MADE_BY)
+    then: Mapping[str, Any] = cast("Mapping[str, Any]", software) if isinstance(software, Mapping) else {}
     if not then:
         return f"{name} does not say what made it"
     changed = [
@@ -68,7 +68,7 @@ def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
     return f"{name} was made by other versions: {', '.join(changed)}"
 
 
-def told(found: Sequence[str]) -> tuple[str, ...]:
+def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:
     """Return the first of many sentences, and how many more there are."""
-    more = len(found) - _MOST
-    return tuple(found) if more <= 0 else (*found[:_MOST], f"and {more} more numbers differ")
+    more = len(sentences) - _MOST
+    return tuple(sentences) if more <= 0 else (*sentences[:_MOST], f"and {more} more numbers differ")

@@ -11,8 +11,8 @@ from sessions.recording.unblinding import revealed
 def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
     """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
     paths = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
-    found = (revealed(Recording.open(path)) for path in paths)
-    return tuple(recording for recording in found if subject in (None, recording.plan.subject))
+    recordings = (revealed(Recording.open(path)) for path in paths)
+    return tuple(recording for recording in recordings if subject in (None, recording.plan.subject))
 
 
 def force_visit(folder: Path, subject: str) -> Recording:

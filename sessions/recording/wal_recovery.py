@@ -64,12 +64,12 @@ def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, in
     step = FRAME.size + page_size
     position = end = start
     while position + FRAME.size <= size:
-        found = FRAME.unpack(_read(log, position, FRAME.size))
-        if found == _HOLE and position != mislabelled:
+        frame = FRAME.unpack(_read(log, position, FRAME.size))
+        if frame == _HOLE and position != mislabelled:
             position = max(position + step, start + (_next_data(log, position) - start) // step * step)
             continue
         position += step
-        if position - step == mislabelled or found[2:4] == salts:
+        if position - step == mislabelled or frame[2:4] == salts:
             end = position
     return min(end, size) if end < position else size
 

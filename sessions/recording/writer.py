@@ -219,7 +219,7 @@ class SessionWriter:
         self._check()
         now_ns = self._clock.now_ns()
         try:
-            rows = self._written()
+            rows = self._write_waiting()
         except sqlite3.Error as error:
             rows = self._written_again(error)
         if self._lost_sight():
@@ -243,7 +243,7 @@ class SessionWriter:
         self._connection.close()
         release_reserve(self.folder)
 
-    def _written(self) -> int:
+    def _write_waiting(self) -> int:
         """Write what waits in one transaction, and return the number of the last row of readings."""
         if not self._blocks and not self._events:
             return self._block_rows
@@ -267,7 +267,7 @@ class SessionWriter:
             )
             self.give_back_reserve()
         try:
-            return self._written()
+            return self._write_waiting()
         except sqlite3.Error as again:
             with suppress(sqlite3.Error):
                 self._connection.execute("ROLLBACK")

@@ -17,22 +17,22 @@ ASKED: dict[Answer, type[Given] | None] = {
 IN_WORDS: dict[type[Given], str] = {Scored: "a score", MagnitudeEstimate: "a number", PairedChoice: "a choice"}
 
 
-def problem(given: Given, asked: Answer) -> str | None:
-    """Say in a sentence what is wrong with an answer where `asked` is due; None where nothing is.
+def problem(answer: Given, expected: Answer) -> str | None:
+    """Say in a sentence what is wrong with an answer where `expected` is due; None where nothing is.
 
     >>> problem(Scored(120.0), "line")
     'a score lies between 0 and 100; 120 does not'
     >>> problem(Scored(12.0), "number")
     'this trial asks for a number, not for a score'
     """
-    wanted = ASKED[asked]
-    if wanted is None:
+    expected_kind = ASKED[expected]
+    if expected_kind is None:
         return "this trial asks for no answer"
-    if not isinstance(given, wanted):
-        return f"this trial asks for {IN_WORDS[wanted]}, not for {IN_WORDS[type(given)]}"
-    if given.corrections is not None and given.corrections < 0:
-        return f"an answer is corrected a number of times; {given.corrections} is none"
-    match given:
+    if not isinstance(answer, expected_kind):
+        return f"this trial asks for {IN_WORDS[expected_kind]}, not for {IN_WORDS[type(answer)]}"
+    if answer.corrections is not None and answer.corrections < 0:
+        return f"an answer is corrected a number of times; {answer.corrections} is none"
+    match answer:
         case Scored(score) if score is not None and not 0 <= score <= 100:
             return f"a score lies between 0 and 100; {score:g} does not"
         case Scored(positions=positions) if not all(0 <= at <= 100 and math.isfinite(t) for t, at in positions):

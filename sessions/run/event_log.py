@@ -52,10 +52,10 @@ def event_of(logged: LoggedEvent) -> Event | None:
 
     Raises ValueError where the line does not hold what such an event has.
     """
-    return None if logged.kind not in _EVENTS else made(logged.kind, logged.data)
+    return None if logged.kind not in _EVENTS else event_from_data(logged.kind, logged.data)
 
 
-def made(kind: str, data: Mapping[str, Any]) -> Event:
+def event_from_data(kind: str, data: Mapping[str, Any]) -> Event:
     """Return the event of a kind that `data_of` gave `data` for. Raises ValueError where it is none."""
     if kind not in _EVENTS:
         raise ValueError(f"{kind} is no event of a session's course")
@@ -78,10 +78,10 @@ def line_of(command: Command) -> Line | None:
         case Tell(sentence):
             return "told", None, {"sentence": sentence}
         case _:
-            return _asked(command)
+            return _question_line(command)
 
 
-def _asked(command: Command) -> Line | None:
+def _question_line(command: Command) -> Line | None:
     """Return how it is logged that something was asked for."""
     match command:
         case ShowInstruction(block):

@@ -92,19 +92,19 @@ class TakeWatch:
         )
 
     def _touches(self, detector: Detector, block: ReadingBlock) -> tuple[Noticed, ...]:
-        found: list[Noticed] = []
+        notices: list[Noticed] = []
         for event in detector.feed(block.time, self._normal_force(block)):
             if isinstance(event, Onset):
-                found.append(ContactOnset(event.time, event.noticed))
+                notices.append(ContactOnset(event.time, event.noticed))
                 self._lifted = None
             else:
-                found.append(FingerLifted(event.time, event.noticed))
+                notices.append(FingerLifted(event.time, event.noticed))
                 self._lifted = event.time
         last = float(block.time[-1])
         if self._lifted is not None and last - self._lifted >= self._after_lift:
-            found.append(Settled(last))
+            notices.append(Settled(last))
             self._lifted = None
-        return tuple(found)
+        return tuple(notices)
 
     def _normal_force(self, block: ReadingBlock) -> Array:
         return normal_force(self._info.calibration.wrench(block.raw, np.zeros(6)), self._frame)

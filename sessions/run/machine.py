@@ -165,21 +165,21 @@ def _touched(state: State, event: ContactOnset | FingerLifted | Settled) -> Step
         case Settling(place, touching=True), FingerLifted():
             return Settling(place), ()
         case Settling(place, touching=False), Settled():
-            return _kept(place)
+            return _keep_take(place)
         case _:
             return state, (_refusal(state, event),)
 
 
-def _answered(state: Scoring, given: Given) -> Step:
+def _answered(state: Scoring, answer: Given) -> Step:
     """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
     place = state.place
-    wrong = problem(given, place.trial.answer)
+    wrong = problem(answer, place.trial.answer)
     if wrong is not None:
         return state, (Refuse(wrong),)
-    if isinstance(given, PairedChoice):
-        place = place.with_progress(replace(place.progress[place.index], choice=given.choice))
+    if isinstance(answer, PairedChoice):
+        place = place.with_progress(replace(place.progress[place.index], choice=answer.choice))
     if state.settled or not place.plan.forces:
-        return _kept(place)
+        return _keep_take(place)
     return Settling(place, touching=state.touching), ()
 
 
@@ -207,8 +207,8 @@ def _again(state: State, event: Redo | UndoRedo) -> Step:
     if isinstance(event, UndoRedo):
         return _redo_undone(state)
     after, commands = _repeated(state, event.reason)
-    whole = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
-    if whole and after != state and isinstance(after, Mounting | Taring | Ready):
+    between_takes = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
+    if between_takes and after != state and isinstance(after, Mounting | Taring | Ready):
         after = replace(after, place=replace(after.place, before_redo=state))
     return after, commands
 
@@ -259,7 +259,7 @@ def _gone_back(before: State) -> Step:
         case Scoring(place, strokes=strokes):
             return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
         case Settling(place):
-            return _kept(place)
+            return _keep_take(place)
         case Resting(place):
             return before, (AskRest(place.plan.rests.duration),)
         case Mounting(place):
@@ -297,7 +297,7 @@ def _stroke_over(place: Place) -> Step:
     """Ask for the answer; where none is due the take ends, once the finger has been off for a moment."""
     if place.trial.answer != "none":
         return Scoring(place), (_ask_answer(place),)
-    return (Settling(place), ()) if place.plan.forces else _kept(place)
+    return (Settling(place), ()) if place.plan.forces else _keep_take(place)
 
 
 def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
@@ -308,10 +308,10 @@ def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
     return (Tell(f"stroke {strokes} where {allowed} may be made: it is recorded and will be flagged"),)
 
 
-def _kept(place: Place) -> Step:
-    kept = KeepTake(place.trial.number, place.take)
+def _keep_take(place: Place) -> Step:
+    keep = KeepTake(place.trial.number, place.take)
     after, commands = _next(place.with_progress(replace(place.progress[place.index], kept=True)))
-    return after, (kept, *commands)
+    return after, (keep, *commands)
 
 
 def _taken_up(place: Place, reason: str) -> Step:

@@ -60,7 +60,7 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
 
 def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
     """Yield a sentence for each event that came out otherwise, is new, or came no more."""
-    then, now = ([event for event in made.events if event.kind not in LATER] for made in (recorded, replayed))
+    then, now = ([event for event in events.events if event.kind not in LATER] for events in (recorded, replayed))
     matcher = SequenceMatcher(None, [_key(event) for event in then], [_key(event) for event in now], autojunk=False)
     for what, i, i_end, j, j_end in matcher.get_opcodes():
         if what == "equal":
@@ -283,10 +283,10 @@ class _Player:
         if self.speed is None:
             return False
         due = self._began + (step.instant_ns - self._first_ns) * 1e-9 / self.speed
-        left = due - time.monotonic()
-        if left > 0.0:
-            time.sleep(min(left, SLICE))
-        return left > SLICE
+        remaining = due - time.monotonic()
+        if remaining > 0.0:
+            time.sleep(min(remaining, SLICE))
+        return remaining > SLICE
 
     def _move_past(self, what: str, step: Step, every: float) -> None:
         """Go on to the step, and so far that the runner, which tells such things now and then, tells it once more."""
@@ -316,10 +316,10 @@ def _run(
             after = logs[number + 1] if number + 1 < len(logs) else None
             limit = None if after is None else after[0].readings
 
-            def shown(part: float, what: str, number: int = number) -> None:
+            def show(part: float, what: str, number: int = number) -> None:
                 progress((number + part) / len(logs), what)
 
-            player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, shown)
+            player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
             resumed = None if number == 0 else _resumed(recording.plan, writer.made, log)
             writer.follow_part(log)
             _run_part(recording.plan, player, writer, resumed)
@@ -339,13 +339,13 @@ def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Re
 
 def _resumed(plan: SessionPlan, before: Sequence[LoggedEvent], log: Sequence[LoggedEvent]) -> Resumed:
     """Return how a part goes on after those before it, as they came out in the replay."""
-    told = next(event.data for event in log if event.kind == "resumed")
+    resumed = next(event.data for event in log if event.kind == "resumed")
     seams = [event.data for event in log if event.kind == "readings_joined"]
 
     def joins(_last: ReadingBlock, _first: ReadingBlock) -> Seam:
         return _JoinedBefore(**seams[0]) if seams else _JoinedBefore(0, 0.0)
 
-    data = {name: value for name, value in told.items() if name != "run"}
+    data = {name: value for name, value in resumed.items() if name != "run"}
     return Resumed(resumption(plan, before), data, ReadingBlock.empty(), joins)
 
 

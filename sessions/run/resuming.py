@@ -60,8 +60,8 @@ def resumption(plan: SessionPlan, events: Sequence[LoggedEvent]) -> Resumption:
             state, _ = interrupted(state, CUT_SHORT)
     state, commands = interrupted(state, CUT_SHORT)
     due = _of_takes(commands)
-    shown = tuple(command for command in commands if line_of(command) not in due)
-    return Resumption(state, (*owed, *due), shown)
+    pending = tuple(command for command in commands if line_of(command) not in due)
+    return Resumption(state, (*owed, *due), pending)
 
 
 def check_resumable(recording: Recording) -> None:

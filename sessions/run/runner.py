@@ -284,12 +284,12 @@ class _Run:
         health = self.transducer.health
         counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
         if any(counts.values()) and (now or self._due("losses", self.settings.losses_every)):
-            told = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+            summary = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
             flagged = {words: count - self._reported.flagged.get(words, 0) for words, count in health.flagged.items()}
             flagged = {words: count for words, count in flagged.items() if count}
             causes = [health.rate_words] if counts["off_rate"] else []
             causes += [f"status: {flagged_words(flagged)}"] if flagged else []
-            sentence = f"readings: {told}" + (f" ({'; '.join(causes)})" if causes else "")
+            sentence = f"readings: {summary}" + (f" ({'; '.join(causes)})" if causes else "")
             data: dict[str, Any] = {**counts, "rate_words": health.rate_words} if counts["off_rate"] else {**counts}
             data |= {"flagged": flagged} if flagged else {}
             self.writer.event("losses", trial_in_hand(self._state), {**data, "sentence": sentence})
@@ -349,11 +349,11 @@ class _Run:
 
 def _with_origin(settings: RunnerSettings) -> dict[str, Any]:
     """Return the settings as plain data, each marked as set or as the default."""
-    default, chosen = asdict(RunnerSettings()), asdict(settings)
+    default, values = asdict(RunnerSettings()), asdict(settings)
     return {
         setting.name: {
-            "value": chosen[setting.name],
-            "origin": "default" if chosen[setting.name] == default[setting.name] else "set",
+            "value": values[setting.name],
+            "origin": "default" if values[setting.name] == default[setting.name] else "set",
         }
         for setting in fields(settings)
     }

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sessions.recording import LoggedEvent
-from sessions.run.event_log import made
+from sessions.run.event_log import event_from_data
 from sessions.run.steps import Event
 
 # What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.
@@ -54,25 +54,25 @@ def parts(events: Sequence[LoggedEvent]) -> tuple[tuple[LoggedEvent, ...], ...]:
 
 def steps(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
     """Return the steps of a session from its log; the last is its end, or where it was cut short."""
-    found: list[Step] = []
+    steps: list[Step] = []
     for i, event in enumerate(events):
         place = event.readings, event.time_ns
         refused = event.kind == "refused"
         kind = event.data.get("event") if refused else event.kind
         if event.kind == "ended":
-            found.append(Step(*place, end=event.data))
+            steps.append(Step(*place, end=event.data))
         elif kind is not None and kind in ACTS:
-            found.append(Step(*place, act=made(kind, event.data["given"] if refused else event.data)))
+            steps.append(Step(*place, act=event_from_data(kind, event.data["given"] if refused else event.data)))
         elif kind in NOTICED:
-            found.append(Step(*place))
+            steps.append(Step(*place))
         elif event.kind == "losses" and not _at_the_end(events, i):
-            found.append(Step(*place, losses=event))
+            steps.append(Step(*place, losses=event))
         elif event.kind == "told" and event.trial is not None:  # the machine's own words belong to no trial
-            found.append(Step(*place, told=True))
-    if not found or found[-1].end is None:
+            steps.append(Step(*place, told=True))
+    if not steps or steps[-1].end is None:
         last = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
-        found.append(Step(last.readings, last.time_ns, end={}))
-    return tuple(found)
+        steps.append(Step(last.readings, last.time_ns, end={}))
+    return tuple(steps)
 
 
 def _at_the_end(events: Sequence[LoggedEvent], position: int) -> bool:

@@ -56,12 +56,12 @@ class Place:
         rests, trial, block = self.plan.rests, self.trial, self.block
         if self.index == 0 or trial.compared_with is not None:
             return False
-        done = block.trials.index(trial)
-        if done == 0:
+        position = block.trials.index(trial)
+        if position == 0:
             return rests.between_blocks and self.at(self.index - 1).block.phase != "practice"
         # Two that are compared make one trial in the subject's eyes.
-        counted = sum(earlier.compared_with is None for earlier in block.trials[:done])
-        return rests.after_trials is not None and counted % rests.after_trials == 0
+        number = sum(earlier.compared_with is None for earlier in block.trials[:position])
+        return rests.after_trials is not None and number % rests.after_trials == 0
 
     def at(self, index: int) -> "Place":
         """Return the place with another trial in hand, to which no redo has led."""
@@ -76,12 +76,12 @@ class Place:
     def answers(self) -> tuple[tuple[Stimulus, bool], ...]:
         """Return what was compared with the standard of this block, and whether it was chosen, where a take counts."""
         trials = self.plan.trials
-        said: list[tuple[Stimulus, bool]] = []
+        stimuli: list[tuple[Stimulus, bool]] = []
         for n, (trial, progress) in enumerate(zip(trials, self.progress, strict=True)):
             if trial.block == self.trial.block and progress.kept and progress.choice is not None:
                 compared = trials[n - 1] if trial.standard else trial
-                said.append((compared.stimulus, (progress.choice == "second") == (compared is trial)))
-        return tuple(said)
+                stimuli.append((compared.stimulus, (progress.choice == "second") == (compared is trial)))
+        return tuple(stimuli)
 
     def with_take(self, take: int) -> "Place":
         """Return the place with this take of the trial in hand, the latest or an earlier one, which does not count."""

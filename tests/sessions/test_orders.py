@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sessions.plan.orders import drawn, opaque_codes, pairs, pairs_with, shuffled, williams
+from sessions.plan.orders import draw, opaque_codes, pairs, pairs_with, shuffled, williams
 
 STIMULI = (0, 20, 50, 80, 100)
 
@@ -87,7 +87,7 @@ def apart(order):
 
 @given(seed=st.integers(0, 2**31 - 1))
 def test_an_order_that_is_to_meet_a_constraint_meets_it_and_one_that_does_at_once_is_the_shuffled_one(seed):
-    order = drawn(STIMULI, seed, "b", apart)
+    order = draw(STIMULI, seed, "b", apart)
     assert apart(order)
     plain = shuffled(STIMULI, seed, "b")
     assert order == plain or not apart(plain)
@@ -95,13 +95,13 @@ def test_an_order_that_is_to_meet_a_constraint_meets_it_and_one_that_does_at_onc
 
 def test_all_fourteen_orders_of_five_without_neighbours_come_about_equally_often():
     # 14 is the fifth number of Hertzsprung's problem (OEIS A002464).
-    counted = Counter(drawn(STIMULI, seed, "b", apart) for seed in range(1400))
+    counted = Counter(draw(STIMULI, seed, "b", apart) for seed in range(1400))
     assert len(counted) == 14
     assert all(abs(count - 100) < 50 for count in counted.values())  # five standard deviations of a binomial count
 
 
 def test_a_constraint_that_no_order_meets_gives_none():
-    assert drawn((0, 1, 2), 1, "b", lambda order: abs(order[0] - order[1]) > 1 and abs(order[1] - order[2]) > 1) is None
+    assert draw((0, 1, 2), 1, "b", lambda order: abs(order[0] - order[1]) > 1 and abs(order[1] - order[2]) > 1) is None
 
 
 # ---- pairs

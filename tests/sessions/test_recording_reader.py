@@ -1,4 +1,5 @@
 import hashlib
+import json
 import shutil
 import sqlite3
 import tracemalloc
@@ -14,6 +15,7 @@ from recordings import PLAN, begun, change, ended, readings, rows
 
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.log import trial_records
+from sessions.recording.schema import FORMAT, FORMAT_VERSION
 from sessions.recording.wal_recovery import log_tail
 
 
@@ -73,11 +75,9 @@ def test_a_file_that_is_no_recording_is_refused_with_a_sentence(tmp_path, conten
 
 def test_a_recording_of_a_later_format_is_refused_by_name(tmp_path):
     folder = ended(tmp_path / "s")
-    later = '{"name":"daq-app session","version":3}'
-    import zlib
-
+    later = json.dumps({"name": FORMAT, "version": FORMAT_VERSION + 1})
     change(folder, "UPDATE head SET value=?, crc32=? WHERE name='format'", (later, zlib.crc32(later.encode())))
-    with pytest.raises(RecordingError, match="up to version 2: use a later program"):
+    with pytest.raises(RecordingError, match=f"up to version {FORMAT_VERSION}: use a later program"):
         Recording.open(folder)
 
 

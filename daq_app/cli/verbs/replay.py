@@ -16,7 +16,7 @@ from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, repeat, stored_
 from daq_app.cli.options import add_session, within
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording
-from sessions.recording.verification import told
+from sessions.recording.verification import first_sentences
 from sessions.run.replay import Stopped, different_events, different_readings, replay
 from sessions.strokes.decisions import read
 
@@ -50,7 +50,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
         except Stopped:
             raise KeyboardInterrupt from None
         taken = time.perf_counter() - began
-        found = [*different_readings(recording, replayed), *told(list(different_events(recording, replayed)))]
+        found = [
+            *different_readings(recording, replayed),
+            *first_sentences(list(different_events(recording, replayed))),
+        ]
         compared = ["readings", "events", ANALYSIS]
         decided = read(recording.folder)  # people decided about the recording, not about its replay
         analysis = stored_document(options.session, ANALYSIS)

@@ -76,8 +76,8 @@ def check_translations(
 def missing_texts(translations: Sequence[Translation], names: Sequence[str]) -> Iterator[tuple[str, str]]:
     """Yield language and block of each text that a language which has others lacks."""
     for language in languages_of(translations):
-        held = {one.block for one in translations if one.language == language}
-        yield from ((language, name) for name in names if name not in held)
+        blocks = {one.block for one in translations if one.language == language}
+        yield from ((language, name) for name in names if name not in blocks)
 
 
 def languages_of(translations: Sequence[Translation]) -> tuple[str, ...]:

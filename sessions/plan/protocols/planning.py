@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
 from sessions.plan.adaptive import next_comparison
-from sessions.plan.orders import Item, drawn, pairs, pairs_with, shuffled, williams
+from sessions.plan.orders import Item, draw, pairs, pairs_with, shuffled, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
     PROXIMAL_TO_DISTAL,
@@ -77,16 +77,16 @@ def plan(
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
         raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
-    own, held = body or Body(), setting or VisitSetting()
-    asked = protocol.phases if phases is None else phases
+    own, visit_setting = body or Body(), setting or VisitSetting()
+    planned_phases = protocol.phases if phases is None else phases
     try:
-        protocol = protocol if held.language is None else protocol.in_language(held.language)
+        protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
         check_seed("seed", seed)
-        check_phases(protocol, asked)
+        check_phases(protocol, planned_phases)
         check_body(own, protocol)
     except NotAllowed as error:
         raise SettingsError(str(error)) from error
-    area = protocol.face.contact_area if held.contact_area is None else held.contact_area
+    area = protocol.face.contact_area if visit_setting.contact_area is None else visit_setting.contact_area
     rows = design_rows(protocol)
     row = None if rows is None else (seed % rows if place is None else place.row - 1) % rows + 1
     design_seed = protocol.label_seed if place is None else place.seed
@@ -96,18 +96,18 @@ def plan(
     rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}"
     if protocol.order.blocks == "counterbalanced":
         rule += f"; blocks counterbalanced, {outlines[0].name} first"
-    made = SessionPlan(
+    plan = SessionPlan(
         protocol=protocol.name,
         subject=subject,
         seed=seed,
         order_rule=rule,
-        blocks=tuple(blocks.of(asked)),
+        blocks=tuple(blocks.of(planned_phases)),
         forces=forces,
-        frame=held.frame or protocol.face.frame,
+        frame=visit_setting.frame or protocol.face.frame,
         contact_angle=protocol.contact_angle if own.contact_angle is None else own.contact_angle,
         contact_angle_origin="set" if own.contact_angle is None else "measured",
-        stroking_hand=held.stroking_hand,
-        answering_hand=held.answering_hand,
+        stroking_hand=visit_setting.stroking_hand,
+        answering_hand=visit_setting.answering_hand,
         finger=own.finger,
         rests=Rests(protocol.rests.after_trials, protocol.rests.between_blocks, protocol.rests.duration),
         shown=protocol.shown,
@@ -118,11 +118,11 @@ def plan(
         order_seed=None if row is None else design_seed,
         key_sha256=None if place is None else place.key_sha256,
     )
-    if made.key_sha256 is not None:
-        if any(block.candidates for block in made.blocks):
+    if plan.key_sha256 is not None:
+        if any(block.candidates for block in plan.blocks):
             raise SettingsError("an adaptive block needs to know which stimulus is which: its study is not blinded")
-        made = blinded(made)
-    return made if area is None else replace(made, contact_area=area, contact_area_origin="set")
+        plan = blinded(plan)
+    return plan if area is None else replace(plan, contact_area=area, contact_area_origin="set")
 
 
 def design_rows(protocol: Protocol) -> int | None:
@@ -196,8 +196,8 @@ class _Blocks:
     def _pre_evaluation(self, outline: BlockOutline) -> Block:
         """Return the block in which every stimulus is judged once, shuffled."""
         name = f"{outline.name}, pre-evaluation"
-        told = self.protocol.pre_evaluation
-        instruction = outline.instruction if told is None else told.instruction
+        pre_evaluation = self.protocol.pre_evaluation
+        instruction = outline.instruction if pre_evaluation is None else pre_evaluation.instruction
         return self._block(outline, "pre-evaluation", name, [self._shuffled(outline, name)], instruction)
 
     def _practice(self, outline: BlockOutline) -> Block:
@@ -232,8 +232,8 @@ class _Blocks:
 
     def _candidates(self, outline: BlockOutline) -> tuple[Stimulus, ...]:
         """Return what is compared with the standard of an adaptive block, by index; nothing in any other block."""
-        others = sorted(set(outline.indices) - {outline.standard}) if outline.adaptive is not None else ()
-        return tuple(self._stimulus(outline, index) for index in others)
+        comparisons = sorted(set(outline.indices) - {outline.standard}) if outline.adaptive is not None else ()
+        return tuple(self._stimulus(outline, index) for index in comparisons)
 
     def _stimulus(self, outline: BlockOutline, index: int) -> Stimulus:
         return Stimulus(outline.descriptor, index, self.labels[outline.descriptor, index])
@@ -251,7 +251,7 @@ class _Blocks:
     def _shuffled(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
         """Return an order by chance that meets the protocol's constraints. Codes are drawn: an order tells no index."""
         by_code = self._by_code(outline)
-        order = drawn(
+        order = draw(
             tuple(by_code),
             self.seed,
             name,

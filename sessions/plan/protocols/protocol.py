@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from sessions.plan.orders import Item, drawn, opaque_codes
+from sessions.plan.orders import Item, draw, opaque_codes
 from sessions.plan.plan import Frame, Phase, Shown
 from sessions.plan.protocols.languages import (
     ENGLISH,
@@ -300,7 +300,7 @@ class Protocol:
         if self.order.first_differs and block.repetitions > len(set(block.indices) - set(self.order.not_first)):
             what = "more repetitions than stimuli that may be first, and first_differs asks for another each time"
             raise NotAllowed(f"{key}.repetitions", block.repetitions, what)
-        if self.order.constrained and drawn(block.indices, 0, block.name, self._meets) is None:
+        if self.order.constrained and draw(block.indices, 0, block.name, self._meets) is None:
             raise NotAllowed(f"{key}.indices", list(block.indices), "no order of these meets what [order] asks for")
 
     def _meets(self, order: Sequence[Item]) -> bool:
@@ -322,9 +322,9 @@ def check_phases(protocol: Protocol, phases: Sequence[Phase]) -> None:
 
 def phases_before(protocol: Protocol) -> tuple[Phase, ...]:
     """Return the phases that may come before the trials of the experiment."""
-    judged = protocol.pre_evaluation is not None and protocol.scale.answer != "choice"
+    is_judged = protocol.pre_evaluation is not None and protocol.scale.answer != "choice"
     practised = any(block.practice for block in protocol.blocks)
-    has: dict[Phase, bool] = {"pre-evaluation": judged, "practice": practised}
+    has: dict[Phase, bool] = {"pre-evaluation": is_judged, "practice": practised}
     return tuple(phase for phase, there in has.items() if there)
 
 
@@ -343,13 +343,13 @@ def protocol(name_or_path: str | Path) -> Protocol:
 
 def protocol_file(name_or_path: str | Path) -> Path:
     """Return the file of a built-in protocol, or the path given. Raises SettingsError for an unknown name."""
-    given = str(name_or_path)
-    if given in protocol_names():
-        return FOLDER / f"{given}.toml"
-    if not given.endswith(".toml"):
+    text = str(name_or_path)
+    if text in protocol_names():
+        return FOLDER / f"{text}.toml"
+    if not text.endswith(".toml"):
         built_in = ", ".join(protocol_names())
-        raise SettingsError(f"there is no protocol {given}; built in: {built_in}; or give the path of a .toml file")
-    return Path(given)
+        raise SettingsError(f"there is no protocol {text}; built in: {built_in}; or give the path of a .toml file")
+    return Path(text)
 
 
 def check_seed(key: str, seed: int) -> None:
