@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from daq_app.analyst.messages import EDGES, Edge
+from daq_app.analyst.messages import EDGES, Edge, History
 from sessions.report.contents import StrokeFinding
 from sessions.strokes.decisions import Decision, Decisions
 
@@ -58,17 +58,34 @@ def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: st
 
 def taken_back(decisions: Decisions, by: str) -> Decision | None:
     """Return the line that undoes the last decision in force; None where there is none."""
-    last = next((line for line in reversed(decisions.standing) if line.undoes is None), None)
+    last = _last(_standing(decisions))
     return None if last is None else Decision(by, "undone in the window", undoes=last.number)
 
 
 def brought_back(decisions: Decisions, by: str) -> Decision | None:
     """Return the line that redoes what was undone last; None where nothing was undone since the last decision."""
+    last = _last(_undone(decisions))
+    return None if last is None else Decision(by, "redone in the window", undoes=last.number)
+
+
+def history(decisions: Decisions) -> History:
+    """Return which decisions can be undone, and which redone."""
+    undone = [decision_meant(decisions, line) for line in reversed(_undone(decisions))]
+    return History(*(tuple(f"{one.what} of {one.of}" for one in lines) for lines in (_standing(decisions), undone)))
+
+
+def _standing(decisions: Decisions) -> list[Decision]:
+    return [line for line in decisions.standing if line.undoes is None]
+
+
+def _undone(decisions: Decisions) -> list[Decision]:
+    """Return the lines that undo a decision, and have come since the last one."""
     decided = {line.number for line in decisions.lines if line.undoes is None}
-    last = next((line for line in reversed(decisions.standing) if line.undoes in decided), None)
-    if last is None or last.number < max(decided):
-        return None
-    return Decision(by, "redone in the window", undoes=last.number)
+    return [line for line in decisions.standing if line.undoes in decided and line.number > max(decided)]
+
+
+def _last(lines: list[Decision]) -> Decision | None:
+    return lines[-1] if lines else None
 
 
 def decision_meant(decisions: Decisions, line: Decision) -> Decision:

@@ -28,11 +28,20 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
+class History:
+    """The decisions that can be undone, the last one first, and those that can be redone, the first one first."""
+
+    done: tuple[str, ...] = ()  # each in words
+    undone: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Found:
     """What is known of the session now: its strokes alone, or the model's answers too."""
 
     stage: Literal["analysed", "predicted"]
     report: Report
+    history: History = History()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,6 +22,7 @@ class AnalystState:
     folder: Path
     stage: Stage = "opening"
     report: Report | None = None
+    history: m.History = field(default_factory=m.History)
     version: int = 0  # of the report; pictures drawn of an earlier one are out of date
     fingers: Mapping[m.Key, Finger] = field(default_factory=dict[m.Key, Finger])
     drawn: Mapping[str, m.Drawn] = field(default_factory=dict[str, m.Drawn])  # of this version, by name
@@ -134,7 +135,15 @@ def _found(state: AnalystState, found: m.Found) -> AnalystState:
         kept = tuple(p for p in before.predictions if p.stroke in numbers)
         report = replace(report, predictions=kept)
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
-    after = replace(state, stage=found.stage, report=report, version=state.version + 1, fingers=fingers, drawn={})
+    after = replace(
+        state,
+        stage=found.stage,
+        report=report,
+        history=found.history,
+        version=state.version + 1,
+        fingers=fingers,
+        drawn={},
+    )
     return replace(after, row=max(0, min(state.row, len(rows(after)) - 1)))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
-from daq_app.analyst.edges import brought_back, decision_meant, decision_of, taken_back
+from daq_app.analyst.edges import brought_back, decision_meant, decision_of, history, taken_back
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
@@ -64,7 +64,7 @@ class Work:
             self._analysis, self._recording.plan, progress=told, watch=self._answered, first=self._first()
         )
         self._report = findings(self._recording, self._analysis, self._prediction)
-        self._say(m.Found("predicted", self._report))
+        self._say(m.Found("predicted", self._report, history(read(self._recording.folder))))
 
     def do(self, asked: m.Ask) -> None:
         """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
@@ -108,7 +108,7 @@ class Work:
         self._analysis = analyse(self._recording, stored_settings(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
-        self._say(m.Found("analysed", self._report))
+        self._say(m.Found("analysed", self._report, history(read(self._recording.folder))))
 
     def _move(self, asked: m.Move) -> None:
         stroke = self._report.strokes[asked.stroke - 1]

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Protocol
 
 from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -127,7 +127,13 @@ class AnalystWindow(QMainWindow):
         self.ask(m.Write(what, path))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Stop the work with Esc, undo with Ctrl+Z and redo with Ctrl+Shift+Z."""
+        """Stop the work with Esc; undo and redo with the keys that the system has for it."""
+        if event.matches(QKeySequence.StandardKey.Undo):
+            self.stroke.decisions.stack.undo()
+            return
+        if event.matches(QKeySequence.StandardKey.Redo):
+            self.stroke.decisions.stack.redo()
+            return
         held = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():
             case Qt.Key.Key_F1:
@@ -138,8 +144,6 @@ class AnalystWindow(QMainWindow):
                 self.ask(m.Stop())
             case Qt.Key.Key_Home:
                 self.stroke.stroke.show_all()
-            case Qt.Key.Key_Z if held:
-                self.stroke.decisions.take_back(again=bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier))
             case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if held:
                 self._go_to(event.key() - Qt.Key.Key_1)
             case _:

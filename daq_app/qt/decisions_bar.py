@@ -4,6 +4,7 @@ from PySide6.QtCore import QSettings, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
+from daq_app.qt.decision_stack import DecisionStack
 from daq_app.qt.parts import Wrapped, button, label
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID
@@ -30,12 +31,12 @@ class DecisionsBar(QWidget):
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)
         self.why.setAccessibleName(tr("why an edge is moved"))
-        self.undo = button(
-            tr("Undo"), tr("undo the last decision, Ctrl+Z"), lambda: self.take_back(again=False), "small"
-        )
-        self.redo = button(
-            tr("Redo"), tr("redo what was undone, Ctrl+Shift+Z"), lambda: self.take_back(again=True), "small"
-        )
+        self.stack = DecisionStack(self)
+        self.stack.wanted.connect(self._ask)
+        self.stack.indexChanged.connect(self._show_next)
+        self.undo = button(tr("Undo"), "", self.stack.undo, "small")
+        self.redo = button(tr("Redo"), "", self.stack.redo, "small")
+        self._show_next()
         self.told = Wrapped("value", "look")
         line = QHBoxLayout()
         line.setSpacing(GRID // 2)
@@ -59,10 +60,21 @@ class DecisionsBar(QWidget):
         """Return why."""
         return self.why.text().strip() or DRAGGED
 
-    def take_back(self, *, again: bool) -> None:
-        """Undo the last decision, or redo the last that was undone."""
+    def show_decided(self, sentences: tuple[str, ...], history: m.History) -> None:
+        """Show what was decided about a stroke, and what of the session can be undone."""
+        self.told.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
+        self.stack.show_history(history)
+
+    def _ask(self, again: bool) -> None:
         self.asked.emit(m.Undo(self.who(), again))
 
-    def show_decided(self, sentences: tuple[str, ...]) -> None:
-        """Show what was decided about a stroke."""
-        self.told.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
+    def _show_next(self) -> None:
+        """Say on each button what it would do next."""
+        stack = self.stack
+        for made, can, words in (
+            (self.undo, stack.canUndo(), tr("undo {decision}, Ctrl+Z", decision=stack.undoText())),
+            (self.redo, stack.canRedo(), tr("redo {decision}, Ctrl+Shift+Z", decision=stack.redoText())),
+        ):
+            made.setEnabled(can)
+            made.setAccessibleName(words if can else tr("{button}: no decision", button=made.text()))
+            made.setToolTip(made.accessibleName())

@@ -73,11 +73,11 @@ class StrokeColumn(QWidget):
             self._stroke = stroke
             self.stroke.show_stroke(stroke)
             self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
-            self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()))
             self._read = None
         elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
             self.stroke.put_back()
         self._moving = self._moving and state.step is not None
+        self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()), state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
         told = numbers(state)

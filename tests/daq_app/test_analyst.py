@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
-from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, taken_back, within
+from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, history, taken_back, within
 from daq_app.analyst.frame import Contact, Finger, Frame, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.messages import EDGES
@@ -184,6 +184,23 @@ def test_undo_and_redo_go_back_and_forth_over_every_decision_and_all_of_it_stays
     assert taken_back(Decisions(), "E03") is None
     again = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 1.0, 3.0))
     assert brought_back(again, "E03") is None
+
+
+def test_the_history_names_what_undo_and_redo_would_do_next():
+    kept = Decisions()
+    for what in ("onset", "lift"):
+        kept = kept.with_line(Decision("E02", "dragged", what, 1, 1, 0.5, 1.0))
+    onset, lift = "onset of stroke 1 of trial 1", "lift of stroke 1 of trial 1"
+    seen = [history(kept)]
+    for step in (taken_back, taken_back, brought_back):
+        kept = kept.with_line(step(kept, "E03"))
+        seen.append(history(kept))
+    assert [(one.done, one.undone) for one in seen] == [
+        ((onset, lift), ()),
+        ((onset,), (lift,)),
+        ((), (onset, lift)),
+        ((onset,), (lift,)),
+    ]
 
 
 # ---- replay

@@ -260,9 +260,20 @@ def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes
     assert handle.text() == before
 
 
-def test_ctrl_z_undoes_and_ctrl_shift_z_redoes(window):
-    held = Qt.KeyboardModifier.ControlModifier
+def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
+    held, bar = Qt.KeyboardModifier.ControlModifier, window.stroke.decisions
+    assert not bar.undo.isEnabled()
     QTest.keyClick(window, Qt.Key.Key_Z, held)
+    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    window.take(
+        m.Found("predicted", example(), m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",)))
+    )
+    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    assert bar.undo.accessibleName() == "undo lift of trial 2, Ctrl+Z"
+    assert bar.redo.accessibleName() == "redo steady of trial 3, Ctrl+Shift+Z"
+    QTest.keyClick(window, Qt.Key.Key_Z, held)
+    window.take(m.Found("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
+    assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, held | Qt.KeyboardModifier.ShiftModifier)
     assert [asked.again for asked in window._work.asked if isinstance(asked, m.Undo)] == [False, True]
 
