@@ -75,6 +75,7 @@ def _painting(film) -> None:  # noqa: ANN001
     """Print what painting a state of the finger takes."""
     from PySide6.QtWidgets import QApplication
 
+    from daq_app.analyst.field_list import FIELD_CHOICES
     from daq_app.qt.finger_canvas import FingerCanvas, Look
     from daq_app.qt.tokens import LIGHT
 
@@ -84,7 +85,7 @@ def _painting(film) -> None:  # noqa: ANN001
     for near in (False, True):
         took: list[float] = []
         for frame in film.frames[::4]:
-            canvas.show_frame(frame, film.parts, film.arcs, "", Look(30.0, near))
+            canvas.show_frame(frame, film.parts, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
             begun = time.process_time()
             canvas.grab()
             took.append(time.process_time() - begun)

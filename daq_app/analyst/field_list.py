@@ -14,7 +14,6 @@ Array = NDArray[np.float64]
 Range = tuple[float, float]
 
 NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")
-TICKS = 7  # at most, in a colour bar
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,17 +66,3 @@ def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
             tops.append(float(np.quantile(known, TOP)))
     high = step_above(max(tops))
     return (-high if field.signed else 0.0), high
-
-
-def ticks(low: float, high: float) -> list[float]:
-    """Return round numbers from `low` to `high`, at most `TICKS` of them; none where `low` is not below `high`.
-
-    >>> ticks(0.0, 15.0), ticks(-0.3, 0.3)
-    ([0.0, 5.0, 10.0, 15.0], [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3])
-    """
-    if not low < high:
-        return []
-    power = 10.0 ** np.floor(np.log10((high - low) / TICKS))
-    step = next(s * power for s in (1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / (s * power) <= TICKS - 1 + 1e-9)
-    numbers = range(int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9)) + 1)
-    return [float(f"{number * step:.12g}") for number in numbers]

@@ -54,6 +54,12 @@ class FieldBar(QWidget):
         ends = sorted((self.low.value(), self.high.value()))
         return (ends[0], ends[1]) if self.mode == FIXED and ends[0] < ends[1] else automatic
 
+    def fix(self, ends: Range) -> None:
+        """Fix the colours at these ends."""
+        self._automatic = ends
+        self.ranges.setCurrentIndex(FIXED)
+        self._fix()
+
     def _free(self) -> None:
         """Fit the colours to another field: numbers that were fixed are of another unit."""
         if self.mode == FIXED:

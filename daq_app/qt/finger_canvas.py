@@ -4,45 +4,33 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import (
-    QBrush,
-    QColor,
-    QFontMetricsF,
-    QKeyEvent,
-    QLinearGradient,
-    QMouseEvent,
-    QPainter,
-    QPaintEvent,
-    QPen,
-    QPixmap,
-    QResizeEvent,
-    QWheelEvent,
-)
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSizeF, Qt, Signal
+from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice, ticks
+from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice
 from daq_app.analyst.frame import Frame, Parts
 from daq_app.analyst.probe import Line, probe_words
 from daq_app.analyst.viewport import View
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
+from daq_app.qt.zoomed_plot import style_axis
 from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
 
 NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
-NOTCH = 120.0  # of a wheel, in Qt's eighths of a degree
-ZOOM = 1.25  # of a notch or a key [-]: three of them double the picture
+ZOOM = 1.25  # of a key [-]: three of them double the picture
 STEP = 0.1  # of the picture's width that an arrow key moves it
 END_STEP = 0.2  # of `STEP`, by which an arrow key moves an end of a line
+NEAREST, FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
 # Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
 LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
 ARROWS = {
-    Qt.Key.Key_Left: (STEP, 0.0),
-    Qt.Key.Key_Right: (-STEP, 0.0),
+    Qt.Key.Key_Left: (-STEP, 0.0),
+    Qt.Key.Key_Right: (STEP, 0.0),
     Qt.Key.Key_Up: (0.0, STEP),
     Qt.Key.Key_Down: (0.0, -STEP),
 }
@@ -58,35 +46,46 @@ class Sight(QObject):
     def __init__(self) -> None:
         """Look at all of it."""
         super().__init__()
-        self.view: View | None = None  # None: all of it
+        self.part: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None
         self.draws_line = False  # the mouse draws a line in place of moving the picture
         self.lines = 2.2  # of words over each finger
 
+    def look_at(self, part: QRectF | None) -> None:
+        """Show a part of the finger [mm]; None shows all of it."""
+        self.part = part
+        self.changed.emit()
 
-class FingerCanvas(QWidget):
-    """A picture of one frame."""
+    def set_line(self, line: Line | None) -> None:
+        """Draw a line [mm], or none."""
+        self.line = line
+        self.changed.emit()
+        self.cut.emit()
+
+
+class FingerCanvas(pg.GraphicsLayoutWidget):
+    """A picture of one frame in pyqtgraph's view box, with its colour bar under it."""
+
+    range_chosen = Signal(tuple)  # ends of the colours, as the bar's handles were left
 
     def __init__(self, tokens: Tokens, scale: float, sight: Sight | None = None) -> None:
         """Show nothing yet; canvases with the same `sight` move together."""
-        super().__init__()
+        base: Any = super()
+        base.__init__()
         self.sight = sight or Sight()
-        self.sight.changed.connect(self._renew)
-        self._tokens, self._scale = tokens, scale
+        self._tokens, self._font = tokens, font(SMALL, scale)
         self._frame: Frame | None = None
         self._parts = NO_PARTS
         self._look = Look(FIELD_CHOICES[0], (0.0, 1.0))
         self._words = ""
-        self._kept: QPixmap | None = None
         self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
         self._pointer: QPointF | None = None
-        self._held: QPointF | None = None  # where a button was pressed, or moved to since
-        self._drawing = False  # what is held is the end of a line
         self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
+        self.setBackground(tokens.surface)
+        self.setFrameShape(QFrame.Shape.NoFrame)
         self.setMinimumSize(80, round(160 * scale))  # two stand beside each other
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMouseTracking(True)
         self.setToolTip(
             tr(
                 "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
@@ -94,6 +93,15 @@ class FingerCanvas(QWidget):
             )
         )
         self.setAccessibleName(tr("finger of the model: none"))
+        self._box = _Box(self.sight)
+        self._bar = self._colour_bar()
+        self.ci.addItem(self._box, 0, 0)
+        self.ci.addItem(self._bar, 1, 0)
+        self._item = _FingerItem(self)
+        self.scene().addItem(self._item)
+        self._box.sigResized.connect(self._place)
+        self.sight.changed.connect(self._place)
+        self._place()
 
     def show_frame(
         self, frame: Frame | None, parts: Parts, words: str, look: Look, linked: tuple[Frame, ...] = ()
@@ -103,139 +111,27 @@ class FingerCanvas(QWidget):
         if frame is self._frame and fits == self._fits and (words, look) == (self._words, self._look):
             return
         if look.near != self._look.near:
-            self.sight.view = None
+            self.sight.part = None
         self._frame, self._parts, self._words, self._look, self._fits = frame, parts, words, look, fits
         self.setAccessibleName(words or tr("finger of the model: none"))
-        self._renew()
+        low, high = look.range
+        self._bar.rounding = (high - low) / 100.0
+        self._bar.setColorMap(pg.ColorMap(np.linspace(0.0, 1.0, SHADES), self._shades[look.field.signed]))
+        self._bar.setLevels(look.range)
+        self._bar.getAxis("bottom").setLabel(look.field.axis)
+        self._bar.setVisible(frame is not None)
+        self._place()
         self._probe()
 
-    def view(self) -> View | None:
-        """Return what is shown, or None without a finger."""
-        if self.sight.view is not None or not self._fits:
-            return self.sight.view
-        box, boxes = self._box(), np.array([whole_box(frame, self._look) for frame in self._fits])
-        left, below = boxes.min(axis=0)[[0, 2]].tolist()
-        right, above = boxes.max(axis=0)[[1, 3]].tolist()
-        return View.fitted((left, right, below, above), box.left(), box.top(), box.width(), box.height())
-
-    def show_view(self, view: View | None) -> None:
-        """Show a part of the finger; None shows all of it."""
-        self.sight.view = view
-        self.sight.changed.emit()
-
-    def zoom(self, factor: float, at: QPointF | None = None) -> None:
-        """Show the finger `factor` times as large; what is at a pixel stays there, at first the middle."""
-        view, place = self.view(), at or self._box().center()
-        if view is not None:
-            self.show_view(view.zoomed(factor, place.x(), place.y()))
-
-    def set_line(self, line: Line | None) -> None:
-        """Draw a line [mm], or none."""
-        self.sight.line = line
-        self.sight.changed.emit()
-        self.sight.cut.emit()
+    def view(self) -> View:
+        """Return where places of the finger lie on the canvas."""
+        part, here = self._box.viewRect(), self._here()
+        middle, per_mm = part.center(), here.width() / part.width()
+        return View(middle.x(), middle.y(), here.center().x(), here.center().y(), per_mm)
 
     def words_at(self, place: tuple[float, float]) -> str:
         """Return what is at a place [mm]; "" without a finger."""
         return "" if self._frame is None else probe_words(self._frame, self._parts, self._look.field, *place)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
-        """Zoom about the pointer."""
-        self.zoom(ZOOM ** (event.angleDelta().y() / NOTCH), event.position())
-        event.accept()
-
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Take hold of the picture, or begin a line."""
-        view = self.view()
-        if event.button() != Qt.MouseButton.LeftButton or view is None:
-            event.ignore()
-            return
-        self._held = event.position()
-        self._drawing = self.sight.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        if self._drawing:
-            place = view.place(self._held.x(), self._held.y())
-            self.set_line((place, place))
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Move the picture or the line's end with a button held; say what is under the pointer."""
-        view, at = self.view(), event.position()
-        if view is None or self._frame is None:
-            return
-        if self._held is not None and self._drawing and self.sight.line is not None:
-            self.set_line((self.sight.line[0], view.place(at.x(), at.y())))
-        elif self._held is not None:
-            self.show_view(view.moved(at.x() - self._held.x(), at.y() - self._held.y()))
-            self._held = at
-            return
-        self._pointer = at
-        self._probe()
-
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Let go; a line without a length is taken away."""
-        self._held = None
-        if self.sight.line is not None and self.sight.line[0] == self.sight.line[1]:
-            self.set_line(None)
-
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Show all of it."""
-        event.accept()
-        self.show_view(None)
-
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
-        """Say nothing of a place any more."""
-        self._pointer = None
-        self._probe()
-        super().leaveEvent(event)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
-        key, view = event.key(), self.view()
-        if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
-            self.zoom(ZOOM)
-        elif key == Qt.Key.Key_Minus:
-            self.zoom(1.0 / ZOOM)
-        elif key == Qt.Key.Key_Home:
-            self.show_view(None)
-        elif key == Qt.Key.Key_Delete and self.sight.line is not None:
-            self.set_line(None)
-        elif key in ARROWS and view is not None and event.modifiers() & LINE_KEYS:
-            self._move_end(view, key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
-        elif key in ARROWS and view is not None:
-            across, down = ARROWS[Qt.Key(key)]
-            self.show_view(view.moved(across * self.width(), down * self.width()))
-        else:
-            super().keyPressEvent(event)
-
-    def _move_end(self, view: View, key: int, *, begins: bool) -> None:
-        """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
-        middle = self._box().center()
-        line = self.sight.line or (view.place(middle.x(), middle.y()),) * 2
-        across, down = ARROWS[Qt.Key(key)]
-        along = END_STEP * self.width() / view.per_mm
-        x, y = line[0 if begins else 1]
-        moved = (x - across * along, y + down * along)
-        self.set_line((moved, line[1]) if begins else (line[0], moved))
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Paint anew at another size."""
-        self._kept = None
-        super().resizeEvent(event)
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the picture, or what was painted before."""
-        if self._kept is None:
-            ratio = self.devicePixelRatioF()
-            self._kept = QPixmap(round(self.width() * ratio), round(self.height() * ratio))
-            self._kept.setDevicePixelRatio(ratio)
-            self._kept.fill(Qt.GlobalColor.transparent)
-            painter = QPainter(self._kept)
-            self._paint_on(painter)
-            painter.end()
-        painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._kept)
-        if self.hasFocus():
-            painter.setPen(QPen(QColor(self._tokens.act), 2))
-            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
 
     @property
     def frame(self) -> Frame | None:
@@ -249,70 +145,184 @@ class FingerCanvas(QWidget):
 
     def draw(self, painter: QPainter, head: str) -> None:
         """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it, "" for none."""
-        painter.fillRect(self.rect(), QColor(self._tokens.surface))
-        self._paint_on(painter)
+        self.render(painter, QRectF(self.rect()), self.rect())
+        painter.setFont(self._font)
         painter.setPen(QColor(self._tokens.look))
-        painter.drawText(self._box(), int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop), f"{head} ")
+        painter.drawText(self._here(), int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop), f"{head} ")
 
-    def _paint_on(self, painter: QPainter) -> None:
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setFont(font(SMALL, self._scale))
-        self._paint(painter)
+    def paint_finger(self, painter: QPainter) -> None:
+        """Paint the finger where the view box has it."""
+        if self._frame is not None:
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            painter.setFont(self._font)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._here(), self._frame, self._parts)
+            picture.paint(self._look, self._shades[self._look.field.signed], self.sight.line)
+
+    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:  # noqa: ARG002, N802  Qt's name
+        """Write what is said of the finger over it."""
+        painter.setFont(self._font)
+        painter.setPen(QColor(self._tokens.quiet))
+        words = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
+        painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802  Qt's name
+        """Draw a ring around all of it while it has the keyboard."""
+        base: Any = super()
+        base.paintEvent(event)
+        if self.hasFocus():
+            painter = QPainter(self.viewport())
+            painter.setPen(QPen(QColor(self._tokens.act), 2))
+            painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Take hold of the picture, or begin a line."""
+        self._box.draws = self.sight.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        base: Any = super()
+        base.mousePressEvent(event)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Say what is under the pointer."""
+        base: Any = super()
+        base.mouseMoveEvent(event)
+        self._pointer = event.position()
+        self._probe()
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+        """Show all of it."""
+        event.accept()
+        self.sight.look_at(None)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Say nothing of a place any more."""
+        self._pointer = None
+        self._probe()
+        base: Any = super()
+        base.leaveEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
+        key = Qt.Key(event.key())
+        if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
+            self._box.zoom(ZOOM)
+        elif key == Qt.Key.Key_Minus:
+            self._box.zoom(1.0 / ZOOM)
+        elif key == Qt.Key.Key_Home:
+            self.sight.look_at(None)
+        elif key == Qt.Key.Key_Delete and self.sight.line is not None:
+            self.sight.set_line(None)
+        elif key in ARROWS and event.modifiers() & LINE_KEYS:
+            self._move_end(key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
+        elif key in ARROWS:
+            across, up = ARROWS[key]
+            self._box.move(across, up)
+        else:
+            event.ignore()
+
+    def _move_end(self, key: Qt.Key, *, begins: bool) -> None:
+        """Move the beginning or the end of the line as an arrow key points; the first draws it from the middle."""
+        part = self._box.viewRect()
+        line = self.sight.line or ((part.center().x(), part.center().y()),) * 2
+        across, up = (END_STEP * step * part.width() for step in ARROWS[key])
+        x, y = line[0 if begins else 1]
+        moved = (x + across, y + up)
+        self.sight.set_line((moved, line[1]) if begins else (line[0], moved))
 
     def _probe(self) -> None:
         """Say which place is under the pointer."""
-        view, at = self.view(), self._pointer
-        inside = view is not None and at is not None and self._box().contains(at)
-        self.sight.pointed.emit(view.place(at.x(), at.y()) if inside and view is not None and at is not None else None)
+        at = self._pointer
+        inside = at is not None and self._frame is not None and self._here().contains(at)
+        self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
 
-    def _renew(self) -> None:
-        self._kept = None
-        self.update()
+    def _place(self) -> None:
+        """Show the part that is looked at, or all of it at the foot of the box."""
+        self.ci.layout.setContentsMargins(0.0, self._above(), 0.0, 0.0)
+        part, here = self.sight.part, self._box.rect()
+        if part is None and self._fits and here.height() > 1.0:
+            boxes = np.array([whole_box(frame, self._look) for frame in self._fits])
+            left, below = boxes.min(axis=0)[[0, 2]].tolist()
+            right, above = boxes.max(axis=0)[[1, 3]].tolist()
+            shown = View.fitted((left, right, below, above), 0.0, 0.0, here.width(), here.height())
+            x0, x1, y0, y1 = shown.visible(0.0, 0.0, here.width(), here.height())
+            part = QRectF(x0, y0, x1 - x0, y1 - y0)
+        if part is not None:
+            self._box.setRange(part, padding=0.0)
+        self._item.prepareGeometryChange()
+        self._item.update()
+        self.viewport().update()
 
-    def _box(self) -> QRectF:
-        """Return where the finger is: under its lines of words, over the colours and their ticks."""
-        line = self._line_height()
-        above = self.sight.lines * line
-        return QRectF(0, above, self.width(), max(self.height() - above - 2.5 * line, 1.0))
+    def _here(self) -> QRectF:
+        """Return where the view box is on the canvas."""
+        return QRectF(self._box.mapRectToScene(self._box.rect()))
 
-    def _line_height(self) -> float:
-        metrics = QFontMetricsF(font(SMALL, self._scale))
-        return metrics.height()
+    def _above(self) -> float:
+        """Return the height of the words [pixel]."""
+        return self.sight.lines * QFontMetricsF(self._font).height()
 
-    def _paint(self, painter: QPainter) -> None:
-        line = self._line_height()
-        painter.setPen(QColor(self._tokens.quiet))
-        words = QRectF(4, 0, self.width() - 8, self.sight.lines * line)
-        painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
-        view = self.view()
-        if self._frame is None or view is None:
+    def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
+        pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}
+        line = QFontMetricsF(self._font).height()
+        made = pg.ColorBarItem(width=line - 4.0, orientation="h", colorMapMenu=False, **pens)
+        style_axis(made.getAxis("bottom"), self._tokens, self._font)
+        self.ci.layout.setRowFixedHeight(1, 3.5 * line)  # colours, ticks and the field's name keep their place
+        made.hide()
+        made.sigLevelsChangeFinished.connect(self._choose_range)
+        return made
+
+    def _choose_range(self) -> None:
+        self.range_chosen.emit(self._bar.levels())
+
+
+class _Box(pg.ViewBox):
+    """Moves and zooms the finger as every plot, true to scale; with Shift, or where lines are drawn, a drag is one."""
+
+    def __init__(self, sight: Sight) -> None:
+        base: Any = super()
+        base.__init__(lockAspect=True, enableMenu=False, defaultPadding=0.0)
+        self._sight = sight
+        self.draws = False  # what is dragged is the end of a line
+        self.setLimits(minXRange=NEAREST, maxXRange=FARTHEST)
+        self.sigRangeChangedManually.connect(self._tell)
+
+    def zoom(self, factor: float) -> None:
+        """Show the finger `factor` times as large; its middle stays."""
+        self.scaleBy((1.0 / factor, 1.0 / factor))
+        self._tell()
+
+    def move(self, across: float, up: float) -> None:
+        """Look further to the right and up, by parts of the width that is shown."""
+        width = self.viewRect().width()
+        self.translateBy(x=across * width, y=up * width)
+        self._tell()
+
+    def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:  # noqa: ANN401, N802  pyqtgraph's name
+        """Move the picture, or draw a line."""
+        if not self.draws:
+            base: Any = super()
+            base.mouseDragEvent(ev, axis)
             return
-        picture = FingerPainter(painter, self._tokens, view, self._box(), self._frame, self._parts)
-        picture.paint(self._look, self._shades[self._look.field.signed], self.sight.line)
-        self._paint_bar(painter, QRectF(8, self._box().bottom() + 4, self.width() - 16, 2.4 * line))
+        ev.accept()
+        begin, end = (self.mapToView(at) for at in (ev.buttonDownPos(), ev.pos()))
+        self._sight.set_line(((begin.x(), begin.y()), (end.x(), end.y())))
 
-    def _paint_bar(self, painter: QPainter, box: QRectF) -> None:
-        """Draw the colours with their ticks, and the field's name with its unit."""
-        low, high = self._look.range
-        line, words = self._line_height(), self._look.field.axis
-        name = min(painter.fontMetrics().horizontalAdvance(words) + 12.0, 0.6 * box.width())
-        strip = QRectF(box.left() + line, box.top() + 2, max(box.width() - name - 2.0 * line, 1.0), line - 4)
-        gradient = QLinearGradient(strip.topLeft(), strip.topRight())
-        shades = self._shades[self._look.field.signed]
-        for step in range(SHADES):
-            gradient.setColorAt(step / (SHADES - 1), shades[step])
-        painter.fillRect(strip, QBrush(gradient))
-        painter.setPen(QColor(self._tokens.text))
-        for tick in ticks(low, high):
-            x = strip.left() + strip.width() * (tick - low) / (high - low)
-            painter.drawLine(QPointF(x, strip.bottom()), QPointF(x, strip.bottom() + 4))
-            at = QRectF(x - 40, strip.bottom() + 4, 80, line)
-            painter.drawText(at, int(Qt.AlignmentFlag.AlignCenter), f"{tick:g}".replace("-", "−"))
-        painter.setPen(QColor(self._tokens.quiet))
-        label = QRectF(box.right() - name, box.top(), name, 2.0 * line)
-        painter.drawText(
-            label, int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop | Qt.TextFlag.TextWordWrap), words
-        )
+    def _tell(self, *_: object) -> None:
+        self._sight.look_at(QRectF(self.viewRect()))
+
+
+class _FingerItem(pg.GraphicsObject):
+    """The finger in the scene of its canvas, over the view box."""
+
+    def __init__(self, canvas: FingerCanvas) -> None:
+        base: Any = super()
+        base.__init__()
+        self._canvas = canvas
+
+    def boundingRect(self) -> QRectF:  # noqa: N802  Qt's name
+        """Return all of the canvas."""
+        return QRectF(QPointF(), QSizeF(self._canvas.size()))
+
+    def paint(self, painter: QPainter, *_: object) -> None:
+        """Paint it."""
+        self._canvas.paint_finger(painter)
 
 
 def _shades(name: str, first: float, last: float) -> list[QColor]:

@@ -56,6 +56,8 @@ class ModelColumn(QWidget):
         self.plot.draw.toggled.connect(self._draw_line)
         self.finger.sight.pointed.connect(self._probe)
         self.finger.sight.cut.connect(self._cut)
+        for canvas in (self.finger, self.other):
+            canvas.range_chosen.connect(self.fields.fix)
         self.near = button(tr("Contact"), tr("show the contact alone, with its tractions"), self._paint, "small")
         self.mesh = button(tr("Mesh"), tr("show the mesh"), self._paint, "small")
         self.both = button(
@@ -177,11 +179,11 @@ class ModelColumn(QWidget):
         common = common_range(state, field)
         ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
         look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
+        self.finger.sight.lines = 3.2 if other_words else 2.2
         pair = ((self.finger, finger, f"A  {words}"), (self.other, other, f"B  {other_words}"))
         for canvas, one, said in pair if other_words else ((self.finger, finger, words),):
             frame, parts = (None, NO_PARTS) if one is None else (one.frame, one.parts)
             canvas.show_frame(frame, parts, said, look if canvas is self.finger else replace(look, lost=None), shown)
-        self.finger.sight.lines = 3.2 if other_words else 2.2
         self.other.setVisible(bool(other_words))
         self.plot.show_field((finger, other) if other_words else (finger,), field, self.finger.sight.line)
         self._name_saves()

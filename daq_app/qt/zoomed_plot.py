@@ -5,7 +5,7 @@ from typing import Any
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent
+from PySide6.QtGui import QColor, QFont, QKeyEvent, QMouseEvent
 
 from daq_app.qt.parts import label
 from daq_app.qt.remembered import type_scale
@@ -13,6 +13,15 @@ from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
+
+
+def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types
+    """Give an axis the colours of a theme and a type face."""
+    axis.setTickFont(type_face)
+    axis.setLabel(**{"font-size": f"{type_face.pixelSize()}px"})
+    axis.setPen(QColor(tokens.line))
+    axis.setTextPen(QColor(tokens.quiet))
+    axis.enableAutoSIPrefix(False)
 
 
 class ZoomedPlot(pg.PlotWidget):
@@ -42,13 +51,8 @@ class ZoomedPlot(pg.PlotWidget):
         self._hide_words()
         item.setMenuEnabled(False)
         item.hideButtons()
-        small = font(SMALL, scale)
         for side in ("left", "bottom"):
-            item.getAxis(side).setTickFont(small)
-            item.getAxis(side).setLabel(**{"font-size": f"{small.pixelSize()}px"})
-            item.getAxis(side).setPen(QColor(tokens.line))
-            item.getAxis(side).setTextPen(QColor(tokens.quiet))
-            item.getAxis(side).enableAutoSIPrefix(False)
+            style_axis(item.getAxis(side), tokens, font(SMALL, scale))
 
     def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
         """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""

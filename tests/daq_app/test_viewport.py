@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from daq_app.analyst.field_list import FIELD_CHOICES, automatic_range, ticks
+from daq_app.analyst.field_list import FIELD_CHOICES, automatic_range
 from daq_app.analyst.frame import Contact, Frame, Parts, SkinLine
 from daq_app.analyst.probe import along_line, along_skin, probe_words, value_at
-from daq_app.analyst.viewport import LEAST, MOST, View
+from daq_app.analyst.viewport import View
 
 NONE = np.empty(0)
 BY_NAME = {field.name: field for field in FIELD_CHOICES}
@@ -31,12 +31,6 @@ def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back
     points = np.array([[0.0, 0.0], [3.0, 2.5]])
     places = [view.place(*pixel) for pixel in view.placed(points).tolist()]
     np.testing.assert_allclose(places, points, atol=1e-12)
-
-
-def test_zoom_ends_where_nothing_more_can_be_seen():
-    view = View.fitted(BOX, 0.0, 0.0, 100.0, 50.0)
-    assert view.zoomed(1e9, 5.0, 5.0).per_mm == MOST
-    assert view.zoomed(1e-9, 5.0, 5.0).per_mm == LEAST
 
 
 def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
@@ -81,12 +75,3 @@ def test_colours_of_a_signed_field_have_nought_in_their_middle_and_others_begin_
     assert low == -high < 0.0
     assert automatic_range(BY_NAME["von_mises"], [shown]) == (0.0, 10.0)
     assert automatic_range(BY_NAME["displacement"], [shown]) == (0.0, 1.0)  # the frame has none
-
-
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-30.0, 30.0), (0.137, 0.1425), (-7e-4, 9e5)])
-def test_ticks_are_few_and_round_and_lie_in_the_range(low, high):
-    marks = ticks(low, high)
-    assert 3 <= len(marks) <= 7
-    assert low <= marks[0] < marks[-1] <= high
-    np.testing.assert_allclose(np.diff(marks), marks[1] - marks[0])
-    assert ticks(high, low) == []
