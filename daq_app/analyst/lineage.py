@@ -51,7 +51,7 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         )
     read = state.read
     if read is not None and read.stroke == stroke.number:
-        made.append(Link(tr("{count} readings", count=len(read.readings)), "readings", read.readings.place))
+        made.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
     else:
         made.append(
             Link(tr("raw readings"), "readings", tr("counts, sequence and device counter, as they were recorded"))

@@ -105,7 +105,7 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
     before = np.flatnonzero(block.time < (-np.inf if onset is None else onset))
     free = before[-max(round(MOST_FOR_ZERO * rate), 1) :]
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
-    words = tr("mean of the {count} readings before contact", count=len(free)) if len(free) else tr("as recorded")
+    words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
     return RawReadings(
         place=place,

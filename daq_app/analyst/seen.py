@@ -121,7 +121,7 @@ def _contact_words(frame: Frame) -> str:
     touching = sum(state != "open" for state in states)
     slipping = sum(state in ("slip", "cap") for state in states)
     return (
-        tr("{slipping} of {touching} touching points slip", slipping=slipping, touching=touching)
+        tr("touching points that slip: {slipping} of {touching}", slipping=slipping, touching=touching)
         if touching
         else tr("nothing touches")
     )

@@ -91,7 +91,7 @@ def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[
         return []
     value, error = (shown.factor * number for number in (*found, 0.0)[:2])
     told = with_error(value, error, shown.places) + ("" if shown.unit == "1" else f" {shown.unit}")
-    return [(tr("{response}, averaged over the ending", response=shown.label), told)]
+    return [(tr("{response}, averaged over the ending", response=tr(shown.label)), told)]
 
 
 def _left_out(report: Report | None) -> str:

@@ -36,7 +36,7 @@ class TrialsColumn(QWidget):
         self.list.currentRowChanged.connect(self._chosen)
         self.responses = choice(tr("quantity that is held against the score"))
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
-            self.responses.addItem(f"{shown.label} [{shown.unit}]", shown.name)
+            self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
         self.responses.activated.connect(self._respond)
         self.relation, self.points = self._relation()
         layout = QVBoxLayout(self)

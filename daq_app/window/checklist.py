@@ -115,10 +115,10 @@ def _subject_note(form: SessionForm) -> str:
     said = enrolment(form)
     if said is not None:
         return said.words
-    before = codes_in(place_of(form)).count(form.subject.strip())
-    times = tr("a session") if before == 1 else tr("{before} sessions", before=before)
+    subject = form.subject.strip()
+    before = codes_in(place_of(form)).count(subject)
     return (
-        tr("{subject} has {times} here already: is it the same person?", subject=form.subject.strip(), times=times)
+        tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=before)
         if before
         else ""
     )

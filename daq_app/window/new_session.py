@@ -301,7 +301,7 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
             continue
         done = sum(record.outcome != "open" for record in recording.trials)
         words = tr(
-            "{subject}: {done} of {count} trials done",
+            "{subject}: trials done {done} of {count}",
             subject=recording.plan.subject,
             done=done,
             count=len(recording.trials),

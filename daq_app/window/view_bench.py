@@ -205,7 +205,7 @@ def _tare(bench: BenchState) -> str:
     forces = f"Fx {_mn(fx)}, Fy {_mn(fy)}, Fz {_mn(fz)} mN"
     torques = f"Tx {_nmm(tx)}, Ty {_nmm(ty)}, Tz {_nmm(tz)} N mm"
     return tr(
-        "{forces}\n{torques}\n{readings} readings in {duration:.1f} s",
+        "{forces}\n{torques}\nover {duration:.1f} s, n = {readings}",
         forces=forces,
         torques=torques,
         readings=zero.readings,

@@ -229,7 +229,7 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     finger = tr("{hand} index finger", hand=hand) if hand else tr("index finger")
     way = tr("away from the body") if trial.direction == PROXIMAL_TO_DISTAL else tr("towards the body")
     allowed = session.plan.strokes_allowed(trial)
-    often = tr("once") if allowed == 1 else tr("up to {allowed} times", allowed=allowed)
+    often = tr("once") if allowed == 1 else tr("at most {allowed}×", allowed=allowed)
     sentence = tr(
         "Subject strokes {code} {often}, {way}, with the {finger}.",
         code=trial.stimulus.code,
@@ -251,7 +251,7 @@ def _ended(session: SessionState) -> tuple[str, Button | None]:
         resume = Button(tr("Resume session"), "Space", sends=m.ResumeSession(session.folder))
         return tr("The session was cut short and can go on at the same trial."), resume
     done = sum(t.outcome == "done" for t in session.trials)
-    sentence = tr("Session ended: {done} of {count} trials done.", done=done, count=len(session.trials))
+    sentence = tr("Session ended. Trials done: {done} of {count}.", done=done, count=len(session.trials))
     return sentence, Button(tr("New session"), "Space", sends=NewSession())
 
 

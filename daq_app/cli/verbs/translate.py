@@ -17,7 +17,9 @@ from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
 from sessions.plan.protocols.protocol import Protocol
+from sessions.prediction import QUANTITIES
 from sessions.recording import RecordingError
+from sessions.report.responses import shown_response
 from sessions.toml_file import NotAllowed, toml_text
 from solver.quantities import FIELDS
 
@@ -84,8 +86,9 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
 
 
 def window_texts() -> list[str]:
-    """Return every text of the experimenter's windows, as it stands in the sources, and the fields of the finger."""
-    texts = dict.fromkeys(field.label for field in FIELDS)
+    """Return every text of the experimenter's windows, as it stands in the sources, and the fields and quantities."""
+    labels = (*(field.label for field in FIELDS), *(shown_response(quantity.name).label for quantity in QUANTITIES))
+    texts = dict.fromkeys(labels)
     for source in sorted(PROGRAM.rglob("*.py")):
         for node in ast.walk(ast.parse(source.read_text("utf-8"))):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("tr", "tr_noop"):

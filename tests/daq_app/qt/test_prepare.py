@@ -62,7 +62,7 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     zero = driver.state.bench.zero
     said = row.words.text().split("\n")
     assert said[0] == "SIMULATED Net F/T SI-36-0.5: nothing lost."
-    assert said[1] == f"Zero: {zero.readings} readings in {zero.duration:.1f} s."
+    assert said[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
     assert said[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
     assert said[3].startswith("Life: ")
     row.connect_button.click()

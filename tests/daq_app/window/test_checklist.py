@@ -81,4 +81,4 @@ def test_a_code_that_was_used_before_asks_and_the_next_free_one_is_proposed(form
         (tmp_path / name / "session.sqlite").write_bytes(b"")
     assert codes_in(tmp_path) == ("P07", "P07", "P08")
     assert next_code(codes_in(tmp_path)) == "P09"
-    assert "P07 has 2 sessions here already" in card(form, "Subject").words
+    assert "Sessions of P07 here already: 2." in card(form, "Subject").words

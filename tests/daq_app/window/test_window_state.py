@@ -278,7 +278,7 @@ def test_the_bench_tells_what_a_serial_number_has_been_through():
 def test_a_tare_shows_its_figures_in_newtons_and_how_far_the_zero_has_moved_since_the_first():
     first = m.Tared((8e3, -7e3, -1e3, 0.0, 0.0, 0.0), (4e3,) * 3 + (50.0,) * 3, (0.0,) * 6, 200, 1.0)
     bench = derive_view(after(m.Device(INFO, None), first)).bench
-    assert bench.tare == "Fx 8, Fy −7, Fz −1 mN\nTx 0.0, Ty 0.0, Tz 0.0 N mm\n200 readings in 1.0 s"
+    assert bench.tare == "Fx 8, Fy −7, Fz −1 mN\nTx 0.0, Ty 0.0, Tz 0.0 N mm\nover 1.0 s, n = 200"
     assert bench.drift == "first zero"
     assert bench.bars[0].noise == "4 mN"
     assert bench.bars[3].noise == "0.05 N mm"
