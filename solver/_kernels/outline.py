@@ -1,4 +1,4 @@
-"""The deformed skin as a line: how far it is squeezed, and whether it crosses itself. `skin_compression` in NumPy."""
+"""The deformed skin as a line: how far it is squeezed, and whether it crosses itself."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 def pinched(
     nodes: Array, u: Array, outline: Indices, loose: Flags, state: Narrow, first: int
 ) -> tuple[float, int, float, float]:
-    """Return how far the skin is squeezed where its elements are `loose` (a,), as `skin_compression.pinched` has it.
+    """Return how far the skin is squeezed where its elements are `loose` (a,), as in `SkinCompression`.
 
     `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order, of which
     those from number `first` on may touch, as `state` (k,) says.

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
-from solver.continuation.existence import refuse_far_beyond, steep
+from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
-from solver.continuation.limit_point import folded, sound
 from solver.equilibrium.finger import FiniteFinger, forces_of, sliding_load
 from solver.equilibrium.load_path import Steps, march
 from solver.equilibrium.newton import EquilibriumState

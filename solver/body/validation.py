@@ -7,10 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.hyperelastic import STIFFENING, Law
+from solver.constitutive.hyperelastic import Law
 from solver.constitutive.linear import Prony
 from solver.element import Q2P1
 from solver.mesh.mesh import Mesh, jacobians
+from solver.scene.tables import STIFFENING
 
 HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
 MOTIONS = ("x", "y", "turn")  # of a body as a whole

@@ -15,7 +15,6 @@ from solver.constitutive.linear import Isotropic
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
-STIFFENING = PLAIN, 14.0  # least and largest exponent: steeper ones contradicted themselves
 NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by differences
 TERMS = 14  # of it: enough up to an exponent of 20
 

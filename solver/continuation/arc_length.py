@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from solver.arrays import Array
-from solver.contact.skin_compression import SkinCompression
+from solver.contact.skin import SkinCompression
 from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import Cancelled, NotConverged
 from solver.progress import report_progress

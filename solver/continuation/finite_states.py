@@ -2,18 +2,23 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.continuation import limit_point as reach
-from solver.continuation.existence import APART, all_at_the_bound, stands, steady, steep
+from solver import _kernels as kernels
+from solver.body.finite import FiniteBody
+from solver.constitutive.hyperelastic import Law
+from solver.contact.skin import SkinCompression
+from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch
+from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
+from solver.continuation.surface_instability import folds_at
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finger import FiniteFinger, sliding_load
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_path import Way, march
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
 from solver.scene.scene import Scene
@@ -25,6 +30,7 @@ SEARCHES = 20  # steps of a search for the depth at which a force is met
 FURTHEST = 0.25  # of the depth, by which it may change in one
 MET = 1e-9  # relative difference within which it is
 ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
 
 
 def settled(
@@ -193,10 +199,10 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Calla
 def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
 
-    How deep sliding goes, and how hard it presses there, is found by `limit_point`; but only where driven a little
+    How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
-    proof = reach.of_depth(finger.scene, shape.load._replace(depth=BEYOND * shape.load.depth), stop)
+    proof = of_depth(finger.scene, shape.load._replace(depth=BEYOND * shape.load.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
         shape = _risen_to(finger, shape, proof, force, stop)
     found = _at_force(finger.newton, shape, force, stop)
@@ -204,7 +210,7 @@ def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: C
 
 
 def _risen_to(
-    finger: FiniteFinger, shape: EquilibriumState, proof: reach.Reach, force: float, stop: Callable[[], bool]
+    finger: FiniteFinger, shape: EquilibriumState, proof: Reach, force: float, stop: Callable[[], bool]
 ) -> EquilibriumState:
     """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
 
@@ -235,3 +241,54 @@ def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: 
     for leg in scene.earlier_slides():  # one that never settles is refused with its limits
         settled(finger, leg, stop)
     return march(scene, finger, times, stop=stop)
+
+
+def steady_body(
+    whole: FiniteBody,
+    load: LoadState,
+    skin: Law,
+    start: EquilibriumState | None = None,
+    stop: Callable[[], bool] = lambda: False,
+) -> EquilibriumState:
+    """Return the settled sliding state under `load`, followed on this mesh from the one without friction.
+
+    That is sought from undeformed, or from `start`. `skin` is the law of what may fold. Raises NoSteadyState where the
+    branch ends before, at a limit point or where the skin folds, with the largest friction as this mesh has it;
+    NotConverged where it is lost before, which tells nothing of the body, or cannot be begun; Cancelled where `stop`
+    says so.
+    """
+    newton = Newton(whole.condensed)
+    body = _OwnBody(whole, newton)
+    bare = sliding.settled(newton, load._replace(mu=0.0), start, stop=stop)
+    branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin), stop)
+    where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
+    if branch.limited and (branch.lost or body.spoilt(branch.last)):
+        raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
+    if branch.limited:
+        raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
+    found = sliding.settled(newton, load, branch.last, stop=stop)
+    if jumped_branch(body, branch.last, found):
+        raise NotConverged(f"{where}, and beyond only with its skin folded")
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _OwnBody:
+    """A body of which all skin is looked at that may touch."""
+
+    body: FiniteBody
+    newton: Newton
+
+    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        mesh, every = self.body.mesh, np.ones(len(shape.state) // 2, bool)
+        return SkinCompression(*kernels.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
+
+    def crosses(self, shape: EquilibriumState) -> bool:
+        """Return whether the skin crosses itself."""
+        mesh = self.body.mesh
+        return kernels.crosses(mesh.nodes, shape.u, mesh.skin)
+
+    def spoilt(self, shape: EquilibriumState) -> bool:
+        """Return whether contact has come to an end of the skin, or an element is crushed."""
+        return bool(shape.touching[[0, -1]].any()) or self.body.smallest_det(shape.u) < CRUSHED

@@ -8,7 +8,7 @@ from solver import _kernels as kernels
 from solver._kernels.arguments import MeshTransferArrays
 from solver.arrays import Array, Flags, Indices, Narrow
 from solver.body.finite import VALUES, FiniteBody
-from solver.contact.edges import arcs_of
+from solver.contact.skin import arcs_of
 from solver.element import Q2P1
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesher import FingerMesh, with_middles

@@ -17,7 +17,7 @@ from solver._kernels import SLIP
 from solver.arrays import Array
 from solver.contact.law import NAMES
 from solver.continuation.arc_length import jumped_branch
-from solver.continuation.limit_point import sound
+from solver.continuation.existence import sound
 from solver.equilibrium import force_control, full_slip
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_beside

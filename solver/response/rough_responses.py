@@ -13,10 +13,9 @@ from numpy.linalg import LinAlgError
 
 from solver.accuracy.adaptivity import COARSE, WIDER
 from solver.arrays import Array
+from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
-from solver.continuation.limit_point import sound
-from solver.continuation.small_existence import direct
-from solver.continuation.wedging import WIDE
+from solver.continuation.small_states import WIDE, direct
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import never

@@ -1,7 +1,7 @@
 """From scenes at small strain to predictions: one mesh for all that share a finger, an error estimate with each.
 
-Settled sliding is found directly and refused where it does not exist (`wedging`); the course is marched, and
-where tissues relax, in time (`solver.equilibrium.relaxation`).
+Settled sliding is found directly and refused where it does not exist (`continuation.small_states`); the course is
+marched, and where tissues relax, in time (`solver.equilibrium.relaxation`).
 """
 
 from collections.abc import Callable, Sequence
@@ -25,9 +25,17 @@ from solver.accuracy.audits import (
 )
 from solver.accuracy.error_estimate import edge_changes, nested_numbers
 from solver.arrays import Array
-from solver.continuation.small_existence import direct
-from solver.continuation.small_states import depends_on_way, end, gives_way, in_tissue, marched, nearest, refined
-from solver.continuation.wedging import WIDE
+from solver.continuation.small_states import (
+    WIDE,
+    depends_on_way,
+    direct,
+    end,
+    gives_way,
+    in_tissue,
+    marched,
+    nearest,
+    refined,
+)
 from solver.equilibrium.finger import LinearFinger, forces_of
 from solver.equilibrium.load_path import Instant, Steps, times_on_way
 from solver.equilibrium.newton import EquilibriumState

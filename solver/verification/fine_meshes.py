@@ -10,7 +10,7 @@ from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, r
 from solver.accuracy.adaptivity import end as finite_end
 from solver.arrays import Array
 from solver.continuation import small_states
-from solver.continuation.wedging import WIDE
+from solver.continuation.small_states import WIDE
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_stepping import never

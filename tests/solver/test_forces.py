@@ -21,7 +21,7 @@ from solver import (
     SolveFailure,
     solve,
 )
-from solver.continuation import limit_point as reach
+from solver.continuation import existence as reach
 from solver.equilibrium import force_control as finite_forced
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 

@@ -13,10 +13,10 @@ from solver import _kernels as kernels
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
-from solver.contact.skin_compression import crosses_itself, pinched
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
+from tests.solver.oracle.skin import crosses_itself, pinched
 
 
 def distorted(law, seed=1):

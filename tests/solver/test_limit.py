@@ -8,8 +8,8 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
-from solver.continuation import existence, own_existence
-from solver.continuation import limit_point as reach
+from solver.continuation import existence, finite_states
+from solver.continuation import existence as reach
 from solver.continuation.arc_length import follow
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finger import FiniteFinger, finite_laws
@@ -111,9 +111,9 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
     newton = Newton(FiniteBody.of(mesh, laws).condensed)
     load = LoadState(2.0, 0.5, np.inf, TOWARDS_TIP)
     with pytest.raises(NoSteadyState) as refused:
-        own_existence.steady(newton.condensed.body, load, laws[mesher.EPIDERMIS])
+        finite_states.steady_body(newton.condensed.body, load, laws[mesher.EPIDERMIS])
     assert refused.value.limit_mu == pytest.approx(0.373, rel=0.03)
-    below = own_existence.steady(newton.condensed.body, load._replace(mu=0.3), laws[mesher.EPIDERMIS])
+    below = finite_states.steady_body(newton.condensed.body, load._replace(mu=0.3), laws[mesher.EPIDERMIS])
     np.testing.assert_allclose(below.u, settled(newton, load._replace(mu=0.3)).u, atol=1e-6)
 
 
@@ -128,7 +128,7 @@ def test_what_is_crushed_beside_a_rigid_core_is_told_as_not_known_whatever_the_m
     mesh = grid_mesh(5.0 * np.stack([x, y], axis=-1), np.zeros(layers, np.int64), slice(0, len(angle)), core)
     newton = Newton(FiniteBody.of(mesh, [NeoHooke(0.08, 0.48)]).condensed)
     with pytest.raises(NotConverged, match="is not known"):
-        own_existence.steady(newton.condensed.body, LoadState(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
+        finite_states.steady_body(newton.condensed.body, LoadState(1.0, 1.5, sense=TOWARDS_TIP), NeoHooke(0.08, 0.48))
 
 
 def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monkeypatch):

@@ -1,12 +1,10 @@
-"""Whether a deformed outline crosses itself, and how far its skin is squeezed."""
-
-from typing import NamedTuple
+"""The deformed skin in plain NumPy: whether it crosses itself, and how far it is squeezed."""
 
 import numpy as np
 
+from solver._kernels.outline import SQUEEZED
 from solver.arrays import Array, Flags
-
-SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
+from solver.contact.skin import SkinCompression
 
 
 def crosses_itself(outline: Array) -> bool:
@@ -29,19 +27,6 @@ def crosses_itself(outline: Array) -> bool:
     overlap = (high[:, None] >= low).all(axis=2)
     crossing = apart & apart.T & overlap & overlap.T
     return bool(np.triu(crossing, 2).any())
-
-
-class SkinCompression(NamedTuple):
-    """How far the skin is squeezed where it is, and whether it has a crease.
-
-    A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
-    """
-
-    least: float  # ratio of deformed to undeformed length of a half of an element's side
-    place: int  # the element that it belongs to
-    lowest: float  # stretch, at the ends of elements too: nearer the truth where elements are large
-    kink: float  # largest jump of the tangent, by undeformed length, from one element to the next: a crease has one.
-    # Where skin touches or is drawn out at an edge of contact, jumps are the mesh's: open, squeezed skin is asked.
 
 
 def pinched(before: Array, after: Array, loose: Flags, touching: Flags) -> SkinCompression:

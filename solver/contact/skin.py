@@ -1,8 +1,12 @@
-"""Where contact ends: between two nodes, known to about a tenth of an element from how the pressure falls.
+"""The skin in contact: where contact ends, and how far skin is squeezed.
+
+Contact ends between two nodes, known to about a tenth of an element from how the pressure falls.
 
 Near its edge pressure falls like the square root of the distance. The force beyond a line between elements then has its
 centre at 2/5 of the way from there to the edge.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,3 +67,16 @@ def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float |
     moment = sum(one * (at - place[line]) for one, at in zip(pressed, place[line : last + 1], strict=True))
     least = place[last] - 0.35 * (place[last] - place[last - 1])
     return min(max(place[line] + 2.5 * moment / sum(pressed), least), place[min(last + 1, len(place) - 1)])
+
+
+class SkinCompression(NamedTuple):
+    """How far the skin is squeezed where it is, and whether it has a crease.
+
+    A neo-Hookean half-space in plane strain wrinkles at a stretch of 0.544 (Biot 1963, Appl. Sci. Res. A 12, 168).
+    """
+
+    least: float  # ratio of deformed to undeformed length of a half of an element's side
+    place: int  # the element that it belongs to
+    lowest: float  # stretch, at the ends of elements too: nearer the truth where elements are large
+    kink: float  # largest jump of the tangent, by undeformed length, from one element to the next: a crease has one.
+    # Where skin touches or is drawn out at an edge of contact, jumps are the mesh's: open, squeezed skin is asked.
