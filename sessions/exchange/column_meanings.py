@@ -1,8 +1,13 @@
 """The unit and the meaning of every column of a session's tables: column to (unit, "" for none; meaning)."""
 
+from collections.abc import Mapping
+
 from sessions.exchange.prediction_settings import PREDICTED_WITH
 from sessions.recording.log import OUTCOMES
 from sessions.strokes.bootstrap import NUMBERS
+from sessions.strokes.stroke import meanings
+
+Columns = Mapping[str, tuple[str, str]]
 
 AXES = (("Fx", "N"), ("Fy", "N"), ("Fz", "N"), ("Tx", "N mm"), ("Ty", "N mm"), ("Tz", "N mm"))
 
@@ -27,46 +32,17 @@ TRIAL = {
     **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in AXES},
 }
 
-_MEASURED = {
-    "trial": ("", "number of its trial"),
-    "onset": ("s", "first contact, device clock"),
-    "lift": ("s", "end of contact, device clock"),
-    "steady": ("s", "steady window, device clock"),
-    "break_away": ("s", "end of the stick phase: where T/N stops climbing, a change point, device clock"),
-    "slide_onset": ("s", "from here on the centre of pressure slides, device clock"),
-    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
-    "direction_from": ("", "what the direction was told from"),
-    "direction_agrees": ("", "share of bootstrap repeats with that direction"),
-    "heading": ("deg", "angle of the movement, or else of the drag, from +x towards +y of the face"),
-    "speed": ("mm/s", "of the centre of pressure over the steady window"),
-    "speed_error": ("mm/s", "standard error of the speed"),
-    "mu_static": ("", "height of the static peak of T/N"),
-    "mu_dynamic": ("", "mean of T/N over the steady window"),
-    "mu_dynamic_sd": ("", "standard deviation of T/N over the steady window"),
-    "mu_dynamic_interval": ("", "confidence interval of mu_dynamic"),
-    "mu_max": ("", "greatest T/N"),
-    "tau_max": ("MPa", "greatest tangential force over the contact area"),
-    "normal_force": ("N", "mean over the steady window"),
-    "tangential_force": ("N", "mean over the steady window"),
-    "peak_normal": ("N", "greatest normal force"),
-    "peak_tangential": ("N", "greatest tangential force"),
-    "readings": ("", "how many in the steady window"),
-    "zero": ("", "where the zero of the forces came from"),
-    "zero_drift": ("N", "how far the zero moved from before the stroke to after it"),
-    "flaws": ("", "names of what is wrong with it"),
+_MEASURED = meanings()
+_FURTHER: Mapping[str, Columns] = {  # what an analysis says of a stroke beside its own numbers, after which of them
+    "direction_from": {"direction_agrees": ("", "share of bootstrap repeats with that direction")},
+    "flaws": {
+        **{f"{name}_bootstrap": (_MEASURED[name].unit, f"95 % bootstrap interval of {name}") for name in NUMBERS},
+        "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
+        "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
+    },
 }
-
-STROKE = {
-    **_MEASURED,
-    **{f"{name}_bootstrap": (_MEASURED[name][0], f"95 % bootstrap interval of {name}") for name in NUMBERS},
-    "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
-    "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
-    "contact_area": ("mm2", "by which tau_max was told"),
-    "area_exponent": ("", "with which that area follows the normal force"),
-    "number": ("", "of the stroke within its trial, from 1"),
-    "kept": ("", "false: a person left it out, and the model is not given it"),
-    "decided": ("", "what a person decided about it, who and why"),
-    "reasons": ("", "for each number left out, why"),
+STROKE: Columns = {
+    name: meaning for own, words in _MEASURED.items() for name, meaning in {own: words, **_FURTHER.get(own, {})}.items()
 }
 
 FRICTION = {

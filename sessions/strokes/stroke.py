@@ -2,13 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
+
+
+class Meaning(NamedTuple):
+    """What a number is, in the tables of an export."""
+
+    unit: str  # "" for none
+    words: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,39 +48,58 @@ class StrokeCurve:
 class Stroke:
     """One stroke. None stands where the recording allows no honest number; `flaws` says why."""
 
-    trial: int | None  # None where the recording has no trials
-    onset: float | None  # [s, device time]; None where the recording begins in contact, or no zero is known
-    lift: float | None  # [s, device time]; None where it ends in contact, or no zero is known
-    steady: Interval | None  # steady window [s, device time]
-    break_away: float | None  # where T/N stops climbing, by a change point [s, device time]; None: no stick phase
-    slide_onset: float | None  # from here on the centre of pressure slides [s, device time], where that is seen
-    direction: int | None  # +1 proximal to distal (along +x of the face frame), -1 back
-    direction_from: str | None  # "centre of pressure", "tangential force" or "decision"
-    heading: float | None  # angle of the movement, or else of the drag, from +x towards +y of the face [degrees]
-    speed: float | None  # slope of the centre of pressure on time over the steady window [mm/s]
-    speed_error: float | None  # its standard error [mm/s]
-    mu_static: float | None  # height of the static peak [-]; None where none stands out
-    mu_dynamic: float | None  # mean of T/N over the steady window [-]
-    mu_dynamic_sd: float | None  # standard deviation of T/N in it [-]
-    mu_dynamic_interval: Interval | None  # the bootstrap's: see `BootstrapSettings.kind`
-    mu_max: float | None  # greatest T/N above the force floor, smoothed as the settings say [-]
-    tau_max: float | None  # greatest tangential force over the contact area there [MPa]
-    normal_force: float | None  # mean over the steady window [N]
-    tangential_force: float | None  # mean over the steady window [N]
-    peak_normal: float | None  # [N]
-    peak_tangential: float | None  # [N]
-    readings: int  # in the steady window
-    zero: str  # where the zero came from
-    zero_drift: float | None  # how far the forces' zero moved from before the stroke to after it [N]
-    flaws: tuple[str, ...]
-    reasons: Mapping[str, str]  # for each number withheld, the flaw that forbids it
-    contact_area: float | None = None  # by which tau_max was told [mm2]
-    area_exponent: float = 0.0  # with which that area follows the normal force [-]
-    number: int = 1  # within its trial, or within a recording without trials, from 1
-    kept: bool = True  # False: a person left it out, and the model does not get it
-    decided: Mapping[str, str] = field(default_factory=dict[str, str])  # what a person decided, with who and why
+    trial: Annotated[int | None, Meaning("", "number of its trial")]  # None where the recording has no trials
+    # No onset where the recording begins in contact, no lift where it ends in contact, neither where no zero is known.
+    onset: Annotated[float | None, Meaning("s", "first contact, device clock")]
+    lift: Annotated[float | None, Meaning("s", "end of contact, device clock")]
+    steady: Annotated[Interval | None, Meaning("s", "steady window, device clock")]
+    # None where there is no stick phase
+    break_away: Annotated[
+        float | None, Meaning("s", "end of the stick phase: where T/N stops climbing, a change point, device clock")
+    ]
+    slide_onset: Annotated[float | None, Meaning("s", "from here on the centre of pressure slides, device clock")]
+    # Along +x of the face frame is +1.
+    direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back, as measured")]
+    # "centre of pressure", "tangential force" or "decision"
+    direction_from: Annotated[str | None, Meaning("", "what the direction was told from")]
+    heading: Annotated[
+        float | None, Meaning("deg", "angle of the movement, or else of the drag, from +x towards +y of the face")
+    ]
+    speed: Annotated[float | None, Meaning("mm/s", "of the centre of pressure over the steady window")]
+    speed_error: Annotated[float | None, Meaning("mm/s", "standard error of the speed")]
+    mu_static: Annotated[float | None, Meaning("", "height of the static peak of T/N")]  # None where none stands out
+    mu_dynamic: Annotated[float | None, Meaning("", "mean of T/N over the steady window")]
+    mu_dynamic_sd: Annotated[float | None, Meaning("", "standard deviation of T/N over the steady window")]
+    # The bootstrap's: see `BootstrapSettings.kind`.
+    mu_dynamic_interval: Annotated[Interval | None, Meaning("", "confidence interval of mu_dynamic")]
+    mu_max: Annotated[float | None, Meaning("", "greatest T/N")]  # smoothed as the settings say
+    tau_max: Annotated[float | None, Meaning("MPa", "greatest tangential force over the contact area")]
+    normal_force: Annotated[float | None, Meaning("N", "mean over the steady window")]
+    tangential_force: Annotated[float | None, Meaning("N", "mean over the steady window")]
+    peak_normal: Annotated[float | None, Meaning("N", "greatest normal force")]
+    peak_tangential: Annotated[float | None, Meaning("N", "greatest tangential force")]
+    readings: Annotated[int, Meaning("", "how many in the steady window")]
+    zero: Annotated[str, Meaning("", "where the zero of the forces came from")]
+    zero_drift: Annotated[float | None, Meaning("N", "how far the zero moved from before the stroke to after it")]
+    flaws: Annotated[tuple[str, ...], Meaning("", "names of what is wrong with it")]
+    contact_area: Annotated[float | None, Meaning("mm2", "by which tau_max was told")] = None
+    area_exponent: Annotated[float, Meaning("", "with which that area follows the normal force")] = 0.0
+    number: Annotated[int, Meaning("", "of the stroke within its trial, from 1")] = 1
+    kept: Annotated[bool, Meaning("", "false: a person left it out, and the model is not given it")] = True
+    decided: Annotated[Mapping[str, str], Meaning("", "what a person decided about it, who and why")] = field(
+        default_factory=dict[str, str]
+    )
+    reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")] = field(
+        default_factory=dict[str, str]
+    )
     curve: StrokeCurve | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return the stroke as plain data, without its curve."""
         return {column.name: getattr(self, column.name) for column in fields(self) if column.name != "curve"}
+
+
+def meanings() -> dict[str, Meaning]:
+    """Return the unit and the meaning of each number of a stroke, by its name, for those who read its tables."""
+    hints = get_type_hints(Stroke, include_extras=True)
+    return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}

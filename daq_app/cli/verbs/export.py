@@ -1,4 +1,4 @@
-"""Write a session in a format of others: csv, bids, hdf5 or nwb.
+"""Write a session in a format of others; --format lists them.
 
 Numbers kept in the session (analysis.json, prediction.json) go with it; the analysis is made where none was kept. An
 export as csv, bids or hdf5 can be imported again and is the session it was.
