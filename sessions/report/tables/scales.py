@@ -7,6 +7,7 @@ import numpy as np
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
 from sessions.report.wording import digits, p_value, places
 from sessions.statistics.pooling.findings import DescriptorFindings
+from sessions.statistics.scales.latent import JUDGEMENTS
 from sessions.statistics.scales.paired import Ends, PairedScale
 
 CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
@@ -21,6 +22,40 @@ def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
         " by maximum likelihood, with 95 % intervals of a bootstrap over subjects. Last row: what coming first adds."
     )
     return table("table-scales", caption, "surface | Bradley–Terry [logit] | Thurstone V [z]", groups, notes)
+
+
+def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
+    """Return the latent values of each surface by every kind of judgement, where there are others than scores."""
+    judgements = [kind for kind in JUDGEMENTS if any(kind in one.latent for one in descriptors)]
+    if judgements in ([], ["scores"]):
+        return None
+    notes = Notes()
+    groups: list[Group] = []
+    for one in descriptors:
+        means = {mean.index: mean.mean for mean in one.scores}
+        rows = (
+            (
+                Cell(str(index)),
+                notes.number(means.get(index), places(1), "no scores were given"),
+                *(_latent(one.latent.get(kind, {}).get(index), kind, notes) for kind in judgements),
+            )
+            for index in one.indices
+        )
+        groups.append(Group(one.descriptor, tuple(rows)))
+    heads = " | ".join(f"by {kind} [z]" for kind in judgements)
+    caption = (
+        "One latent scale, with mean 0. Its unit is the standard deviation of the difference of two judgements: √2 "
+        "times the scatter of single scores or log estimates, Thurstone's z of choices, the JND of comparisons by "
+        "0.674. 95 % intervals: bootstrap over subjects; of comparisons the JND's. People who differ count as scatter."
+    )
+    return table("table-latent", caption, f"surface | mean score [0–100] | {heads}", groups, notes)
+
+
+def _latent(found: Ends | None, kind: str, notes: Notes) -> Cell:
+    if found is None:
+        return notes.number(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
+    ends = None if found.low is None or found.high is None else (found.low, found.high)
+    return notes.estimate(found.value, places(2), None, ends, "too few subjects")
 
 
 def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:

@@ -10,7 +10,7 @@ from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_c
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.psychometric import compared_in_study, psychometric_table
 from sessions.report.tables.rivals import rivals_table
-from sessions.report.tables.scales import scales_table
+from sessions.report.tables.scales import latent_table, scales_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table
 from sessions.report.tables.study_trials import trials_table
@@ -33,6 +33,7 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
             _agreement(study),
             _estimates(study),
             scales_table(study.descriptors),
+            latent_table(study.descriptors),
             psychometric_table(compared_in_study(study)),
         ),
         "surfaces": (_surfaces(study), _forces(study)),

@@ -5,10 +5,13 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from sessions.statistics.pooling.averages import Average, average
 from sessions.statistics.pooling.visit import TrialRow, Visit
 from sessions.statistics.scales.constant_stimuli import Comparison, comparison, function_of
-from sessions.statistics.scales.paired import Choice
+from sessions.statistics.scales.latent import Judgement, of_comparisons, of_judgements
+from sessions.statistics.scales.paired import Choice, Ends, PairedScale
 from sessions.statistics.scales.psychometric import Psychometric
 from sessions.statistics.scales.stevens import Exponent, stevens_exponent
 
@@ -50,6 +53,27 @@ def constant_stimuli(trials: Sequence[tuple[Visit, TrialRow]]) -> ConstantStimul
     pse = [one.pse.value for one in functions.values() if one.pse is not None]
     jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
     return ConstantStimuli(functions, average(pse), average(jnd))
+
+
+def latent_scales(
+    trials: Sequence[tuple[Visit, TrialRow]], scales: Sequence[PairedScale], compared: ConstantStimuli | None
+) -> Mapping[Judgement, Mapping[int, Ends]]:
+    """Return the latent values of each surface by every kind of judgement that has some."""
+    scores = [(v.subject, row.index, row.score) for v, row in trials if row.score is not None]
+    logs = [(v.subject, row.index, math.log(row.estimate)) for v, row in trials if row.estimate and row.estimate > 0.0]
+    mu: defaultdict[int, list[float]] = defaultdict(list)
+    for _, row in trials:
+        if row.standard is not None and row.mu:
+            mu[row.index].append(math.log(row.mu))
+    jnd = None if compared is None else compared.jnd
+    found: dict[Judgement, Mapping[int, Ends]] = {"scores": of_judgements(scores), "estimates": of_judgements(logs)}
+    for scale in scales:
+        if scale.model == "Thurstone V":
+            found["choices"] = scale.values
+    if jnd is not None and jnd.low is not None and jnd.high is not None:
+        middle = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(mu.items())}
+        found["comparisons"] = of_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
+    return {judgement: values for judgement, values in found.items() if values}
 
 
 def exponent(trials: Sequence[tuple[Visit, TrialRow]]) -> Exponent | None:

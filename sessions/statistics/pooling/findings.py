@@ -1,7 +1,7 @@
 """What a study finds, as plain data, and the names of the effects it tells."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from sessions.prediction import SED
@@ -12,7 +12,8 @@ from sessions.statistics.pooling.averages import Average, Estimates
 from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.visit import Visit, VisitOptions
 from sessions.statistics.rivals import Rival
-from sessions.statistics.scales.paired import Consistence, PairedScale
+from sessions.statistics.scales.latent import Judgement
+from sessions.statistics.scales.paired import Consistence, Ends, PairedScale
 from sessions.statistics.scales.stevens import Exponent
 from sessions.statistics.scores import MeanScore, Relation
 from sessions.statistics.variance_components import Spread
@@ -96,6 +97,7 @@ class DescriptorFindings:
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
     paths: tuple[PathFinding, ...]  # () where they were not asked for
     constant_stimuli: ConstantStimuli | None = None  # None where nobody compared with a standard
+    latent: Mapping[Judgement, Mapping[int, Ends]] = field(default_factory=dict[Judgement, Mapping[int, Ends]])
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from sessions.prediction import SED, Quantity, shown_unit
 from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
 from sessions.statistics.multiverse import PathTrial, path_findings
-from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent
+from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent, latent_scales
 from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
 from sessions.statistics.pooling.exclusions import Exclusion, decided
 from sessions.statistics.pooling.findings import (
@@ -130,6 +130,8 @@ def _descriptor(
     points = [(v.subject, r, x, score) for v, r, x, score in answered if x is not None and score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
     chosen = choices(trials)
+    scales = tuple(paired_scale(chosen, model) for model in MODELS) if chosen else ()
+    compared = constant_stimuli(trials)
     competing = [_rival_trial(subject, r, score) for subject, r, _, score in points]
     return DescriptorFindings(
         descriptor=name,
@@ -150,7 +152,7 @@ def _descriptor(
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),
-        scales=tuple(paired_scale(chosen, model) for model in MODELS) if chosen else (),
+        scales=scales,
         consistence=consistence(chosen),
         on_response=_model([(p[0], p[1], p[3]) for p in points], quantity, response_term(quantity)),
         on_index=_model(scored, quantity, INDEX),
@@ -162,7 +164,8 @@ def _descriptor(
             options.area,
             within=True,
         ),
-        constant_stimuli=constant_stimuli(trials),
+        constant_stimuli=compared,
+        latent=latent_scales(trials, scales, compared),
     )
 
 
