@@ -15,13 +15,13 @@ from sessions.file_access import open_new, remedy
 from sessions.report import Report
 from sessions.report import tables as report_tables
 from sessions.report.figures import Panel, Plate, plates
-from sessions.report.prose import question, summary
+from sessions.report.prose import doubts, question, summary, told_apart
 from sessions.report.tables import Table
 from sessions.report.tables.cells import parted
 from sessions.report.templates import template
 
 HEAD = "<!DOCTYPE html>"
-BODY = {"table-scores", "table-strokes", "table-predictions", "table-relation", "table-rivals"}  # no appendix for them
+BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others stand in the appendix
 
 
 class ReportError(Exception):
@@ -39,6 +39,8 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
         report=report,
         question=question(report),
         summary=summary(report),
+        doubts=doubts(report),
+        told_apart=told_apart(report),
         figures=figures,
         drawing=drawn,
         data_address=partial(data_address, head=report.head if report.simulated else ""),
@@ -82,7 +84,7 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
 
 def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
-    order = ("scores", "course", "friction", "speed", "finger", "response", "relation", "paths", "forces")
+    order = ("relation", "scores", "course", "friction", "speed", "finger", "response", "paths", "forces")
     numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
     return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
 
@@ -92,16 +94,19 @@ def _contents(
 ) -> tuple[tuple[str, str], ...]:
     """Return anchor and words of the sections that the page has."""
     parts = (
-        ("who", "who and what", True),
+        ("relation", "prediction against score", "relation" in figures or bool(tables["relation"])),
+        ("friction", "friction", bool(tables["strokes"])),
+        ("predictions", "predicted responses", bool(tables["predictions"])),
+        ("rivals", "rivals", bool(tables["rivals"])),
+        ("who", "appendix: who and what", True),
         ("excluded", "excluded", True),
         ("scores", "scores", "scores" in figures),
-        ("friction", "forces and friction", "course" in figures or bool(tables["strokes"])),
-        ("predictions", "predicted responses", bool(tables["predictions"])),
-        ("relation", "prediction against score", bool(tables["relation"])),
+        ("course", "forces in time", "course" in figures or "friction" in figures),
+        ("responses", "responses", "finger" in figures or "response" in figures),
         ("paths", "many paths", "paths" in figures),
         ("model", "the model", bool(report.modelled or report.left_out)),
         ("again", "to do it again", True),
-        ("further", "appendix", further or "forces" in figures),
+        ("further", "further tables", further or "forces" in figures),
     )
     return tuple((anchor, words) for anchor, words, there in parts if there)
 

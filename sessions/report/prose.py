@@ -42,15 +42,25 @@ def summary(report: Report) -> tuple[str, ...]:
         values = [shown.factor * one[0] for one in told if one is not None]
         if values:
             sentences.append(_predicted(experiment, shown, (min(values), max(values)), report.model.split(",")[0]))
-            sentences += rivals_sentences(experiment.name, experiment.rivals)
         if experiment.paths:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
-    if any(p.sed is not None for p in report.predictions):
-        sentences += [*robustness(report), *report.other_signs]
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
         sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
+    excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
+    sentences.append(f"Excluded: {excluded}; flaws found: {flaws}; the appendix names each.")
     return tuple(sentences)
+
+
+def doubts(report: Report) -> tuple[str, ...]:
+    """Return what would change the sign between prediction and scores; nothing without a prediction."""
+    predicted = any(p.sed is not None for p in report.predictions)
+    return (*robustness(report), *report.other_signs) if predicted else ()
+
+
+def told_apart(report: Report) -> tuple[str, ...]:
+    """Return what scores can and cannot tell apart."""
+    return tuple(s for e in report.experiments if e.rivals for s in rivals_sentences(e.name, e.rivals))
 
 
 def _strokes(report: Report) -> str:

@@ -6,7 +6,18 @@ from itertools import chain
 from sessions.report.figures.study import study_plates
 from sessions.report.html import data_address, drawn, text_address
 from sessions.report.study_csv import columns_csv, trials_csv
-from sessions.report.study_prose import again, command, excluded, modelled, remarks, sealed, summary, versions, who
+from sessions.report.study_prose import (
+    again,
+    command,
+    excluded,
+    modelled,
+    remarks,
+    sealed,
+    summary,
+    told_apart,
+    versions,
+    who,
+)
 from sessions.report.tables.cells import parted
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
@@ -14,7 +25,7 @@ from sessions.report.templates import template
 from sessions.statistics.pooling.findings import StudyFindings
 
 # Tables that are no appendix; that of the trials stands under a heading of its own behind it.
-BODY = {"table-scores", "table-surfaces", "table-relation", "table-rivals", "table-models", "table-trials"}
+BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals", "table-trials"}
 QUESTION = (
     "People stroke surfaces and scale what they feel. Does the strain-energy density (SED) that a finger model "
     "predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
@@ -33,6 +44,7 @@ def study_page(study: StudyFindings, name: str) -> str:
         name=name,
         question=QUESTION,
         summary=summary(study),
+        told_apart=told_apart(study),
         sealed=sealed(study),
         who=who(study),
         excluded=excluded(study),

@@ -30,8 +30,6 @@ def summary(study: StudyFindings) -> list[str]:
     said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
     for one in study.descriptors:
         said += _related(one, study)
-        said += rivals_sentences(f"{one.descriptor}, by means over subjects", one.rivals_of_means)
-        said += rivals_sentences(f"{one.descriptor}, within subjects", one.rivals)
         said += scale_sentences(one)
         said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
     said += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
@@ -44,6 +42,16 @@ def summary(study: StudyFindings) -> list[str]:
             "the error of a transducer's calibration is one for all its strokes."
         )
     return said
+
+
+def told_apart(study: StudyFindings) -> list[str]:
+    """Return what scores can and cannot tell apart."""
+    return [
+        sentence
+        for one in study.descriptors
+        for kind, rivals in (("by means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
+        for sentence in rivals_sentences(f"{one.descriptor}, {kind}", rivals)
+    ]
 
 
 def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:

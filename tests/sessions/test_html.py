@@ -175,7 +175,7 @@ def test_a_report_without_plan_scores_or_predictions_shows_what_it_has():
         left_out=(),
     )
     seen = Words(page(bare))
-    assert "Forces and friction" in seen.words
+    assert "Friction" in seen.words
     assert not {
         "Scores",
         "Predicted responses",
@@ -396,3 +396,5 @@ def test_every_word_of_every_table_is_on_the_printed_a4_pages(text, tmp_path):
     long = {word for word in lost if len(word) > 60}  # longer than a line: it goes on in the next
     assert lost - long == set()
     assert {word for word in long if word not in re.sub(r"\s+", "", printed)} == set()
+    body = next(n for n, sheet in enumerate(printed.split("\f")) if "Appendix:" in sheet)
+    assert body <= 3

@@ -10,7 +10,7 @@ from scipy import optimize, stats
 from study_example import study
 
 from sessions.report.figures import picture
-from sessions.report.prose import summary
+from sessions.report.prose import told_apart
 from sessions.report.study_csv import rivals_csv
 from sessions.report.study_page import study_page
 from sessions.report.tables import tables
@@ -220,14 +220,14 @@ def test_weights_are_those_of_the_published_rule():
 
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
     report = example()
-    shown = next(one for one in tables(report)["relation"] if one.name == "table-rivals")
+    shown = next(one for one in tables(report)["rivals"] if one.name == "table-rivals")
     assert [row[0].text for row in shown.groups[0].rows] == [MODEL, GIVEN, "µ static", "τ max", "speed"]
     assert len(shown.caption.split()) <= 60
     drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
     assert "τ max +0.95" in drawn
     in_data = report.to_dict()["experiments"][0]["rivals"][1]["contrast"]
     assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
-    said = " ".join(summary(report))
+    said = " ".join(told_apart(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
     needed = cases_needed(*correlations_of(report.experiments[0]))
     assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in said

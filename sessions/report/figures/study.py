@@ -23,13 +23,13 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
     along = (paths_panel(one.descriptor, one.paths, simulated=simulated) for one in study.descriptors if one.paths)
     paths = tuple(panel for panel in along if panel is not None)
     plates = (
-        Plate("scores", SCORES, scores),
         Plate(
             "relation",
             f"Score against the {shown.label} {RELATION} Model: "
             f"{model_in_short(study.options.prediction, study.options.area)}.",
             relations,
         ),
+        Plate("scores", SCORES, scores),
         Plate("paths", CAPTION, paths),
     )
     return tuple(plate for plate in plates if plate.panels)

@@ -13,7 +13,7 @@ from sessions.report.tables.predictions import (
     prediction_table,
 )
 from sessions.report.tables.psychometric import compared_with_standard, psychometric_table
-from sessions.report.tables.rivals import rivals_table
+from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scores import answer_tables, relation_table, score_table
 from sessions.report.tables.strokes import course_table, planted_table, stroke_table
 
@@ -22,9 +22,10 @@ __all__ = ["Cell", "Column", "Group", "Table", "tables"]
 
 def tables(report: Report) -> dict[str, tuple[Table, ...]]:
     """Return the tables a report has numbers for, by section, in their order."""
-    compared = ((e.name, e.rivals) for e in report.experiments)
+    compared = [(e.name, e.rivals) for e in report.experiments]
+    quantity = BY_NAME[report.response].label
     sections = {
-        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
+        "relation": (relation_table(report),),
         "strokes": (stroke_table(report), course_table(report)),
         "predictions": (
             prediction_table(report),
@@ -33,11 +34,12 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             beside_table(report),
             beside_forces_table(report),
         ),
-        "afferent": (afferent_table(report),),
-        "relation": (
-            relation_table(report),
-            rivals_table(compared, BY_NAME[report.response].label, report.model),
+        "rivals": (
+            rivals_table(compared, quantity, report.model),
+            responses_table(compared, quantity, report.model),
         ),
+        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
+        "afferent": (afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }

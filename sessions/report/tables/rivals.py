@@ -1,6 +1,6 @@
 """Table and sentences of what else follows the scores beside the model's quantity, of a session as of a study."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from textwrap import fill
 
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
@@ -14,20 +14,39 @@ MANY = 3  # responses of the model that are no longer named one by one
 _LINE = 44  # characters that a line of a picture's title has room for
 
 
-def rivals_table(compared: Iterable[tuple[str, Sequence[Rival]]], quantity: str, model: str) -> Table | None:
-    """Return the rivals of a quantity in each group that is named; `model` says in short which model it is of."""
+Compared = Sequence[tuple[str, Sequence[Rival]]]  # name of a group, and its rivals
+
+
+def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
+    """Return what was measured beside a quantity of the model in each group; `model` says in short which model it is.
+
+    The model's other quantities stand in `responses_table`.
+    """
+    caption = (
+        f"r of scores with the {quantity} ({model}) and with what was measured. Differences: with both r made "
+        "positive; Zou (2007), Steiger (1980), within subjects by bootstrap. Left-out error: of surfaces left out, "
+        "root mean square. AIC: crossed mixed models. Exploratory, not corrected."
+    )
+    return _table("table-rivals", caption, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
+
+
+def responses_table(compared: Compared, quantity: str, model: str) -> Table | None:
+    """Return the model's other quantities beside one of them, as `rivals_table` has what was measured."""
+    caption = f"The same of the model's other responses ({model}) beside the {quantity}."
+    return _table("table-responses", caption, compared, quantity, lambda name: name != quantity and name in RESPONSES)
+
+
+def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: Callable[[str], bool]) -> Table | None:
     notes = Notes()
-    groups = [Group(name, tuple(_row(rival, quantity, notes) for rival in rivals)) for name, rivals in compared]
+    groups = [
+        Group(name, tuple(_row(rival, quantity, notes) for rival in rivals if shown(rival.name)))
+        for name, rivals in compared
+    ]
     columns = (
         f"quantity | n | r | {quantity}'s r less this | Steiger's Z | p | r given the model's µ | "
         "left-out error [0–100] | AIC weight"
     )
-    caption = (
-        f"r of scores with the {quantity} ({model}) and rivals. Differences: with both r made positive; Zou (2007), "
-        "Steiger (1980), within subjects by bootstrap. Left-out error: of surfaces left out, root mean square. AIC: "
-        "crossed mixed models. Exploratory, not corrected."
-    )
-    return table("table-rivals", caption, columns, groups, notes)
+    return table(anchor, caption, columns, groups, notes)
 
 
 def rival_words(rivals: Sequence[Rival]) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
 from sessions.report.wording import digits, p_value, places
 from sessions.statistics.pooling.findings import DescriptorFindings
-from sessions.statistics.scales.latent import JUDGEMENTS
+from sessions.statistics.scales.latent import JUDGEMENTS, Judgement
 from sessions.statistics.scales.paired import Ends, PairedScale
 
 CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
@@ -26,7 +26,7 @@ def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
 
 def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the latent values of each surface by every kind of judgement, where there are others than scores."""
-    judgements = [kind for kind in JUDGEMENTS if any(kind in one.latent for one in descriptors)]
+    judgements: list[Judgement] = [kind for kind in JUDGEMENTS if any(kind in one.latent for one in descriptors)]
     if judgements in ([], ["scores"]):
         return None
     notes = Notes()
@@ -37,7 +37,7 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
             (
                 Cell(str(index)),
                 notes.number(means.get(index), places(1), "no scores were given"),
-                *(_latent(one.latent.get(kind, {}).get(index), kind, notes) for kind in judgements),
+                *(_latent(one, kind, index, notes) for kind in judgements),
             )
             for index in one.indices
         )
@@ -51,7 +51,9 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     return table("table-latent", caption, f"surface | mean score [0–100] | {heads}", groups, notes)
 
 
-def _latent(found: Ends | None, kind: str, notes: Notes) -> Cell:
+def _latent(one: DescriptorFindings, kind: Judgement, index: int, notes: Notes) -> Cell:
+    values = one.latent.get(kind)
+    found = None if values is None else values.get(index)
     if found is None:
         return notes.number(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
     ends = None if found.low is None or found.high is None else (found.low, found.high)

@@ -9,7 +9,7 @@ from sessions.report.responses import shown_response
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
 from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.psychometric import compared_in_study, psychometric_table
-from sessions.report.tables.rivals import rivals_table
+from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import latent_table, scales_table
 from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table
@@ -25,7 +25,7 @@ from sessions.statistics.within_subjects import RepeatedCorrelation
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
     """Return the tables a study has numbers for, by section."""
     sections = {
-        "visits": (_visits(study),),
+        "relation": (_relation(study),),
         "scores": (
             _scores(study),
             _normalised(study),
@@ -37,7 +37,9 @@ def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
             psychometric_table(compared_in_study(study)),
         ),
         "surfaces": (_surfaces(study), _forces(study)),
-        "relation": (_relation(study), _rivals(study), models_table(study)),
+        "rivals": _rivals(study),
+        "models": (models_table(study),),
+        "visits": (_visits(study),),
         "paths": (paths_table((one.descriptor, one.paths) for one in study.descriptors),),
         "planted": (planted_table(study), flaws_table(study)),
         "trials": (trials_table(study),),
@@ -306,14 +308,15 @@ def _relation(study: StudyFindings) -> Table | None:
     return table("table-relation", caption, columns, groups, notes)
 
 
-def _rivals(study: StudyFindings) -> Table | None:
+def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
     kinds = [
         (one.descriptor, kind, rivals)
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
     model, label = model_in_short(study.options.prediction, study.options.area), BY_NAME[study.response].label
-    return rivals_table(((f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds), label, model)
+    compared = [(f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds]
+    return rivals_table(compared, label, model), responses_table(compared, label, model)
 
 
 def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:
