@@ -157,31 +157,31 @@ class _Repeats:
 
     def all(self) -> dict[str, Array]:
         """Return the numbers (repeats,) of each repeat, by name."""
-        found: dict[str, Array] = {}
+        numbers: dict[str, Array] = {}
         if self._stroke.tau_max is not None and self._stroke.peak_tangential:
             area = self._stroke.contact_area or self._stroke.peak_tangential / self._stroke.tau_max
             curve = self._curve
             at = int(np.nanargmax(curve.tangential if curve.crests is None else curve.crests))
             of_normal, _ = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
             top = self._top(curve.tangential, self._noise_t) if curve.crests is None else self._crest(curve.crests)
-            moved = self._zero_t + top + of_normal * curve.normal[at]
-            peak = self._stroke.tau_max * area * self._gain_t + moved
-            found["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
-            found["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + moved
+            shift = self._zero_t + top + of_normal * curve.normal[at]
+            peak = self._stroke.tau_max * area * self._gain_t + shift
+            numbers["tau_max"] = peak / (area * self._gain_n**self._stroke.area_exponent)
+            numbers["peak_tangential"] = self._stroke.peak_tangential * self._gain_t + shift
         for name in ("mu_static", "mu_max"):
             value = getattr(self._stroke, name)
             if value is not None:
-                found[name] = self._single(value)
+                numbers[name] = self._single(value)
         window = self._window()
         if window is not None:
-            found |= window
+            numbers |= window
         if self._stroke.peak_normal is not None:
             top = self._top(self._curve.normal, self._noise_n)
             at = int(np.nanargmax(self._curve.normal))
             _, of_drag = self._shared.shares(drag_direction(self._curve.force[at : at + 1]))
-            moved = self._zero_n + of_drag * self._curve.tangential[at]
-            found["peak_normal"] = self._stroke.peak_normal * self._gain_n + moved + top
-        return found | self._instants(found.get("speed")) | self._onset()
+            shift = self._zero_n + of_drag * self._curve.tangential[at]
+            numbers["peak_normal"] = self._stroke.peak_normal * self._gain_n + shift + top
+        return numbers | self._instants(numbers.get("speed")) | self._onset()
 
     def _crest(self, force: Array) -> Array:
         """Return how far the true greatest unfiltered force may lie from the one told (repeats,) [N]."""
@@ -222,15 +222,15 @@ class _Repeats:
             [curve.ratio, 1.0 / curve.normal, curve.time, curve.position, curve.normal, curve.tangential, curve.force]
         )
         length = max(1, round(settings.block / self._step))
-        held = columns[inside]
-        count = len(held) // length
+        window = columns[inside]
+        count = len(window) // length
         if count < settings.fewest_blocks:
             return None
-        blocks = held[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
-        chosen, weight, kept = self._chosen(count)
-        drawn = blocks[chosen]  # (repeats, blocks, 9)
+        blocks = window[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
+        positions, weight, own = self._sample(count)
+        sample = blocks[positions]  # (repeats, blocks, 9)
         total = weight.sum(axis=1)
-        means = np.einsum("rbc,rb->rc", drawn, weight) / total[:, None]
+        means = np.einsum("rbc,rb->rc", sample, weight) / total[:, None]
         # A mean of few blocks, or of blocks that are alike, strays further than drawing them shows.
         further, free = mean_inflation(blocks[:, 0], settings)
         further *= np.sqrt(total / np.maximum(total - 1.0, 1.0) * free / self._draw.chisquare(free, len(total)))
@@ -239,29 +239,29 @@ class _Repeats:
         along = drag_direction(curve.force[inside])
         of_normal, of_drag = self._shared.shares(along)
         from_zero = (self._zero_t - self._stroke.mu_dynamic * self._zero_n) * lightness
-        found = {"mu_dynamic": self._shared.ratio(mu, along) + from_zero}
+        numbers = {"mu_dynamic": self._shared.ratio(mu, along) + from_zero}
         if self._stroke.normal_force is not None and self._stroke.tangential_force is not None:
             # A force may change along the stroke: its mean is that of a window, not of blocks drawn again. Windows are
             # drawn inwards, where N may be greater, but might have been wider too: about their own mean.
-            other = kept @ blocks[:, 5:7] / total[:, None]
+            other = own @ blocks[:, 5:7] / total[:, None]
             other -= other.mean(axis=0)
             pressing, dragging = self._stroke.normal_force, self._stroke.tangential_force
             shared_n, shared_t = of_drag * dragging + self._zero_n, of_normal * pressing + self._zero_t
-            found["normal_force"] = (pressing + other[:, 0]) * self._gain_n + shared_n
-            found["tangential_force"] = (dragging + other[:, 1]) * self._gain_t + shared_t
+            numbers["normal_force"] = (pressing + other[:, 0]) * self._gain_n + shared_n
+            numbers["tangential_force"] = (dragging + other[:, 1]) * self._gain_t + shared_t
         way = means[:, 7:] + self._zero_t_sd * self._draw.standard_normal((len(means), 2))
         if self._stroke.speed is not None and np.isfinite(blocks[:, 3:5]).all():
-            way = self._slopes(drawn, weight) * self._shared.gain_torque[:, None]
-            found["speed"] = np.hypot(way[:, 0], way[:, 1]) / (self._gain_n + of_drag * self._stroke.mu_dynamic)
+            way = self._slopes(sample, weight) * self._shared.gain_torque[:, None]
+            numbers["speed"] = np.hypot(way[:, 0], way[:, 1]) / (self._gain_n + of_drag * self._stroke.mu_dynamic)
         if self._stroke.heading is not None:
-            found["heading"] = self._headings(way, self._stroke.heading)
-        return found
+            numbers["heading"] = self._headings(way, self._stroke.heading)
+        return numbers
 
-    def _headings(self, way: Array, told: float) -> Array:
+    def _headings(self, way: Array, heading: float) -> Array:
         """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near the angle told as whole turns allow."""
         uneven = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(way))  # of two gains
         angle = np.degrees(np.arctan2(way[:, 1] * uneven, way[:, 0]))
-        return told + (angle - told + 180.0) % 360.0 - 180.0
+        return heading + (angle - heading + 180.0) % 360.0 - 180.0
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
         """Return the instants (repeats,) that the analysis told and nobody decided."""
@@ -280,8 +280,8 @@ class _Repeats:
         if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
             noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
-            told = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
-            draws = slide_onset_draws(curve.time[part], curve.speed[part], told, noise, self._draw)
+            threshold = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
+            draws = slide_onset_draws(curve.time[part], curve.speed[part], threshold, noise, self._draw)
             found |= {} if draws is None else {"slide_onset": draws}
         return found
 
@@ -301,23 +301,23 @@ class _Repeats:
         draws = onset_draws((curve.time, curve.unfiltered), onset, noise, wrong, self._settings, self._draw)
         return {} if draws is None else {"onset": draws}
 
-    def _chosen(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
+    def _sample(self, count: int) -> tuple[NDArray[np.int64], Array, Array]:
         """Return blocks drawn for each repeat (repeats, count); 1 for those that fit into its window; 1 for its own."""
         repeats = self._settings.repeats
         trim = self._settings.inwards * count * self._draw.uniform(size=(2, repeats))
         first, stop = np.floor(trim[0]), count - np.floor(trim[1])
         stop = np.maximum(stop, first + min(count, 3))
         first = np.minimum(first, stop - 3)
-        held = stop - first
-        chosen = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * held[:, None])
-        weight = (np.arange(count) < held[:, None]).astype(np.float64)
+        length = stop - first
+        positions = first[:, None] + np.floor(self._draw.uniform(size=(repeats, count)) * length[:, None])
+        weight = (np.arange(count) < length[:, None]).astype(np.float64)
         places = np.arange(count)
         own = (places >= first[:, None]) & (places < stop[:, None])
-        return np.clip(chosen, 0, count - 1).astype(np.int64), weight, own.astype(np.float64)
+        return np.clip(positions, 0, count - 1).astype(np.int64), weight, own.astype(np.float64)
 
-    def _slopes(self, drawn: Array, weight: Array) -> Array:
+    def _slopes(self, sample: Array, weight: Array) -> Array:
         """Return the slope of position on time (repeats, 2) [mm/s] over the blocks drawn."""
         total = weight.sum(axis=1)[:, None]
-        time, moved = drawn[:, :, 2], drawn[:, :, 3:5]
+        time, moved = sample[:, :, 2], sample[:, :, 3:5]
         t = time - (time * weight).sum(axis=1)[:, None] / total
         return ((t * weight)[:, :, None] * moved).sum(axis=1) / np.maximum((t**2 * weight).sum(axis=1), 1e-9)[:, None]

@@ -42,7 +42,7 @@ class BootstrapSettings:
     @classmethod
     def of(cls, settings: AnalysisSettings, tilt: Tilt | None) -> "BootstrapSettings":
         """Return what the intervals of an analysis are drawn from; `tilt` is what its presses tell, if any."""
-        drawn = cls(
+        bootstrap = cls(
             seed=settings.bootstrap_seed,
             gain_error=settings.gain_uncertainty,
             gain_error_origin="assumed" if settings.gain_error is None else "set",
@@ -55,10 +55,10 @@ class BootstrapSettings:
             tilt is None or len(tilt.presses) < settings.press.press_fewest
         ):  # of fewer, the hand's own push is not known
             prior = settings.systematic.tilt_prior
-            return replace(drawn, tilt_error=(prior, prior))
+            return replace(bootstrap, tilt_error=(prior, prior))
         rest = (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
         origin = f"by {len(tilt.presses)} presses"
-        return replace(drawn, tilt=rest, tilt_error=tilt.error(settings.confidence), tilt_origin=origin)
+        return replace(bootstrap, tilt=rest, tilt_error=tilt.error(settings.confidence), tilt_origin=origin)
 
     @property
     def kind(self) -> str:

@@ -35,12 +35,12 @@ def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: Anal
     events = detector.feed(time, normal)
     onsets = [event.time for event in events if isinstance(event, Onset)]
     lifts: list[float | None] = [event.time for event in events if isinstance(event, Lift)]
-    found: list[Contact] = []
+    pieces: list[Contact] = []
     for onset, lift in zip(onsets, lifts + [None] * (len(onsets) - len(lifts)), strict=True):
         start = int(np.searchsorted(time, onset))
         stop = len(time) if lift is None else int(np.searchsorted(time, lift))
-        found.append(Contact(start, stop, None if start == 0 else onset, lift))
-    return tuple(found)
+        pieces.append(Contact(start, stop, None if start == 0 else onset, lift))
+    return tuple(pieces)
 
 
 def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: AnalysisSettings) -> tuple[Contact, ...]:
@@ -68,14 +68,14 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
 
 def _bridged(time: Array, force: Array, longest: float) -> Array:
     """Return forces (n,) [N] with straight lines in place of nan; 0 where a line would cross a gap of `longest` [s]."""
-    held = np.flatnonzero(np.isfinite(force))
-    if not len(held):
+    finite = np.flatnonzero(np.isfinite(force))
+    if not len(finite):
         return np.zeros_like(force)
     gaps = np.concatenate([[0], np.cumsum(np.diff(time) > longest)])  # before each reading
     number = np.arange(len(force))
-    after = held[np.minimum(np.searchsorted(held, number), len(held) - 1)]
-    before = held[np.maximum(np.searchsorted(held, number, "right") - 1, 0)]
-    return np.where(gaps[after] == gaps[before], np.interp(number, held, force[held]), np.nan_to_num(force))
+    after = finite[np.minimum(np.searchsorted(finite, number), len(finite) - 1)]
+    before = finite[np.maximum(np.searchsorted(finite, number, "right") - 1, 0)]
+    return np.where(gaps[after] == gaps[before], np.interp(number, finite, force[finite]), np.nan_to_num(force))
 
 
 def _piece(contact: Contact, start: int, stop: int, time: Array, normal: Array, settings: AnalysisSettings) -> Contact:
@@ -143,12 +143,13 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     normal = -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
     with np.errstate(invalid="ignore"):
-        held = np.flatnonzero(normal >= floor)
-    if len(held) < 2:
+        at = np.flatnonzero(normal >= floor)
+    if len(at) < 2:
         return []
-    firsts = np.flatnonzero(np.diff(np.floor((time[held] - time[held[0]]) / settings.contact.turn_block), prepend=-1.0))
-    counts = np.diff(np.append(firsts, len(held)))
-    force, pressed = (np.add.reduceat(column[held], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
+    block_number = np.floor((time[at] - time[at[0]]) / settings.contact.turn_block)
+    firsts = np.flatnonzero(np.diff(block_number, prepend=-1.0))
+    counts = np.diff(np.append(firsts, len(at)))
+    force, pressed = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
     if unsure > settings.zero.drift_refused * float(np.median(drag)):  # nothing of the drag will be told
         return []
@@ -156,24 +157,24 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
         (drag >= settings.contact.turn_share * float(np.median(drag / pressed)) * pressed)
         & (drag > settings.contact.turn_unsure * unsure)
     )
-    lasts = held[np.append(firsts[1:], len(held)) - 1]
+    lasts = at[np.append(firsts[1:], len(at)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
         if runs and float(force[:, runs[-1][-settings.contact.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
-    found = [
-        _DragRun(int(held[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs
+    every_run = [
+        _DragRun(int(at[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs
     ]
-    greatest = max((way.drag for way in found), default=0.0)
-    longest = max((float(time[way.last] - time[way.first]) for way in found), default=0.0)
+    greatest = max((way.drag for way in every_run), default=0.0)
+    longest = max((float(time[way.last] - time[way.first]) for way in every_run), default=0.0)
     shortest = max(
         settings.contact.shortest_stroke - settings.contact.turn_block, settings.contact.turn_shortest * longest
     )
     ways: list[_DragRun] = []
     dropped = False  # since the last way
-    for way in found:
+    for way in every_run:
         if time[way.last] - time[way.first] < shortest or way.drag < settings.contact.light_share * greatest:
             dropped = True
         elif ways and dropped and float(ways[-1].push @ way.push) >= 0.0:

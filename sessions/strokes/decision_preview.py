@@ -16,14 +16,14 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
         return decision
     if decision.what == "tilt":
         return replace(decision, old=analysis.settings.tilt)
-    found = [stroke for stroke in analysis.strokes if stroke.trial == decision.trial]
+    strokes = [stroke for stroke in analysis.strokes if stroke.trial == decision.trial]
     if decision.stroke is None:
-        given = next((one.stroke for one in analysis.friction if one.trial == decision.trial), None)
-        return replace(decision, old=None if given is None else analysis.strokes[given].number)
-    for stroke in found:
+        position = next((one.stroke for one in analysis.friction if one.trial == decision.trial), None)
+        return replace(decision, old=None if position is None else analysis.strokes[position].number)
+    for stroke in strokes:
         if stroke.number == decision.stroke:
             return replace(decision, old=_stands(stroke, decision.what))
-    there = f"it has {len(found)}" if found else "none was found in it"
+    there = f"it has {len(strokes)}" if strokes else "none was found in it"
     raise DecisionError(f"there is no {decision.of}: {there}")
 
 
@@ -32,16 +32,16 @@ def preview(recording: Recording, decision: Decision, before: Decisions, now: An
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    found = analyse(
+    after = analyse(
         recording,
         AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error),
         before.with_line(decision),
     )
-    known = {flaw.sentence for flaw in now.flaws}
-    for flaw in found.flaws:
-        if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:
+    before_sentences = {flaw.sentence for flaw in now.flaws}
+    for flaw in after.flaws:
+        if flaw.name is FlawName.DECISION and flaw.sentence not in before_sentences and decision.undoes is None:
             raise DecisionError(flaw.sentence)
-    return found
+    return after
 
 
 def _stands(stroke: Stroke, what: str) -> Value:

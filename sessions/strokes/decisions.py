@@ -142,13 +142,13 @@ class StrokeDecisions:
 
     def instant(self, what: str) -> float | None:
         """Return an instant [s] that was decided."""
-        found = self.of.get(what)
-        return None if found is None else float(cast("float", found.new))
+        decision = self.of.get(what)
+        return None if decision is None else float(cast("float", decision.new))
 
     def span(self, what: str) -> Span | None:
         """Return two instants [s] that were decided."""
-        found = self.of.get(what)
-        return None if found is None else cast("Span", found.new)
+        decision = self.of.get(what)
+        return None if decision is None else cast("Span", decision.new)
 
     @property
     def direction(self) -> int | None:
@@ -189,13 +189,13 @@ class Decisions:
     def standing(self) -> tuple[Decision, ...]:
         """Return the lines that are not undone, in order."""
         undone: set[int] = set()
-        kept: list[Decision] = []
+        standing: list[Decision] = []
         for decision in reversed(self.lines):  # whatever undoes a line comes after it
             if decision.number not in undone:
-                kept.append(decision)
+                standing.append(decision)
                 if decision.undoes is not None:
                     undone.add(decision.undoes)
-        return tuple(reversed(kept))
+        return tuple(reversed(standing))
 
     def of_stroke(self, trial: int | None, stroke: int) -> StrokeDecisions:
         """Return what is in force of a stroke, its number counted within the trial from 1."""
@@ -240,8 +240,8 @@ def parse(content: bytes) -> Decisions:
     """Return the decisions in the bytes of a file."""
     lines: list[Decision] = []
     problems: list[str] = []
-    *whole, rest = content.split(b"\n")
-    for place, line in enumerate(whole, 1):
+    *complete, rest = content.split(b"\n")
+    for place, line in enumerate(complete, 1):
         found = _decision(line)
         if isinstance(found, str):
             problems.append(f"line {place} of {DECISIONS} is left out: {found}")
@@ -269,15 +269,15 @@ def append(recording: "Recording", decision: Decision) -> Decision:
     try:
         torn = bool(content) and not content.endswith(b"\n")
         number = max(before.with_line(decision).lines[-1].number, content.count(b"\n") + torn + 1)
-        made = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
+        recorded = replace(decision, number=number, made_utc=datetime.now(UTC).isoformat(timespec="seconds"))
         ending = b"\n" if torn else b""  # a torn line stays, as a line of its own
         with path.open("ab") as file:
-            file.write(ending + _line(made, recording.simulated_sentence))
+            file.write(ending + _line(recorded, recording.simulated_sentence))
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
         raise RecordingError(f"{path} cannot be written ({error.strerror}); {remedy(error)}") from error
-    return made
+    return recorded
 
 
 def _line(decision: Decision, simulated: str | None) -> bytes:

@@ -11,14 +11,14 @@ def doubtful_readings(recording: Recording) -> Iterator[str]:
     """Yield a sentence, the flaw's name first, for each cause that makes recorded readings doubtful."""
     if recording.info is None:
         return
-    told = StatusCount(recording.info.status)
+    count = StatusCount(recording.info.status)
     for block in recording.blocks():
-        told.take(block.status)
-    said = flagged_words(told.flagged)
-    if faulty := told.verdicts["doubtful"]:
-        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device told of a fault: {said}"
-    if saturated := told.verdicts["saturated"]:
-        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device told: {said}"
+        count.take(block.status)
+    words = flagged_words(count.flagged)
+    if faulty := count.verdicts["doubtful"]:
+        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device told of a fault: {words}"
+    if saturated := count.verdicts["saturated"]:
+        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device told: {words}"
     if unsure := sum(event.data.get("off_units", 0) for event in recording.events if event.kind == "losses"):
         yield (
             f"{FlawName.RECORDING}: the last {unsure} readings of a stream are doubtful, the device was found to "

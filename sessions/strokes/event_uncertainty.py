@@ -36,12 +36,12 @@ def onset_draws(
     if at == 0 or len(time) < at + fewest or force[at - 1] > onset_threshold(noise, detector):
         return None
     climbing = force[at:] < 2.0 * max(detector.leave_noise * noise, float(force[at]))
-    held = slice(at - 1, at + max(fewest, int(np.argmin(climbing)) + 1))
-    step = float(np.median(np.diff(time[held])))
+    part = slice(at - 1, at + max(fewest, int(np.argmin(climbing)) + 1))
+    step = float(np.median(np.diff(time[part])))
     # Skin stiffens as it is pressed: a force that bends upwards was less steep where it left the noise.
-    bend, slope, _ = np.polyfit(time[held] - (onset - step / 2.0), force[held], 2).tolist()
-    whole = float(np.polyfit(time[held], force[held], 1)[0])
-    slope = max(slope if bend > 0.0 else whole, settings.onset_steep * whole)
+    bend, slope, _ = np.polyfit(time[part] - (onset - step / 2.0), force[part], 2).tolist()
+    chord = float(np.polyfit(time[part], force[part], 1)[0])
+    slope = max(slope if bend > 0.0 else chord, settings.onset_steep * chord)
     if slope <= 0.0:
         return None
     reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
@@ -50,8 +50,8 @@ def onset_draws(
     since = places + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
     within = slope * since + noise * draw.standard_normal(since.shape) <= 0.0
     last = np.where(within.any(axis=1), since.shape[1] - 1 - np.argmax(within[:, ::-1], axis=1), -1)
-    told = since[:, 0] + (last + 1) * step  # the reading after the last within the noise
-    return onset - told + zero / slope
+    crossing = since[:, 0] + (last + 1) * step  # the reading after the last within the noise
+    return onset - crossing + zero / slope
 
 
 def break_away_draws(
@@ -71,22 +71,22 @@ def break_away_draws(
     first order.
     """
     last = float(columns[0][-1])
-    held = np.isfinite(columns[1])
-    time, ratio, normal = (column[held] for column in columns)
+    finite = np.isfinite(columns[1])
+    time, ratio, normal = (column[finite] for column in columns)
 
     def readings(until: float) -> tuple[ClimbReadings, Array]:
         t, y, n = (thin(column[time <= until], settings.climb.climb_most) for column in (time, ratio, normal))
         return ClimbReadings(t, y, settings.climb), n
 
-    whole = readings(last)[0].fit(settings.block, peaked=peaked)
-    if whole is None:
+    climb = readings(last)[0].fit(settings.block, peaked=peaked)
+    if climb is None:
         return None
-    bends = whole.bend != 1.0
+    bends = climb.bend != 1.0
     draws: list[Array] = []
     for number, part in enumerate(np.array_split(np.arange(len(zero[0])), settings.climb_ends)):
         series, n = readings(last + (shortest - last) * number / (settings.climb_ends - 1))
         t, y = series.time, series.ratio
-        fit = series.refine(whole, bends=bends)
+        fit = series.refine(climb, bends=bends)
         if fit.rise <= 0.0:
             return None
         edges = np.flatnonzero(np.diff(np.floor((t - t[0]) / settings.block), prepend=-1.0))
@@ -103,17 +103,19 @@ def break_away_draws(
     return np.concatenate(draws)
 
 
-def slide_onset_draws(time: Array, speed: Array, told: Array, noise: Array, draw: np.random.Generator) -> Array | None:
+def slide_onset_draws(
+    time: Array, speed: Array, least_speed: Array, noise: Array, draw: np.random.Generator
+) -> Array | None:
     """Return from when the centre of pressure may have slid (repeats,) [s]; None where its speed is not known.
 
-    `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `told` is the
-    speed at which the slide has begun, `noise` how wrong that of the centre of pressure may be (repeats,) [mm/s]. Where
+    `speed` (n,) [mm/s] at `time` (n,) [s], from the contact's onset on, reaches to the steady window; `least_speed` is
+    that at which the slide has begun, `noise` how wrong that of the centre of pressure may be (repeats,) [mm/s]. Where
     it was as fast as that when its speed was first known, it may have begun to slide at any instant before.
     """
     slow = np.flatnonzero(~np.isfinite(speed))
     first = int(slow[-1]) + 1 if len(slow) else 0
     if len(speed) - first < 2:
         return None
-    kept = np.minimum.accumulate(speed[first:][::-1])[::-1]  # the least speed from each instant on
-    found = np.interp(told - noise, kept, time[first:])
-    return np.where(told - noise < kept[0], draw.uniform(time[0], time[first], len(told)), found)
+    least = np.minimum.accumulate(speed[first:][::-1])[::-1]  # the least speed from each instant on
+    onsets = np.interp(least_speed - noise, least, time[first:])
+    return np.where(least_speed - noise < least[0], draw.uniform(time[0], time[first], len(least_speed)), onsets)

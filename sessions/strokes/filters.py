@@ -44,14 +44,14 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
 
 def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
     """Return where values (n,) are greatest among their neighbours (p,), and how far each stands out of them (p,)."""
-    found, standing = (_compiled("_peak_finding_utils", name) for name in ("_local_maxima_1d", "_peak_prominences"))
-    if found is None or standing is None:
+    maxima, prominences = (_compiled("_peak_finding_utils", name) for name in ("_local_maxima_1d", "_peak_prominences"))
+    if maxima is None or prominences is None:
         from scipy import signal
 
-        places, told = signal.find_peaks(values, prominence=0.0)
-        return places, told["prominences"]
-    places = found(values)[0]
-    return places, standing(values, places, -1)[0]
+        places, properties = signal.find_peaks(values, prominence=0.0)
+        return places, properties["prominences"]
+    places = maxima(values)[0]
+    return places, prominences(values, places, -1)[0]
 
 
 @cache

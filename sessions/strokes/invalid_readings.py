@@ -27,15 +27,15 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
             settings.wild_noise * NORMAL_STEP * float(np.median(steps)),
             settings.wild_coarse * float(moving.min()),
         )
-        found = [
+        spikes_found = [
             (at, w)
             for w in range(1, settings.wild_widest + 1)
             for at in _candidates(np.diff(column), w, floor, settings).tolist()
         ]
         alike = np.zeros(len(column), np.bool_)  # these may be wild: none of them says what is usual around another
-        for at, width in found:
+        for at, width in spikes_found:
             alike[at : at + width] = True
-        for at, width in found:
+        for at, width in spikes_found:
             if not marked[at : at + width, axis].any() and _stands_out(column, alike, at, width, settings):
                 marked[at : at + width, axis] = True
     return marked
@@ -44,8 +44,8 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
 def _candidates(steps: Array, width: int, floor: float, settings: SignalSettings) -> NDArray[np.int64]:
     """Return where `width` readings begin that more than `floor` leads to and back from, with neighbours beside."""
     there, back = steps[:-width], steps[width:]
-    found = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
-    return found[(found >= settings.wild_neighbours) & (found + width + settings.wild_neighbours <= len(steps) + 1)]
+    places = np.flatnonzero((np.minimum(np.abs(there), np.abs(back)) > floor) & (there * back < 0.0)) + 1
+    return places[(places >= settings.wild_neighbours) & (places + width + settings.wild_neighbours <= len(steps) + 1)]
 
 
 def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: SignalSettings) -> bool:
@@ -55,16 +55,16 @@ def _stands_out(column: Array, alike: Mask, at: int, width: int, settings: Signa
     usual = np.abs(np.concatenate([np.diff(before), np.diff(after)]))
     if len(usual) < settings.wild_fewest or min(len(before), len(after)) < settings.wild_neighbours:
         return False
-    beside = np.concatenate([before[: settings.wild_neighbours], after[: settings.wild_neighbours]])
+    neighbours = np.concatenate([before[: settings.wild_neighbours], after[: settings.wild_neighbours]])
     inside = column[at : at + width]
-    height = max(float(inside.min() - beside.max()), float(beside.min() - inside.max()))
+    height = max(float(inside.min() - neighbours.max()), float(neighbours.min() - inside.max()))
     return height > settings.wild_steps * float(usual.max())
 
 
 def _sound(column: Array, alike: Mask, places: range) -> Array:
     """Return the readings at places, in their order, without those that are `alike`."""
-    held = np.array(places, np.int64)
-    return column[held[~alike[held]]]
+    positions = np.array(places, np.int64)
+    return column[positions[~alike[positions]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +87,10 @@ def constant_runs(time: Array, raw: Array, ignored: Mask, settings: SignalSettin
     return tuple(found for axis in range(raw.shape[1]) for found in _of_axis(axis, time, raw, ignored, settings))
 
 
-def at_the_same_value(raw: Array, found: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
+def at_the_same_value(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:
     """Mark the readings (n,) of frozen runs; or, `clipped`, all those at a value at which an axis was clipped."""
     marked = np.zeros(len(raw), np.bool_)
-    for one in found:
+    for one in runs:
         if one.clipped != clipped:
             continue
         if clipped:
@@ -112,7 +112,7 @@ def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: Signal
         return []
     sound = column[~ignored]
     ends = (float(sound.min()), float(sound.max())) if len(sound) else ()
-    found: list[ConstantRun] = []
+    constant: list[ConstantRun] = []
     for value in np.unique(column[firsts[candidates]]).tolist():
         runs = candidates[column[firsts[candidates]] == value]
         moving = np.array([_others_move(axis, time, raw, (int(firsts[at]), int(lasts[at])), settings) for at in runs])
@@ -124,8 +124,8 @@ def _of_axis(axis: int, time: Array, raw: Array, ignored: Mask, settings: Signal
             elsewhere = lengths[~np.isin(column[firsts], ends)] if clipped else lengths[2 * lengths < lengths[at]]
             long = lengths[at] > settings.long_run * (_usual(elsewhere) - 1.0)
             if (clipped or frozen) and long and _jumps(column, int(firsts[at]), int(lasts[at]), settings):
-                found.append(ConstantRun(axis, clipped, int(firsts[at]), int(lasts[at]), value))
-    return found
+                constant.append(ConstantRun(axis, clipped, int(firsts[at]), int(lasts[at]), value))
+    return constant
 
 
 def _usual(lengths: NDArray[np.int64]) -> float:
@@ -147,12 +147,12 @@ def _jumps(column: Array, first: int, last: int, settings: SignalSettings) -> bo
 def _others_move(axis: int, time: Array, raw: Array, run: tuple[int, int], settings: SignalSettings) -> bool:
     """Say whether other axes live during a run, and some of them moves by more than its noise around it."""
     first, last = run
-    others = np.delete(raw, axis, axis=1)
-    alive = (np.diff(others[first : last + 1], axis=0) != 0.0).any(axis=1)
+    other_axes = np.delete(raw, axis, axis=1)
+    alive = (np.diff(other_axes[first : last + 1], axis=0) != 0.0).any(axis=1)
     if alive.mean() < 0.5:
         return False
     lacking = max(0.0, settings.flat_around - (time[last] - time[first])) / 2.0
-    window = others[(time >= time[first] - lacking) & (time <= time[last] + lacking)]
+    window = other_axes[(time >= time[first] - lacking) & (time <= time[last] + lacking)]
     steps = np.abs(np.diff(window, axis=0))
     noise = NORMAL_STEP * np.median(steps, axis=0)
     least = np.array([float(each[each > 0.0].min(initial=np.inf)) for each in steps.T])
@@ -193,8 +193,8 @@ def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
     """
     steps = np.abs(np.diff(raw, axis=0))
     changes = [column[column > 0.0] for column in steps.T]
-    known = [each for each in changes if len(each)]
-    if not known or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in known):
+    moving = [each for each in changes if len(each)]
+    if not moving or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in moving):
         return np.zeros(0, np.bool_)
     large = np.array(
         [settings.coarse_jump * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes]

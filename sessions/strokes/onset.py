@@ -96,8 +96,8 @@ class ContactDetector:
 
     def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
         """Take readings, time (n,) [s] and normal force (n,) [N, pressing > 0, not zeroed]; return what they tell."""
-        told = (self._take_reading(t, force) for t, force in zip(time.tolist(), normal_force.tolist(), strict=True))
-        return tuple(event for event in told if event is not None)
+        events = (self._take_reading(t, force) for t, force in zip(time.tolist(), normal_force.tolist(), strict=True))
+        return tuple(event for event in events if event is not None)
 
     def _take_reading(self, t: float, force: float) -> ContactEvent | None:
         if self._baseline is None:

@@ -143,24 +143,24 @@ def _loss_flaws(lost: int, arrived: int) -> _Found:
 def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
     """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
     refused = float(frozen.mean()) >= settings.signal.frozen_refused
-    found: _Found = []
+    flaws: _Found = []
     if repeated.any():
         sentence = (
             f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
             f"{time[repeated][0]:.2f} s: the sensor was frozen"
         )
         rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
-        found.append((FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"))
+        flaws.append((FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"))
     elif refused:
         share = 100 * float(frozen.mean())
         sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
-        found.append((FlawName.FROZEN, sentence, "refused"))
-    return found
+        flaws.append((FlawName.FROZEN, sentence, "refused"))
+    return flaws
 
 
 def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
     """Name each axis that was clipped or frozen by the first run that shows it."""
-    found: _Found = []
+    flaws: _Found = []
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
         lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
@@ -172,11 +172,11 @@ def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
             sentence += (
                 "and never goes beyond it: clipped. These readings are left out, and no peak that they hide is told."
             )
-            found.append((FlawName.SATURATED, sentence, "doubtful"))
+            flaws.append((FlawName.SATURATED, sentence, "doubtful"))
         else:
             sentence += "and moves before or after: frozen there. These readings are left out."
-            found.append((FlawName.FROZEN, sentence, "doubtful"))
-    return found
+            flaws.append((FlawName.FROZEN, sentence, "doubtful"))
+    return flaws
 
 
 def _wild_flaws(wild: Mask, time: Array) -> _Found:
@@ -198,11 +198,11 @@ def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _Found:
     faulty = table.faulty(block.status)
     if not faulty.any():
         return []
-    told = StatusCount(table)
-    told.take(block.status[faulty])
+    count = StatusCount(table)
+    count.take(block.status[faulty])
     sentence = (
         f"{int(faulty.sum())} readings came while the device told of a fault, first at {block.time[faulty][0]:.2f} s: "
-        f"{flagged_words(told.flagged)}; they are doubtful and left out."
+        f"{flagged_words(count.flagged)}; they are doubtful and left out."
     )
     return [(FlawName.DEVICE_FAULT, sentence, "doubtful")]
 

@@ -20,17 +20,19 @@ _QUARTERS = 4
 _ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
 
 
-def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSettings) -> slice | None:
+def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSettings) -> slice | None:
     """Return the stretch over which T/N is steady, by the rule the settings name, or None.
 
-    `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; `whole` is how many readings the
-    stroke has. Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
+    `ratio` (n,) [-] is nan where the finger does not slide or T/N means nothing; the stroke has so many `readings`.
+    Steady: the standard deviation is below 10 % of the mean and no quarter's mean lies more than 5 % from
     it (settings), beyond what the scatter of few readings explains. Of the steady stretches half as long as the slide
     that of least variance is taken as it is ("least variance"), or widened to the longest steady stretch that holds it
     ("widened"). "middle half" and "whole slide" ask for no steadiness.
     """
     shortest = max(
-        settings.steady.steady_share * whole, settings.steady.steady_shortest * rate, settings.steady.steady_readings
+        settings.steady.steady_share * readings,
+        settings.steady.steady_shortest * rate,
+        settings.steady.steady_readings,
     )
     first, last, variance, steady = _stretches(ratio, shortest, settings)
     if not len(first):
@@ -55,9 +57,9 @@ def steady_window(ratio: Array, rate: float, whole: int, settings: AnalysisSetti
 def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tuple[Places, Places, Array, Mask]:
     """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
     edges = np.unique(np.linspace(0, len(ratio), settings.steady.steady_edges).round().astype(int))
-    held = np.isfinite(ratio)
-    value = np.where(held, ratio, 0.0)
-    count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (held, value, value**2))
+    finite = np.isfinite(ratio)
+    value = np.where(finite, ratio, 0.0)
+    count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (finite, value, value**2))
     first, last = (edges[index] for index in np.triu_indices(len(edges), 1))
     long_enough = last - first >= shortest
     first, last = first[long_enough], last[long_enough]
@@ -115,15 +117,15 @@ def movement(time: Array, position: Array, rate: float, settings: AnalysisSettin
     if len(blocks) < settings.filter.fewest_blocks:
         return None
     t = blocks[:, 0] - blocks[:, 0].mean()
-    moved = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
+    position_off = blocks[:, 1:] - blocks[:, 1:].mean(axis=0)
     spread = float(t @ t)
-    slope = t @ moved / spread
-    rest = moved - t[:, None] * slope
+    slope = t @ position_off / spread
+    rest = position_off - t[:, None] * slope
     speed = float(np.hypot(*slope))
     # Scatter along the path is what makes the speed uncertain.
     direction = slope / speed if speed > 0.0 else np.array([1.0, 0.0])
     error = float(np.sqrt(((rest @ direction) ** 2).sum() / (len(blocks) - 2) / spread))
-    variance = float((moved**2).sum())
+    variance = float((position_off**2).sum())
     explained = 1.0 - float((rest**2).sum()) / variance if variance > 0.0 else 0.0
     return Movement((float(slope[0]), float(slope[1])), speed, error, explained)
 
@@ -133,50 +135,52 @@ def displacement(position: Array) -> float:
 
     nan where it is not known.
     """
-    held = position[np.isfinite(position).all(axis=1)]
-    fifth = max(1, len(held) // 5)
-    if len(held) < 2 * fifth:
+    finite = position[np.isfinite(position).all(axis=1)]
+    fifth = max(1, len(finite) // 5)
+    if len(finite) < 2 * fifth:
         return float("nan")
-    return float(np.hypot(*(held[-fifth:].mean(axis=0) - held[:fifth].mean(axis=0))))
+    return float(np.hypot(*(finite[-fifth:].mean(axis=0) - finite[:fifth].mean(axis=0))))
 
 
 def block_means(values: Array, rate: float, settings: AnalysisSettings) -> Array:
     """Return the means (k, m) of values (n, m) over whole blocks, leaving out readings with nan."""
-    held = values[np.isfinite(values).all(axis=1)]
+    finite = values[np.isfinite(values).all(axis=1)]
     length = max(1, round(settings.filter.block * rate))
-    whole = len(held) // length
-    return held[: whole * length].reshape(whole, length, values.shape[1]).mean(axis=1)
+    count = len(finite) // length
+    return finite[: count * length].reshape(count, length, values.shape[1]).mean(axis=1)
 
 
 def slide(
-    found: Findings,
+    findings: Findings,
     span: Span,
     track: Track,
     frame: Frame,
     settings: AnalysisSettings,
     decided: tuple[float, float] | None = None,
-    whole: Track | None = None,
+    uncut: Track | None = None,
 ) -> slice | None:
     """Find the steady window and the speed in it; None, with the reason, where nothing slides steadily.
 
-    A window that a person `decided` [s, device clock] is taken; what speaks against it is named. `whole` is the contact
+    A window that a person `decided` [s, device clock] is taken; what speaks against it is named. `uncut` is the contact
     that turns cut the stroke out of.
     """
     window = None
     if decided is not None:
-        window = _asked(track, decided, settings.steady.steady_readings)
+        window = _decided_window(track, decided, settings.steady.steady_readings)
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         with np.errstate(invalid="ignore"):
             sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
-    moved, trouble = _speed(span, track, window, frame, settings)
+    motion, trouble = _speed(span, track, window, frame, settings)
     if trouble is not None and decided is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
-        moved, trouble = _speed(span, track, window, frame, settings)
-    at_rest = _rest(span, track, track if whole is None else whole, window, settings)
+        motion, trouble = _speed(span, track, window, frame, settings)
+    at_rest = _rest(span, track, track if uncut is None else uncut, window, settings)
     if window is not None and at_rest is not None and decided is not None:
-        found.flaw(at_rest[0], f"{at_rest[1]} The window was decided by a person: its numbers are given.", "doubtful")
+        findings.flaw(
+            at_rest[0], f"{at_rest[1]} The window was decided by a person: its numbers are given.", "doubtful"
+        )
         at_rest = None
     if window is None or at_rest is not None:
         name, sentence = at_rest or (
@@ -185,21 +189,21 @@ def slide(
             else (FlawName.DECISION, "The window that was decided holds too few readings with a T/N.")
         )
         forbidden = (*COEFFICIENTS, *SPEED, *DIRECTION, "normal_force", "tangential_force")
-        found.flaw(name, sentence, "refused", forbidden)
+        findings.flaw(name, sentence, "refused", forbidden)
         return None
-    found.numbers["steady"] = (float(track.time[window.start]), float(track.time[window.stop - 1]))
+    findings.numbers["steady"] = (float(track.time[window.start]), float(track.time[window.stop - 1]))
     if trouble is not None:
-        found.flaw(trouble[0], trouble[1], "doubtful", SPEED)
-    elif moved is not None:
-        found.numbers |= {"speed": moved.speed, "speed_error": moved.error}
-        _slide_onset(found, track, moved, settings)
-    _direction(found, track, window, moved if trouble is None else None, settings.slide.along_share)
-    if trouble is None and moved is not None:
-        _side_load(found, track, window, moved, settings)
+        findings.flaw(trouble[0], trouble[1], "doubtful", SPEED)
+    elif motion is not None:
+        findings.numbers |= {"speed": motion.speed, "speed_error": motion.error}
+        _slide_onset(findings, track, motion, settings)
+    _direction(findings, track, window, motion if trouble is None else None, settings.slide.along_share)
+    if trouble is None and motion is not None:
+        _side_load(findings, track, window, motion, settings)
     return window
 
 
-def _asked(track: Track, decided: tuple[float, float], fewest: int) -> slice | None:
+def _decided_window(track: Track, decided: tuple[float, float], fewest: int) -> slice | None:
     """Return the readings between two instants; None where too few of them have a ratio."""
     start = int(np.searchsorted(track.time, decided[0] - _ROUNDING))
     stop = int(np.searchsorted(track.time, decided[1] + _ROUNDING, "right"))
@@ -207,7 +211,7 @@ def _asked(track: Track, decided: tuple[float, float], fewest: int) -> slice | N
 
 
 def _rest(
-    span: Span, track: Track, whole: Track, window: slice | None, settings: AnalysisSettings
+    span: Span, track: Track, uncut: Track, window: slice | None, settings: AnalysisSettings
 ) -> tuple[FlawName, str] | None:
     """Say why nothing shows that the contact slides over a window, or None where it does."""
     if window is None:
@@ -223,7 +227,7 @@ def _rest(
                 "torques and the face's height; nothing shows that the contact slides, so no friction is given."
             )
         if way > max(settings.slide.shear, settings.slide.shear_steps * step):
-            return _rolled(track, whole, float(np.nanmean(track.ratio[window])), settings)
+            return _rolled(track, uncut, float(np.nanmean(track.ratio[window])), settings)
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
@@ -231,15 +235,15 @@ def _rest(
     )
 
 
-def _rolled(track: Track, whole: Track, level: float, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
+def _rolled(track: Track, uncut: Track, level: float, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
     """Say that the centre of pressure moves no further than a finger rolls, or None where it does.
 
-    It counts over the `whole` contact, turns included, and only where T/N lies about its `level` in the steady window:
+    It counts over the `uncut` contact, turns included, and only where T/N lies about its `level` in the steady window:
     a contact slips nowhere below that.
     """
     with np.errstate(invalid="ignore"):
-        at_level = np.abs(whole.ratio - level) <= 2.0 * settings.steady.steady_spread * level
-    places = block_means(np.where(at_level[:, None], whole.position, np.nan), track.rate, settings)
+        at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
+    places = block_means(np.where(at_level[:, None], uncut.position, np.nan), track.rate, settings)
     way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
     if way > settings.slide.roll:
         return None
@@ -255,54 +259,54 @@ def _speed(
     """Return the movement over a window, and what forbids taking it for a speed."""
     if window is None:
         return None, (FlawName.SPEED_NOT_MEASURABLE, "")
-    moved = movement(track.time[window], track.position[window], track.rate, settings)
-    return moved, _speed_trouble(span, track, window, moved, frame, settings)
+    motion = movement(track.time[window], track.position[window], track.rate, settings)
+    return motion, _speed_trouble(span, track, window, motion, frame, settings)
 
 
 def _speed_trouble(
-    span: Span, track: Track, window: slice, moved: Movement | None, frame: Frame, settings: AnalysisSettings
+    span: Span, track: Track, window: slice, motion: Movement | None, frame: Frame, settings: AnalysisSettings
 ) -> tuple[FlawName, str] | None:
     """Say why the centre of pressure gives no speed over a window, or None where it does."""
     name = FlawName.SPEED_NOT_MEASURABLE
-    if moved is None:
+    if motion is None:
         return name, "The centre of pressure is known at too few instants of the steady window for a speed."
-    way = moved.speed * float(track.time[window.stop - 1] - track.time[window.start])
+    way = motion.speed * float(track.time[window.stop - 1] - track.time[window.start])
     step = span.torque_step / float(np.nanmean(track.normal[window]))
     if step > settings.slide.speed_step * way:
         return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is told."
-    if moved.error > settings.slide.speed_error * moved.speed:
-        return name, f"The centre of pressure moves at {moved.speed:.2g} ± {moved.error:.2g} mm/s: no speed is told."
-    if moved.explained < settings.slide.speed_line:
-        share = 100 * moved.explained
+    if motion.error > settings.slide.speed_error * motion.speed:
+        return name, f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s: no speed is told."
+    if motion.explained < settings.slide.speed_line:
+        share = 100 * motion.explained
         return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is told."
     if frame.height_origin == "default":
         lever = movement(
             track.time[window], -track.wrench[window, :2] / track.normal[window, None], track.rate, settings
         )
         wrong = settings.slide.height_doubt * (lever.speed if lever else 0.0)
-        if wrong > settings.slide.speed_error * moved.speed:
+        if wrong > settings.slide.speed_error * motion.speed:
             return FlawName.HEIGHT_UNKNOWN, (
                 f"Nobody stated the face's height: were it wrong by {settings.slide.height_doubt:g} mm the speed of "
-                f"{moved.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given."
+                f"{motion.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given."
             )
     return None
 
 
-def _slide_onset(found: Findings, track: Track, moved: Movement, settings: AnalysisSettings) -> None:
+def _slide_onset(findings: Findings, track: Track, motion: Movement, settings: AnalysisSettings) -> None:
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
-    start = int(np.searchsorted(track.time, float(found.numbers["steady"][0])))
+    start = int(np.searchsorted(track.time, float(findings.numbers["steady"][0])))
     with np.errstate(invalid="ignore"):
-        slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * moved.speed)
+        slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * motion.speed)
     last_slow = np.flatnonzero(slow)
     first = int(last_slow[-1]) + 1 if len(last_slow) else 0
     if first <= start:
-        found.numbers["slide_onset"] = float(track.time[first])
+        findings.numbers["slide_onset"] = float(track.time[first])
 
 
-def _side_load(found: Findings, track: Track, window: slice, moved: Movement, settings: AnalysisSettings) -> None:
+def _side_load(findings: Findings, track: Track, window: slice, motion: Movement, settings: AnalysisSettings) -> None:
     """Name a drag that does not lie along the movement: friction alone opposes it."""
     drag = mean_vector(track.wrench[window, :2])
-    along = np.array(moved.along) / moved.speed
+    along = np.array(motion.along) / motion.speed
     across = float(abs(drag[0] * along[1] - drag[1] * along[0]))
     share = across / float(np.hypot(*drag))
     if share > settings.slide.side_load:
@@ -310,10 +314,10 @@ def _side_load(found: Findings, track: Track, window: slice, moved: Movement, se
             f"{100 * share:.0f} % of the tangential force lies across the finger's movement: a load from the side, a "
             "face that leans, or axes that are turned; T/N holds it, and friction along the movement is less."
         )
-        found.flaw(FlawName.SIDE_LOAD, sentence, "doubtful")
+        findings.flaw(FlawName.SIDE_LOAD, sentence, "doubtful")
 
 
-def _direction(found: Findings, track: Track, window: slice, moved: Movement | None, share: float) -> None:
+def _direction(findings: Findings, track: Track, window: slice, motion: Movement | None, share: float) -> None:
     """Give the direction along x: from the movement, else from the drag, which points the way the finger moves.
 
     Either must lie along x by a `share` of its length.
@@ -321,18 +325,18 @@ def _direction(found: Findings, track: Track, window: slice, moved: Movement | N
     drag = mean_vector(track.wrench[window, :2])
     by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
     by_movement = None
-    if moved is not None and abs(moved.along[0]) >= share * moved.speed:
-        by_movement = int(np.sign(moved.along[0]))
+    if motion is not None and abs(motion.along[0]) >= share * motion.speed:
+        by_movement = int(np.sign(motion.along[0]))
     if by_movement is not None and by_drag is not None and by_movement != by_drag:
         sentence = (
             "The centre of pressure moved one way and the drag points the other: the frame, its normal or its height "
             "is wrong, so neither speed nor direction is given."
         )
-        found.flaw(FlawName.DIRECTION_DISAGREES, sentence, "doubtful", (*SPEED, *DIRECTION))
+        findings.flaw(FlawName.DIRECTION_DISAGREES, sentence, "doubtful", (*SPEED, *DIRECTION))
         return
-    way = drag if moved is None else np.array(moved.along)
-    found.numbers["heading"] = float(np.degrees(np.arctan2(way[1], way[0])))
+    way = drag if motion is None else np.array(motion.along)
+    findings.numbers["heading"] = float(np.degrees(np.arctan2(way[1], way[0])))
     if by_movement is not None:
-        found.numbers |= {"direction": by_movement, "direction_from": "centre of pressure"}
+        findings.numbers |= {"direction": by_movement, "direction_from": "centre of pressure"}
     elif by_drag is not None:
-        found.numbers |= {"direction": by_drag, "direction_from": "tangential force"}
+        findings.numbers |= {"direction": by_drag, "direction_from": "tangential force"}

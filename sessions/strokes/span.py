@@ -144,11 +144,11 @@ def _unsure(
     near[list(contact.valleys)] = True
     away = span.smooth[near, :3] - level[:3]
     away = away[np.isfinite(away).all(axis=1)]
-    seen = [(float(np.hypot(*drift[:2])), abs(float(drift[2])))] if drift is not None else []
+    offsets = [(float(np.hypot(*drift[:2])), abs(float(drift[2])))] if drift is not None else []
     if len(away):
         sideways = np.hypot(away[:, 0], away[:, 1])
-        seen.append((float(np.percentile(sideways, 90)), float(np.percentile(np.abs(away[:, 2]), 90))))
-    return max((s for s, _ in seen), default=0.0), max((n for _, n in seen), default=0.0)
+        offsets.append((float(np.percentile(sideways, 90)), float(np.percentile(np.abs(away[:, 2]), 90))))
+    return max((s for s, _ in offsets), default=0.0), max((n for _, n in offsets), default=0.0)
 
 
 def recorded_zero(span: Span, *, stated: bool) -> StrokeZero:

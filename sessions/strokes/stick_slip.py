@@ -26,19 +26,19 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
 
     `noise` is the standard deviation of T/N [-].
     """
-    chosen = settings.ratio
+    limits = settings.ratio
     step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    lag = max(1, round(chosen.slip_within / step)) if step > 0.0 else len(time)
+    lag = max(1, round(limits.slip_within / step)) if step > 0.0 else len(time)
     if len(time) <= lag + 1:
         return None
     change = ratio[lag:] - ratio[:-lag]
-    sudden = max(chosen.slip_share * float(np.nanmedian(ratio)), chosen.slip_noise * np.sqrt(2.0) * noise)
+    sudden = max(limits.slip_share * float(np.nanmedian(ratio)), limits.slip_noise * np.sqrt(2.0) * noise)
     with np.errstate(invalid="ignore"):
         drops = _beginnings(change < -sudden)
         # A slow climb grows by up to a third of a drop in the same time, so half of one is sudden.
         depth = -float(np.median(np.fmin.reduceat(change, drops))) if len(drops) else 0.0
         climbs = _beginnings(change > max(sudden, 0.5 * depth))
-    if len(drops) < chosen.slips_fewest or len(climbs) > chosen.slips_upwards * len(drops):
+    if len(drops) < limits.slips_fewest or len(climbs) > limits.slips_upwards * len(drops):
         return None
     steps = np.diff(ratio)
     climb = float(np.nanmedian(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
@@ -57,16 +57,16 @@ def power_of_normal_force(normal: Array, ratio: Array, length: int, settings: An
     """
     steepest = settings.ratio.law_steepest
     with np.errstate(invalid="ignore"):
-        held = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
-    whole = np.count_nonzero(held) // length
-    if whole < settings.ratio.law_fewest:
+        valid = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
+    blocks = np.count_nonzero(valid) // length
+    if blocks < settings.ratio.law_fewest:
         return steepest
-    means = np.column_stack([np.log(normal[held]), np.log(ratio[held])])[: whole * length]
-    x, y = means.reshape(whole, length, 2).mean(axis=1).T
+    means = np.column_stack([np.log(normal[valid]), np.log(ratio[valid])])[: blocks * length]
+    x, y = means.reshape(blocks, length, 2).mean(axis=1).T
     x, y = x - x.mean(), y - y.mean()
     spread = float(x @ x)
     if spread <= 0.0:
         return steepest
     slope = float(x @ y) / spread
-    error = float(np.sqrt(((y - slope * x) ** 2).sum() / (whole - 2) / spread))
+    error = float(np.sqrt(((y - slope * x) ** 2).sum() / (blocks - 2) / spread))
     return min(0.0, float(np.clip(steepest, slope - 2.0 * error, slope + 2.0 * error)))

@@ -48,12 +48,12 @@ class _Analysis(msgspec.Struct):
 
 def check_analysis(document: Mapping[str, Any]) -> None:
     """Raise ValueError where a document is no analysis that this program writes: where, and what is expected."""
-    held = complete(document, _Analysis)
-    if len(held.bootstrap.strokes) != len(held.strokes):
+    analysis = complete(document, _Analysis)
+    if len(analysis.bootstrap.strokes) != len(analysis.strokes):
         raise SettingsError("it has intervals of another number of strokes")
-    beyond = [row.stroke for row in held.friction if not 0 <= row.stroke < len(held.strokes)]
+    beyond = [row.stroke for row in analysis.friction if not 0 <= row.stroke < len(analysis.strokes)]
     if beyond:
         raise SettingsError(f"it tells the friction of stroke {beyond[0]}, which it does not hold")
-    settings = {**_DEFAULTS, **held.bootstrap.settings}
+    settings = {**_DEFAULTS, **analysis.bootstrap.settings}
     complete({"settings": settings}, _Settings)
     from_table(settings, BootstrapSettings, "bootstrap")

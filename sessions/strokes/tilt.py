@@ -62,11 +62,11 @@ def press_of(
     if peak < settings.ratio.force_floor:
         return None
     with np.errstate(invalid="ignore"):
-        held = np.flatnonzero(track.normal >= settings.press.press_held * peak)
-    hold = slice(int(held[0]), int(held[-1]) + 1)
+        pressed = np.flatnonzero(track.normal >= settings.press.press_held * peak)
+    hold = slice(int(pressed[0]), int(pressed[-1]) + 1)
     lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
-    moved = displacement(track.position[hold])
-    if lasted < settings.press.press_shortest or not moved <= settings.press.press_moves:
+    distance = displacement(track.position[hold])
+    if lasted < settings.press.press_shortest or not distance <= settings.press.press_moves:
         return None
     values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
     blocks = block_means(values, track.rate, settings)

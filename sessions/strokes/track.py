@@ -54,10 +54,10 @@ def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings)
     """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
     speed = np.full(len(time), np.nan)
     smoother = Filter(settings.filter.speed_cut_off, settings.filter.shortest_segment)
-    held = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
-    joined = held[1:] & held[:-1] & (np.diff(time) < settings.signal.missing_step / span.rate)
-    starts = np.flatnonzero(held & ~np.concatenate([[False], joined]))
-    stops = np.flatnonzero(held & ~np.concatenate([joined, [False]])) + 1
+    finite = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
+    joined = finite[1:] & finite[:-1] & (np.diff(time) < settings.signal.missing_step / span.rate)
+    starts = np.flatnonzero(finite & ~np.concatenate([[False], joined]))
+    stops = np.flatnonzero(finite & ~np.concatenate([joined, [False]])) + 1
     for start, stop in zip(starts, stops, strict=True):
         if stop - start < 3:
             continue
@@ -96,10 +96,10 @@ def curve_of(
     """
     first = int(np.searchsorted(span.time, float(span.time[contact.start]) - settings.contact.curve_before))
     last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + settings.contact.curve_after))
-    shown = track_of(span, Contact(first, last, None, None), zero, height, settings)
-    force = shown.wrench[:, :2]
+    track = track_of(span, Contact(first, last, None, None), zero, height, settings)
+    force = track.wrench[:, :2]
     dragging, unfiltered = unfiltered_forces(span, slice(first, last), zero)
-    columns = (shown.time, shown.normal, unfiltered, shown.tangential, force, shown.ratio, shown.position, shown.speed)
+    columns = (track.time, track.normal, unfiltered, track.tangential, force, track.ratio, track.position, track.speed)
     sideways = float(np.sqrt((zero.filtered[:2] ** 2).mean()))
     curve = StrokeCurve(*columns, noise=(sideways, float(zero.filtered[2])), quiet=zero.lasts)
     if missed is None:

@@ -85,9 +85,9 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
     level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
     unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
-    whole = time[starts + length - 1] - time[starts] <= settings.zero.quiet_gap * length / rate
-    chosen = starts[quiet & unloaded & whole]
-    return np.column_stack([chosen, chosen + length]).astype(np.int64)
+    unbroken = time[starts + length - 1] - time[starts] <= settings.zero.quiet_gap * length / rate
+    unloaded_starts = starts[quiet & unloaded & unbroken]
+    return np.column_stack([unloaded_starts, unloaded_starts + length]).astype(np.int64)
 
 
 def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
