@@ -52,6 +52,9 @@ def create_study(folder: Path, protocol_text: str, seed: int, *, blinded: bool) 
     check_code("the name of the study's folder", folder.name)
     if is_study(folder):
         raise StudyError(f"{folder} is a study already, and its protocol is fixed: enrol without --protocol")
+    adaptive = next((block.name for block in protocol.blocks if block.adaptive is not None), None)
+    if blinded and adaptive is not None:
+        raise StudyError(f"{adaptive} is adaptive and needs to know which stimulus is which: make the study unblinded")
     key = _new_key(protocol) if blinded else None
     folder.mkdir(parents=True, exist_ok=True)
     head = {

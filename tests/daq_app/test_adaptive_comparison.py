@@ -13,8 +13,9 @@ from drivers.clock import ToldClock
 from sessions.plan.adaptive import next_comparison
 from sessions.plan.plan import Stimulus
 from sessions.plan.protocols import plan, protocol
-from sessions.plan.protocols.planning import StudyPlace
 from sessions.plan.protocols.protocol import FOLDER
+from sessions.plan.study import StudyError
+from sessions.plan.study_file import create_study
 from sessions.recording import Recording
 from sessions.recording.archive import problems
 from sessions.report.experiments import experiments, with_psychometric
@@ -116,10 +117,11 @@ def test_a_recording_of_a_later_kind_of_plan_is_not_read_by_a_program_that_would
     assert {*stood_for} == {50, compared([record.trial for record in recording.trials])[0]}
 
 
-def test_a_blinded_study_refuses_an_adaptive_block():
-    place = StudyPlace("s", 0, 1, 1, ADAPTIVE.labels, key_sha256="0" * 64)
-    with pytest.raises(SettingsError, match=r"adaptive block .* not blinded"):
-        plan(ADAPTIVE, "S01", 1, place=place)
+def test_a_blinded_study_refuses_an_adaptive_block(tmp_path):
+    text = (FOLDER / "adaptive-comparison.toml").read_text()
+    with pytest.raises(StudyError, match=r"friction is adaptive .* unblinded"):
+        create_study(tmp_path / "s", text, 1, blinded=True)
+    assert not (tmp_path / "s").exists()
 
 
 @pytest.mark.parametrize(

@@ -119,8 +119,6 @@ def plan(
         key_sha256=None if place is None else place.key_sha256,
     )
     if plan.key_sha256 is not None:
-        if any(block.candidates for block in plan.blocks):
-            raise SettingsError("an adaptive block needs to know which stimulus is which: its study is not blinded")
         plan = blinded(plan)
     return plan if area is None else replace(plan, contact_area=area, contact_area_origin="set")
 
