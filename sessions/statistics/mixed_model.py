@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sessions.statistics.reml import Array, Fit, restricted_fit
 from sessions.statistics.variance_components import Spreads, spreads
@@ -109,8 +109,9 @@ def _exact(score: Array, columns: Array, subjects: Sequence[str]) -> bool:
 
 def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:
     """Return a fixed effect with a t interval of `dof` degrees of freedom, Wald's where None."""
+    size = abs(estimate / error)
     if dof is None:
-        half, p = float(stats.norm.ppf((1 + CONFIDENCE) / 2)), math.erfc(abs(estimate / error) / math.sqrt(2.0))
+        half, p = float(special.ndtri((1 + CONFIDENCE) / 2)), math.erfc(size / math.sqrt(2.0))
     else:
-        half, p = float(stats.t.ppf((1 + CONFIDENCE) / 2, dof)), 2.0 * float(stats.t.sf(abs(estimate / error), dof))
+        half, p = float(special.stdtrit(dof, (1 + CONFIDENCE) / 2)), 2.0 * float(special.stdtr(dof, -size))
     return Term(name, estimate, estimate - half * error, estimate + half * error, p)

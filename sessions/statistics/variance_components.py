@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 CONFIDENCE = 0.95
 
@@ -82,10 +83,8 @@ def spreads(
 
 def _of_square(square: float, dof: int) -> Spread:
     """Return the standard deviation whose square is estimated by `square` with `dof` degrees of freedom."""
-    from scipy import stats  # slow to load, and a window that opens waits for it
-
     tail = (1 - CONFIDENCE) / 2
-    low, high = (math.sqrt(square * dof / float(stats.chi2.ppf(q, dof))) for q in (1 - tail, tail))
+    low, high = (math.sqrt(square * dof / float(special.chdtri(dof, q))) for q in (tail, 1 - tail))
     return Spread(math.sqrt(square), low, high)
 
 
@@ -94,18 +93,16 @@ def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread
 
     Its lower end is 0 exactly where an F test does not tell the two apart.
     """
-    from scipy import stats
-
     tail = (1 - CONFIDENCE) / 2
     found = first - second
 
     def over(q: float, dof: int) -> float:
-        return dof / float(stats.chi2.ppf(q, dof))
+        return dof / float(special.chdtri(dof, 1 - q))
 
-    f, g, h = float(stats.f.ppf(1 - tail, n, m)), 1 - over(1 - tail, n), over(tail, m) - 1
+    f, g, h = float(special.fdtri(n, m, 1 - tail)), 1 - over(1 - tail, n), over(tail, m) - 1
     both = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
     low = found - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + both * first * second, 0.0))
-    f, g, h = float(stats.f.ppf(tail, n, m)), over(tail, n) - 1, 1 - over(1 - tail, m)
+    f, g, h = float(special.fdtri(n, m, tail)), over(tail, n) - 1, 1 - over(1 - tail, m)
     both = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
     high = found + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + both * first * second, 0.0))
     sd, least, greatest = (math.sqrt(max(square, 0.0)) for square in (found, low, high))

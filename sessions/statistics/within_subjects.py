@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
 CONFIDENCE = 0.95
 
@@ -69,9 +70,7 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
         return ()
     levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
     deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
-    from scipy import stats  # slow to load, and a window that opens waits for it
-
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * deviation / math.sqrt(n)
+    half = float(special.stdtrit(len(subjects) - 1, (1 + CONFIDENCE) / 2)) * deviation / math.sqrt(n)
     means = scores.mean(axis=0)
     return tuple(
         WithinMean(index, len(subjects), float(mean), float(mean - h), float(mean + h))
@@ -103,11 +102,9 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     if 1.0 - abs(r) < 1e-12:
         return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r), 0.0)
     t = r * math.sqrt(dof / (1.0 - r * r))
-    from scipy import stats
-
-    half = float(stats.norm.ppf((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
+    half = float(special.ndtri((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
     z = math.atanh(r)
-    p = 2.0 * float(stats.t.sf(abs(t), dof))
+    p = 2.0 * float(special.stdtr(dof, -abs(t)))
     xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
     low, high, people_p = _jackknifed(xy, xx, yy) or (None, None, None)
     people = None if low is None or high is None else (low, high)
@@ -126,10 +123,8 @@ def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float, float] |
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     pseudo = k * z - (k - 1) * np.arctanh(others_xy / size)
     mean, error = float(pseudo.mean()), float(pseudo.std(ddof=1)) / math.sqrt(k)
-    from scipy import stats
-
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, k - 1)) * error
-    p = 2.0 * float(stats.t.sf(abs(mean) / error, k - 1)) if error > 0.0 else 0.0
+    half = float(special.stdtrit(k - 1, (1 + CONFIDENCE) / 2)) * error
+    p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error)) if error > 0.0 else 0.0
     return math.tanh(mean - half), math.tanh(mean + half), p
 
 
@@ -139,7 +134,7 @@ def agreement(table: Table) -> Agreement | None:
     n, c = scores.shape
     if n < 2 or c < 3 or np.all(np.ptp(scores, axis=1) == 0):
         return None
-    from scipy import stats
+    from scipy import stats  # slow to load, and a window that opens waits for it
 
     friedman = stats.friedmanchisquare(*scores.T)
     page = stats.page_trend_test(scores)

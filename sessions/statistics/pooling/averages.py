@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from sessions.statistics.pooling.visit import TrialRow, Visit
 from sessions.statistics.scores import CONFIDENCE
@@ -42,7 +42,7 @@ def average(values: Sequence[float]) -> Average | None:
     if n < 2:
         return Average(n, mean, None, None, None)
     sd = float(np.std(values, ddof=1))
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * sd / math.sqrt(n)
+    half = float(special.stdtrit(n - 1, (1 + CONFIDENCE) / 2)) * sd / math.sqrt(n)
     return Average(n, mean, sd, mean - half, mean + half)
 
 

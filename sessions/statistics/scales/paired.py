@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special, stats
+from scipy import special
 from scipy.sparse import csgraph
 
 Array = NDArray[np.float64]
@@ -96,7 +96,7 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry", se
         first=ends[-1],
         deviance=deviance,
         freedom=freedom,
-        p=float(stats.chi2.sf(deviance, freedom)) if freedom > 0 else None,
+        p=float(special.chdtrc(freedom, deviance)) if freedom > 0 else None,
         interval_reason=why,
     )
 

@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special, stats
+from scipy import optimize, special
 
 from sessions.statistics.scores import CONFIDENCE
 
 Array = NDArray[np.float64]
 
-QUARTILE = float(stats.norm.ppf(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
+QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
 LEAST_LEVELS = 3  # of x: two fit any PSE and JND, and tell nothing of lapses
 MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and a lapse is not to be told from a flat slope
 MOST_SCATTER = 1.0  # of the beta law's theta; its correlation is then 1/2, and most cells are answered all one way
@@ -116,7 +116,7 @@ class _Task:
         self.before, self.place = (np.array([float(row[n]) for row in rows]) for n in (2, 3))
         self.spread = float(np.std(self.x))
         # Root of what the log likelihood falls by at an end. Answers of one level hang together, so levels are counted.
-        self.drop = math.sqrt(float(stats.f.ppf(CONFIDENCE, 1, len(levels))) / 2.0)
+        self.drop = math.sqrt(float(special.fdtri(1, len(levels), CONFIDENCE)) / 2.0)
         self.steepest = STEEPEST / self.spread
         self.ordered = len(set(self.side.tolist())) > 1
         self.reach = far = float(np.ptp(self.x))
