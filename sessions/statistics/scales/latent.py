@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 from sessions.statistics.scales.paired import LEAST_SUBJECTS, Ends
 from sessions.statistics.scales.psychometric import QUARTILE
@@ -51,7 +51,7 @@ def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Ma
         return {}
     drawn = np.random.default_rng(seed).integers(0, len(whole), (RESAMPLES, len(whole)))
     n = len(whole)
-    tail = float(stats.norm.cdf(math.sqrt(n / (n - 1)) * stats.t.ppf((1.0 - CONFIDENCE) / 2.0, n - 1)))
+    tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, (1.0 - CONFIDENCE) / 2.0)))
     ends = np.nanquantile(answered.values(drawn), [tail, 1.0 - tail], axis=0).T.tolist()
     return {i: Ends(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
 
