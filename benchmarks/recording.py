@@ -29,14 +29,14 @@ INFO = TransducerInfo(
 )
 
 
-class ToldClock:
+class SimulatedClock:
     """A clock that is told the time."""
 
     factor = 1.0
     ns = 0
 
     def now_ns(self) -> int:
-        """Return the told time [ns]."""
+        """Return the simulated time [ns]."""
         return self.ns
 
     def sleep(self, seconds: float) -> None:
@@ -69,7 +69,7 @@ def memory() -> float:
 
 def measure(folder: Path, seconds: int) -> None:
     """Write, open, read and seal one recording."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     plan = SessionPlan("bench", "S00", 0, "none", (), True, Frame())
     writer = SessionWriter.create(folder, plan, INFO, provenance(clock), clock=clock)
     raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))

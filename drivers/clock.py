@@ -1,4 +1,4 @@
-"""The clock everything in a session is timed by: real, or told to run faster than real."""
+"""The clock everything in a session is timed by: real, paced, or simulated."""
 
 import math
 import threading
@@ -13,7 +13,7 @@ class Clock(Protocol):
 
     @property
     def factor(self) -> float:
-        """Told seconds that pass in one real second [-]; 1 for a real clock, 0 where the two are not related."""
+        """Seconds of this clock in one real second [-]; 1 for a real clock, 0 where the two are not related."""
         ...
 
     def now_ns(self) -> int:
@@ -73,7 +73,7 @@ def clock_at(factor: float, longest_step: float = math.inf) -> Clock:
     return RealClock() if factor == 1.0 else PacedClock(factor, longest_step)
 
 
-class ToldClock:
+class SimulatedClock:
     """A clock that moves when it is waited on, for simulated benches only: a session takes no longer than its work.
 
     Every look takes a microsecond, so that no two events share an instant.
@@ -86,12 +86,12 @@ class ToldClock:
         self._now_ns = 1_000_000_000
 
     def now_ns(self) -> int:
-        """Return the told time [ns]."""
+        """Return the simulated time [ns]."""
         self._now_ns += 1000
         return self._now_ns
 
     def sleep(self, seconds: float) -> None:
-        """Let `seconds` of told time pass at once."""
+        """Let `seconds` of simulated time pass at once."""
         self._now_ns += int(max(seconds, 0.0) * 1e9)
 
 

@@ -1,4 +1,4 @@
-"""A transducer that feels the simulated bench without any wire, in told time: for whole studies within seconds.
+"""A transducer that feels the simulated bench without any wire, in simulated time: for whole studies within seconds.
 
 Readings can be lost, and the sensor can freeze, in the middle of chosen strokes.
 """
@@ -28,7 +28,7 @@ class Hurt:
 
 
 class DirectTransducer:
-    """The bench as a transducer; it reads whatever told time has brought."""
+    """The bench as a transducer; it reads whatever simulated time has brought."""
 
     def __init__(self, bench: Bench, clock: Clock, hurt: Hurt | None = None) -> None:
         """Feel `bench`, whose time begins with the stream."""

@@ -12,7 +12,7 @@ class Transport:
     first: float  # [s]
     last: float  # [s]
     place: float  # where it stood at `since` [s]
-    speed: float = 1.0  # told seconds in a real one
+    speed: float = 1.0  # session seconds in a real one
     since: float | None = None  # when it began to move [s, window's clock]; None: it stands
 
     @property

@@ -26,7 +26,7 @@ class Display:
     """Gathers what streams, and sends it now and then. Nothing here touches what is recorded."""
 
     def __init__(self, send: Callable[[Report], None], factor: float) -> None:
-        """Send through `send`; told time runs `factor` times as fast as real."""
+        """Send through `send`; the clock runs `factor` times as fast as real."""
         self._send = send
         self._factor = factor
         self._info: TransducerInfo | None = None

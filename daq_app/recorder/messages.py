@@ -117,7 +117,9 @@ class HealthReport:
     """Four times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
 
     health: Health  # totals since the stream began
-    rate: float  # readings a second over the last second of the machine's clock [Hz]; told seconds count as told
+    rate: (
+        float  # readings a second over the last second of the machine's clock [Hz]; of a paced clock simulated seconds
+    )
     load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
     peak: Six  # the same since somebody acknowledged overloads
     saturated: int  # readings the device called invalid since somebody acknowledged
@@ -159,8 +161,10 @@ class SessionBegun:
     plan: SessionPlan
     people: Kind
     simulated: str | None  # the sentence that heads every file, where something is simulated
-    clock_offset_ns: int  # session clock minus this machine's monotonic clock [ns]; a told clock has none of its own
-    factor: float  # told seconds in one real second [-]
+    clock_offset_ns: (
+        int  # session clock minus this machine's monotonic clock [ns]; a simulated clock has none of its own
+    )
+    factor: float  # session seconds in one real second [-]
     events: tuple[LoggedEvent, ...] = ()  # all that was recorded before, of a session that goes on
 
 

@@ -29,7 +29,7 @@ from sessions.run.runner import Status
 KILLS = 6
 STOPS = 3
 CUTS = 20
-PACE = 20.0  # told seconds a real second
+PACE = 20.0  # simulated seconds a real second
 RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
 DEADLINE = 40.0  # for a recorder that does not answer [s]
 QUOTA = 4 * 2**20  # [bytes]

@@ -1,4 +1,4 @@
-"""A whole study of simulated people: what was planted is known, and so is what was spoilt. In told time, in seconds.
+"""A whole study of simulated people: what was planted is known, and so is what was spoilt. It takes seconds.
 
 Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
 people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
@@ -16,7 +16,7 @@ from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.due_events import DueEvents
 from daq_app.simulation.wiring import planted_surface
-from drivers.clock import Clock, ToldClock
+from drivers.clock import Clock, SimulatedClock
 from sessions.atomic_file import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import VisitSetting, plan, protocol
@@ -123,7 +123,7 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
     a, b, c, d, e, f = gains.tolist()
     bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
-    clock = ToldClock()
+    clock = SimulatedClock()
     transducer = DirectTransducer(bench, clock, Hurt(_one(spoilt.lost), _one(spoilt.frozen)))
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
@@ -156,7 +156,7 @@ def _row(subject: str, trial: Trial, stroke: PlantedStroke) -> dict[str, Any]:
 
 
 class SyntheticPeople(DueEvents):
-    """Experimenter and subject in one, on a bench in told time."""
+    """Experimenter and subject in one, on a bench in simulated time."""
 
     def __init__(
         self,

@@ -86,7 +86,7 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     factor = clock.get("factor", 1.0)
     if factor != 1.0:
         words = f"{factor:g} times as fast as the wall clock" if factor else "which moves when it is waited on"
-        facts.append(Fact("clock", f"told time, {words}"))
+        facts.append(Fact("clock", f"simulated time, {words}"))
     return tuple(fact for fact in facts if fact.value)
 
 

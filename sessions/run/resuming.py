@@ -107,7 +107,7 @@ class ContinuedClock:
 
     @property
     def factor(self) -> float:
-        """Return the told seconds in one real second."""
+        """Return the session seconds in one real second."""
         return self.clock.factor
 
     def now_ns(self) -> int:
@@ -141,7 +141,7 @@ def continued(recording: Recording, last: ReadingBlock, clock: Clock, now: datet
     instants = [at_ns, *(event.time_ns for event in recording.events), *last.received_ns.tolist()]
     last_ns = max(instants)
     elapsed_ns = round((now - datetime.fromisoformat(utc)).total_seconds() * 1e9)
-    # A told clock ran faster; while nothing ran, time passed as on the wall.
+    # A simulated clock ran faster; while nothing ran, time passed as on the wall.
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()
     duration = gap_ns * 1e-9 if elapsed_ns >= 0 else None

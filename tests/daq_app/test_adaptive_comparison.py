@@ -9,7 +9,7 @@ from test_constant_stimuli import felt
 from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.wiring import SimulatedPeople
-from drivers.clock import ToldClock
+from drivers.clock import SimulatedClock
 from sessions.plan.adaptive import next_comparison
 from sessions.plan.plan import Stimulus
 from sessions.plan.protocols import plan, protocol
@@ -31,7 +31,7 @@ ADAPTIVE = protocol("adaptive-comparison")
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    folder, clock = tmp_path_factory.mktemp("adaptive") / "S03", ToldClock()
+    folder, clock = tmp_path_factory.mktemp("adaptive") / "S03", SimulatedClock()
     people = SimulatedPeople(3, clock, planted=ADAPTIVE.planted_friction)
     planned = plan(ADAPTIVE, "S03", 3, forces=False)
     conduct(planned, folder, Participants(people, None, clock), Console(as_json=True), durable=False)

@@ -8,7 +8,7 @@ import pytest
 from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.wiring import SimulatedPeople, planted_surface
-from drivers.clock import ToldClock
+from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
 from sessions.report.experiments import experiments, with_psychometric
@@ -27,7 +27,7 @@ from simulators.subject import SubjectSettings
 
 def session(folder, seed):
     """Return a visit that only compares, run and read again."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     people = SimulatedPeople(seed, clock)
     planned = plan(protocol("constant-stimuli"), f"S{seed:02d}", seed, forces=False)
     conduct(planned, folder, Participants(people, None, clock), Console(as_json=True), durable=False)

@@ -1,6 +1,6 @@
 """Makes the sessions of this format version that later versions must still read: `python tests/data/make_sessions.py`.
 
-Two trials in told time, on a transducer that presses 2 N, drags 1 N and slides 20 mm/s. `sealed` ended as it should;
+Two trials in simulated time, on a transducer that presses 2 N, drags 1 N and slides 20 mm/s. `sealed` ended as it should;
 `live` was left by a crash in its second trial, write-ahead log and all. Made once, when a version is released.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "sessions")]
 
-from stand_ins import Hands, StandIn, ToldClock  # noqa: E402
+from stand_ins import Hands, SimulatedClock, StandIn  # noqa: E402
 
 from sessions.plan.protocols import plan, protocol  # noqa: E402
 from sessions.recording import SessionWriter, provenance  # noqa: E402
@@ -43,7 +43,7 @@ class Slider(StandIn):
 
 def record(folder, in_second_stroke):
     """Run one session of two trials, and call `in_second_stroke` when the second stroke is asked for."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     whole = plan(protocol("sensotact-friction"), "G01", 3)
     short = replace(whole, blocks=tuple(replace(block, trials=block.trials[:1]) for block in whole.blocks))
     transducer = Slider(clock, lost=(40, 41))

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from recordings import begun, change, readings
-from stand_ins import INFO, ToldClock
+from stand_ins import INFO, SimulatedClock
 from told_session import Session
 
 from sessions.exchange import ExportSource, export
@@ -26,7 +26,7 @@ def whole(folder):
 
 def torn(folder):
     """Nothing simulated, texts beyond ASCII, lost readings, a silence, odd numbers, a damaged block, and no end."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     writer = begun(folder, info=replace(INFO, simulated=False), clock=clock)
     writer.event("take_started", 1, {"take": 1}, time_ns=50)
     for first, later, received in ((0, 0.0, 100), (110, 0.0, 200), (210, 30.0, 300), (310, 30.0, 400)):

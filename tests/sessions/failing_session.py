@@ -1,7 +1,7 @@
-"""A session in told time on a disk that fails, and ways to fail."""
+"""A session in simulated time on a disk that fails, and ways to fail."""
 
 from faulty_disk import FULL, IOERR_WRITE, OK, faulty_disk
-from stand_ins import INFO, Hands, StandIn, ToldClock
+from stand_ins import INFO, Hands, SimulatedClock, StandIn
 
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
@@ -14,14 +14,14 @@ RESERVE = 2**20
 
 
 class OnADisk:
-    """A session in told time on a disk that fails as `fail` says; `acknowledged` is what was last said to be safe."""
+    """A session in simulated time on a disk that fails as `fail` says; `acknowledged` is what was last said to be safe."""
 
     def __init__(self, folder, fail):
         self.folder = folder
         self.end = self.error = None
         self.safe_events = []
         self.acknowledged = 0
-        clock = ToldClock()
+        clock = SimulatedClock()
         with faulty_disk(fail) as disk:
             try:
                 writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)

@@ -5,7 +5,7 @@ import struct
 from contextlib import closing
 
 import numpy as np
-from stand_ins import INFO, ToldClock
+from stand_ins import INFO, SimulatedClock
 
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
@@ -24,7 +24,7 @@ PLAN = SessionPlan(
 
 
 def begun(folder, *, info=INFO, plan=PLAN, clock=None, subject_simulated=False):
-    clock = clock or ToldClock()
+    clock = clock or SimulatedClock()
     return SessionWriter.create(folder, plan, info, provenance(clock), subject_simulated=subject_simulated, clock=clock)
 
 

@@ -31,7 +31,7 @@ PROVENANCE = {
 DEPTH = {"stickiness": 2.0, "slipperiness": 1.5}
 
 
-class ToldClock:
+class SimulatedClock:
     factor = 1.0
 
     def __init__(self):
@@ -77,7 +77,7 @@ def plan(subject="P01", *, forces=True, per_block=5):
 
 def record(folder, *, seed=1, subject="P01", forces=True, per_block=5, discard=None):
     """Write a session; return the folder and what was planted, a list of (trial, PlantedStroke)."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     made = plan(subject, forces=forces, per_block=per_block)
     writer = SessionWriter.create(
         folder, made, INFO if forces else None, PROVENANCE, subject_simulated=True, clock=clock

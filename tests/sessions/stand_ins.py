@@ -33,7 +33,7 @@ INFO = TransducerInfo(
 )
 
 
-class ToldClock:
+class SimulatedClock:
     """A clock that moves when slept on, and by one microsecond at every look."""
 
     factor = 1.0

@@ -1,4 +1,4 @@
-from stand_ins import Hands, ToldClock
+from stand_ins import Hands, SimulatedClock
 from told_session import PAPER, Session, once
 
 from sessions.plan.protocols import VisitSetting, plan
@@ -28,7 +28,7 @@ def test_what_a_terminal_cannot_tell_of_an_answer_is_empty_and_not_invented(tmp_
 def test_the_plan_keeps_both_hands_and_leaves_them_open_where_nobody_stated_them(tmp_path):
     assert plan(PAPER, "S01", 3).stroking_hand is None
     stated = plan(PAPER, "S01", 3, forces=False, setting=VisitSetting(stroking_hand="right", answering_hand="left"))
-    clock = ToldClock()
+    clock = SimulatedClock()
     writer = SessionWriter.create(tmp_path / "s", stated, None, provenance(clock), clock=clock)
     run_session(stated, writer, Hands(clock), None, clock)
     assert Recording.open(tmp_path / "s").plan == stated

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from recordings import PLAN, begun, ended, plainly_read, readings, rows
-from stand_ins import CALIBRATION, INFO, ToldClock
+from stand_ins import CALIBRATION, INFO, SimulatedClock
 
 from drivers.readings import ReadingBlock
 from sessions.recording import Recording, RecordingError, Setting, provenance
@@ -100,7 +100,7 @@ def test_a_rate_or_range_that_nobody_knows_is_null_in_the_file_and_nan_when_read
 
 def test_provenance_holds_versions_clock_and_marked_settings_and_no_name_of_person_or_computer():
     told = provenance(
-        ToldClock(), [Setting("height", 20.0, "mm", "measured"), Setting("filter", "none", "", "default")]
+        SimulatedClock(), [Setting("height", 20.0, "mm", "measured"), Setting("filter", "none", "", "default")]
     )
     assert told["settings"] == {
         "height": {"value": 20.0, "unit": "mm", "origin": "measured"},
@@ -180,7 +180,7 @@ def test_the_store_writes_ahead_and_waits_for_the_disk(tmp_path):
 
 
 def test_readings_are_committed_once_a_second_of_the_session_clock(tmp_path):
-    clock = ToldClock()
+    clock = SimulatedClock()
     writer = begun(tmp_path / "s", clock=clock)
     safe = []
     for i in range(500):  # 5 s at 100 blocks a second

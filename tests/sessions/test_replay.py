@@ -4,7 +4,7 @@ from dataclasses import replace as replace_fields
 
 import pytest
 from recordings import change, rows
-from stand_ins import INFO, Hands, StandIn, ToldClock
+from stand_ins import INFO, Hands, SimulatedClock, StandIn
 from told_session import resume
 
 from drivers.transducer import LinkLost, SetupError
@@ -51,7 +51,7 @@ def recorded(
     **transducer,
 ):
     """Record a session in simulated time, `most` trials a block; `stop` is asked with the number of readings sent."""
-    clock = ToldClock()
+    clock = SimulatedClock()
     planned = plan(protocol, "S01", 3, forces=forces, phases=phases)
     planned = replace_fields(planned, blocks=tuple(replace_fields(b, trials=b.trials[:most]) for b in planned.blocks))
     info = INFO if forces else None
@@ -361,7 +361,7 @@ def test_a_resumed_session_that_was_altered_is_found(tmp_path):
 
 
 def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it_came(whole):
-    clock = ToldClock(5_000_000_000_000)
+    clock = SimulatedClock(5_000_000_000_000)
     transducer = ReplayTransducer(whole, clock, "replay:whole")
     transducer.start()
     began = clock.ns
@@ -385,11 +385,11 @@ def test_a_replaying_transducer_gives_each_reading_as_long_after_the_start_as_it
 def test_a_recording_without_readings_is_no_transducer(tmp_path):
     recording = recorded(tmp_path / "session", forces=False)
     with pytest.raises(SetupError, match="holds no readings"):
-        ReplayTransducer(recording, ToldClock(), "replay:x")
+        ReplayTransducer(recording, SimulatedClock(), "replay:x")
 
 
 def test_a_replayed_transducer_records_a_session_of_its_own(whole, tmp_path):
-    clock = ToldClock(9_000_000_000_000)
+    clock = SimulatedClock(9_000_000_000_000)
     device = ReplayTransducer(whole, clock, "replay:whole")
     planned = plan(PAPER, "S02", 4)
     writer = SessionWriter.create(tmp_path / "new", planned, device.info, provenance(clock), clock=clock)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from report_session import CALIBRATION, INFO, PROVENANCE, ToldClock, record
+from report_session import CALIBRATION, INFO, PROVENANCE, SimulatedClock, record
 
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame, SessionPlan
@@ -59,7 +59,7 @@ def foreign(folder, *, press=2.0):
         model="force plate",
         calibration=dataclasses.replace(CALIBRATION, raw_unit="N, N mm", matrix=np.eye(6)),
     )
-    writer = SessionWriter.create(folder, plan, info, PROVENANCE, clock=ToldClock())
+    writer = SessionWriter.create(folder, plan, info, PROVENANCE, clock=SimulatedClock())
     counter = np.arange(len(time))
     writer.readings(ReadingBlock(counter, counter, 0 * counter, time, (time * 1e9).astype(np.int64), wrench))
     writer.event("ended", data={})

@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 from hypothesis import given, settings
 from killed_process import forked, kill, lines_of, reported, whole_session
-from stand_ins import INFO, ToldClock
+from stand_ins import INFO, SimulatedClock
 from told_session import Session, resume
 from walks import FORCES, steps, walks
 
@@ -147,7 +147,7 @@ def test_a_session_whose_transducer_was_lost_goes_on_as_often_as_it_is_lost(tmp_
 
 
 def test_a_session_on_time_that_moves_when_it_is_waited_on_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(ToldClock, "factor", 0.0)
+    monkeypatch.setattr(SimulatedClock, "factor", 0.0)
     Session(tmp_path / "s", link_lost_after=1000).run()
     with pytest.raises(RecordingError, match="ran on simulated time without a pace"):
         check_resumable(Recording.open(tmp_path / "s"))
@@ -159,14 +159,14 @@ def test_ended_and_sealed_sessions_are_refused(tmp_path):
         check_resumable(recording)
     seal(tmp_path / "s")
     with pytest.raises(RecordingError, match="is sealed"):
-        SessionWriter.open(tmp_path / "s", ToldClock())
+        SessionWriter.open(tmp_path / "s", SimulatedClock())
 
 
 def test_a_session_that_is_still_written_is_not_resumed(tmp_path):
     session = Session(tmp_path / "s")
     session.writer.event("started")
     with pytest.raises(RecordingError, match="in use"):
-        SessionWriter.open(tmp_path / "s", ToldClock())
+        SessionWriter.open(tmp_path / "s", SimulatedClock())
     session.writer.close()
 
 
@@ -182,7 +182,7 @@ def test_a_wall_clock_set_back_leaves_the_gap_unknown_and_the_session_clock_forw
     Session(tmp_path / "s", link_lost_after=1000).run()
     recording = Recording.open(tmp_path / "s")
     earlier = datetime(2001, 1, 1, tzinfo=UTC)
-    clock, gap = continued(recording, recording.last_block(), ToldClock(7), earlier)
+    clock, gap = continued(recording, recording.last_block(), SimulatedClock(7), earlier)
     assert gap.duration is None
     assert clock.now_ns() > recording.events[-1].time_ns
 

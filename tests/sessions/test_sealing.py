@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from stand_ins import Hands, ToldClock
+from stand_ins import Hands, SimulatedClock
 
 from daq_app.cli.main import run
 from sessions.plan.protocols import Body, plan
@@ -30,7 +30,7 @@ def session(request, tmp_path):
     study = open_study(folder)
     place = study.place(member, study_key(folder))
     planned = plan(study.protocol, "P01", study.session_seed(member.slot), place=place, forces=False)
-    clock = ToldClock()
+    clock = SimulatedClock()
     writer = SessionWriter.create(folder / "P01", planned, None, provenance(clock), subject_simulated=True, clock=clock)
     hands = Hands(clock, None, {AskScore: lambda _: [Scored(50.0)]})
     run_session(planned, writer, hands, None, clock)

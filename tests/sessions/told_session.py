@@ -1,8 +1,8 @@
-"""A whole session in told time, with stand-ins for people and transducer."""
+"""A whole session in simulated time, with stand-ins for people and transducer."""
 
 from datetime import UTC, datetime, timedelta
 
-from stand_ins import INFO, Hands, StandIn, ToldClock
+from stand_ins import INFO, Hands, SimulatedClock, StandIn
 
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
@@ -13,10 +13,10 @@ PAPER = protocol("sensotact-friction")
 
 
 class Session:
-    """A session in told time, run when called."""
+    """A session in simulated time, run when called."""
 
     def __init__(self, folder, *, forces=True, instead=None, **transducer):
-        self.clock = ToldClock()
+        self.clock = SimulatedClock()
         self.plan = plan(PAPER, "S01", 3, forces=forces)
         info = INFO if forces else None
         self.writer = SessionWriter.create(
@@ -43,8 +43,8 @@ def resume(folder, **transducer):
     check_resumable(recording)
     last = recording.last_block()
     now = datetime.fromisoformat(recording.provenance["created_utc"]) + timedelta(seconds=600)
-    clock, gap = continued(recording, last, ToldClock(5_000), now.astimezone(UTC))
-    told = ToldClock(clock.now_ns())
+    clock, gap = continued(recording, last, SimulatedClock(5_000), now.astimezone(UTC))
+    told = SimulatedClock(clock.now_ns())
     device = StandIn(told, **transducer)
     at = resumption(recording.plan, recording.events)
     writer = SessionWriter.open(folder, told)

@@ -22,7 +22,7 @@ from sessions.statistics.scores import mean_scores
 from sessions.strokes import Analysis
 
 EXAMPLE = "daq-app demo --seed 7"
-PACE = 20.0  # told seconds a real second
+PACE = 20.0  # simulated seconds a real second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

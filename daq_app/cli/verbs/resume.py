@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--simulate-subject", type=int, metavar="SEED", help="simulated people (those of the beginning)"
     )
-    parser.add_argument("--pace", type=float, help="told seconds a real second (as at the beginning)")
+    parser.add_argument("--pace", type=float, help="simulated seconds a real second (as at the beginning)")
     parser.add_argument("--end", action="store_true", help="seal the session as it is, and do not go on")
 
 

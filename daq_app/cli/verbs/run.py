@@ -40,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_body_arguments(parser)
     parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
     parser.add_argument("--simulate-subject", type=int, metavar="SEED", help="simulated people")
-    parser.add_argument("--pace", type=float, default=1.0, help="told seconds a real second, simulated people only (1)")
+    parser.add_argument(
+        "--pace", type=float, default=1.0, help="simulated seconds a real second, simulated people only (1)"
+    )
     parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the sensor's origin")
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
     parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
