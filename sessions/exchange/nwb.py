@@ -209,7 +209,7 @@ def _dynamic(table: Table, mark: str) -> object:
 
 
 def _utc(recording: Recording, instant_ns: int) -> datetime:
-    """Return the date of an instant of the session clock; simulated time that moves when waited on passes as the date's."""
+    """Return the date of an instant of the session clock; time of a SimulatedClock passes as the date's."""
     created = datetime.fromisoformat(str(recording.provenance["created_utc"]))
     clock = recording.provenance.get("clock")
     if clock is None:  # how the session clock goes with the date was not recorded: only when it began

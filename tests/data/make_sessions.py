@@ -1,6 +1,6 @@
 """Makes the sessions of this format version that later versions must still read: `python tests/data/make_sessions.py`.
 
-Two trials in simulated time, on a transducer that presses 2 N, drags 1 N and slides 20 mm/s. `sealed` ended as it should;
+Two trials in simulated time, pressing 2 N, dragging 1 N, sliding at 20 mm/s. `sealed` ended as it should;
 `live` was left by a crash in its second trial, write-ahead log and all. Made once, when a version is released.
 """
 

@@ -14,7 +14,7 @@ RESERVE = 2**20
 
 
 class OnADisk:
-    """A session in simulated time on a disk that fails as `fail` says; `acknowledged` is what was last said to be safe."""
+    """A session in simulated time on a disk that fails as `fail` says; `acknowledged` is what it last called safe."""
 
     def __init__(self, folder, fail):
         self.folder = folder
