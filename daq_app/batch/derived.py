@@ -162,7 +162,7 @@ def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     rank = ("none", "small", "both").index
     lost = ["intervals of the SED (--intervals)"] if stood.intervals and not now.intervals else []
     if before and rank(stood.beside) > rank(now.beside):
-        lost.append(f"the variants side by side (--beside {stood.beside})")
+        lost.append(f"the variants side by side (--variants {stood.beside})")
     return lost
 
 

@@ -35,7 +35,7 @@ def session_commands(
         file = scene_file(recording, prediction)
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
         beside = prediction.options.beside
-        sided = ["--beside", "both"] if beside == "both" else []
+        sided = ["--variants", "both"] if beside == "both" else []
         words = [*model_words(prediction.options), *scene, *sided, *_afferent_words(afferent), *settings]
         lines.append(["predict", name, *words])
     if paths is not None:

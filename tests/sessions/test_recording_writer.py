@@ -147,7 +147,7 @@ def test_a_block_tells_the_range_of_its_numbers(tmp_path):
 
 def test_the_file_names_its_format_and_version(tmp_path):
     folder = ended(tmp_path / "s")
-    assert rows(folder, "PRAGMA user_version") == [(2,)]
+    assert rows(folder, "PRAGMA user_version") == [(3,)]
     assert (folder / "session.sqlite").read_bytes()[68:72] == b"DAQF"
 
 

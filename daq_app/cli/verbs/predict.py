@@ -54,7 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     add_quantity(parser, "to print (--json has all)")
     parser.add_argument(
-        "--beside",
+        "--variants",
+        "--beside",  # as it was called before
+        dest="beside",
         choices=["none", "small", "both"],
         default="small",
         help="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "

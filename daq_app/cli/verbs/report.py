@@ -38,7 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         None,
     )
     parser.add_argument(
-        "--beside",
+        "--variants",
+        "--beside",  # as it was called before
+        dest="beside",
         choices=["none", "small", "both"],
         help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
         "with 'both' at finite strain too (about a minute); small, or all that was predicted before",

@@ -255,7 +255,7 @@ def force_table(report: Report) -> Table | None:
 
 
 _OF_STATE = ("normal_per_mm", "normal_force", "tangential_force")  # the depth to match is that of another state
-_ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--beside small)"
+_ROUGH = "found on a rough mesh; under the measured force trials are solved with tau_max computed (--variants small)"
 
 
 def direction_table(report: Report) -> Table | None:
