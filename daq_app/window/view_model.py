@@ -64,7 +64,7 @@ def _of_settled(settled: Settled) -> str:
         return tr(
             "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
         )
-    error = "" if settled.error is None else f" ± {100 * settled.error:.1f} %"
+    error = "" if settled.error is None else f" ± {100 * settled.error:.2g} %"
     by = settled.difference
     if by is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
