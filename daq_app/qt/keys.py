@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
-from daq_app.qt.parts import button, label, panel
+from daq_app.qt.parts import button, label, panel, scrolled
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 
@@ -149,7 +149,6 @@ class KeysPage(QWidget):
         head.addWidget(button(tr("Close  F1"), tr("close the keys"), self.hide))
         inside.addLayout(head)
         rows = QWidget()
-        rows.setObjectName("inside")
         grid = QGridLayout(rows)
         grid.setContentsMargins(0, 0, GRID, 0)
         grid.setHorizontalSpacing(3 * GRID)
@@ -158,12 +157,9 @@ class KeysPage(QWidget):
             grid.addWidget(label(tr(known.key), "value"), row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(label(tr(known.words), "value", wrap=True), row, 1)
         grid.setColumnStretch(1, 1)
-        scroll = QScrollArea()
-        scroll.setWidget(rows)
-        scroll.setWidgetResizable(True)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        scroll.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
-        inside.addWidget(scroll, 1)
+        area = scrolled(rows)
+        area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
+        inside.addWidget(area, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(frame)
