@@ -4,7 +4,6 @@ The tests hold a plain twin of them in NumPy, and compare the two.
 """
 
 from solver._kernels.active_set import meet, solve_active_set, update_contact_states
-from solver._kernels.carrying import carry
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, bind_arguments
 from solver._kernels.elements import assemble, energies, forces
 from solver._kernels.iterating import condense_forces, move
@@ -34,7 +33,6 @@ __all__ = [
     "back_substitute",
     "bind_arguments",
     "bounded_length",
-    "carry",
     "condense",
     "condense_forces",
     "crosses",

@@ -236,19 +236,3 @@ class Slack(NamedTuple):
     force: float  # [N/mm]
     height: float  # [mm]
     by_height: float  # the largest force by the largest height [N/mm per mm]
-
-
-class MeshTransferArrays(NamedTuple):
-    """Which parts of an old mesh of lines and rows of nodes the nodes and quadrature points of a new one lie in."""
-
-    combination: Array  # (old e, 3, 3) pressure modes as combinations of 1, x, y
-    centre: Array  # (old e, 2) what x, y are counted from [mm]
-    along: Narrow  # (lines,) first of the three old lines that a new line takes its values from
-    along_parts: Array  # (lines, 3) its part of each
-    across: Narrow  # (rows,) the same of rows
-    across_parts: Array  # (rows, 3)
-    station: Narrow  # (a, 3) old element along that holds each quadrature point
-    layer: Narrow  # (b, 3) and across
-    points: Array  # (e, q, 2) the new quadrature points [mm]
-    weight: Array  # (e, q) of them
-    modes: Array  # (e, q, 3) pressure modes there

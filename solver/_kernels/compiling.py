@@ -1,5 +1,6 @@
 """How numba compiles the loops, once on a machine, and the types and constants they share."""
 
+import gc
 import os
 import signal
 import threading
@@ -120,6 +121,9 @@ class _Compilation(_event.Listener):
         self._loop, self._open = loop, ExitStack()
         doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
         self._open.enter_context(aside(doing))
+        if gc.isenabled():  # numba makes millions of objects that stay: to look through them is a sixth of its time
+            gc.disable()
+            self._open.callback(gc.enable)
         self._hear_ctrl_c()
 
     def on_end(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
@@ -164,7 +168,7 @@ def compiled(function: Loop) -> Loop:
     both, so that the last bits of a result would depend on what was called before. A division by zero makes infinity:
     to raise would take a branch each time, and a sixth more time to compile.
     """
-    loop = _numba.njit(fastmath=_FAST, inline="always", error_model="numpy")(function)
+    loop = _numba.njit(fastmath=_FAST, inline="always", error_model="numpy", no_cfunc_wrapper=True)(function)
     loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
     return cast("Loop", loop)
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import _kernels as kernels
-from solver._kernels.arguments import MeshTransferArrays
-from solver.arrays import Array, Flags, Indices, Narrow
+from solver.arrays import Array, Flags, Indices
 from solver.body.finite import VALUES, FiniteBody
 from solver.contact.skin import arcs_of
 from solver.element import Q2P1
@@ -47,12 +46,12 @@ class MeshTransfer:
 
     old: Places
     new: Places
-    along: Narrow  # (2 a + 1,) first of the three old lines that a new line takes its values from
+    along: Indices  # (2 a + 1,) first of the three old lines that a new line takes its values from
     along_parts: Array  # (2 a + 1, 3) its part of each
-    across: Narrow  # (2 b + 1,) the same of rows
+    across: Indices  # (2 b + 1,) the same of rows
     across_parts: Array  # (2 b + 1, 3)
-    station: Narrow  # (a, 3) old elements along the skin that hold the new quadrature points
-    layer: Narrow  # (b, 3) and across it
+    station: Indices  # (a, 3) old elements along the skin that hold the new quadrature points
+    layer: Indices  # (b, 3) and across it
     forces: Array  # (k, old k) the new skin's forces by the old skin's: by length they are linear between its nodes
     nearest: Indices  # (k,) old node of the skin
     driven: Flags  # (nodes, 2) which components of the new nodes are held
@@ -61,8 +60,8 @@ class MeshTransfer:
     def of(old: Places, new: Places) -> "MeshTransfer":
         """Find for each place of the `new` mesh where it lies in the `old` one."""
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
-        station = _piece(old.arcs[::2], new.inner_arcs).astype(np.int32)
-        layer = _piece(old.heights[::2], new.inner_heights).astype(np.int32)
+        station = _piece(old.arcs[::2], new.inner_arcs)
+        layer = _piece(old.heights[::2], new.inner_heights)
         onto = np.stack([np.interp(new.skin, old.skin, one, 0.0, 0.0) for one in np.eye(len(old.skin))], axis=1)
         forces = new.lengths[:, None] * onto / old.lengths
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
@@ -85,13 +84,16 @@ class MeshTransfer:
         state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
         change in volume, small as it is, a stiff body would answer strongly.
         """
-        old, new = self.old.body, self.new.body
-        u_new, pressure_new = np.empty(new.mesh.nodes.shape), np.empty((len(new.nodes), 3))
-        transfer = MeshTransferArrays(
-            old.combination, old.centre, self.along, self.along_parts, self.across, self.across_parts, self.station,
-            self.layer, self.new.points, new.weight, new.modes,
-        )  # fmt: skip
-        kernels.carry(u, pressure, transfer, u_new, pressure_new)
+        old, new, three = self.old.body, self.new.body, np.arange(3)
+        grid = u.reshape(len(self.old.arcs), len(self.old.heights), 2)
+        lines = np.einsum("ln,lnrc->lrc", self.along_parts, grid[self.along[:, None] + three])
+        u_new = np.einsum("rn,lrnc->lrc", self.across_parts, lines[:, self.across[:, None] + three]).reshape(-1, 2)
+        layers = (len(self.old.heights) - 1) // 2
+        host = (layers * self.station[:, None, :, None] + self.layer[None, :, None, :]).reshape(-1, 9)
+        slopes = np.einsum("em,emc->ec", pressure, old.combination)[host]  # (e, 9, 3) by 1, x, y
+        away = self.new.points - old.centre[host]
+        field = slopes[..., 0] + slopes[..., 1] * away[..., 0] + slopes[..., 2] * away[..., 1]
+        pressure_new = np.einsum("eq,eq,eqm->em", new.weight, field, new.modes)
         u_new[self.driven] = 0.0
         return u_new, pressure_new
 
@@ -117,10 +119,10 @@ def _piece(ends: Array, points: Array) -> Indices:
     return np.searchsorted(ends[1:-1], points, side="right")
 
 
-def _interpolation(nodes: Array, points: Array) -> tuple[Narrow, Array]:
+def _interpolation(nodes: Array, points: Array) -> tuple[Indices, Array]:
     """Return which three of `nodes` (n,) of quadratic lines values at `points` (p,) come from, first (p,) and parts."""
     ends = nodes[::2]
     piece = _piece(ends, points)
     local = 2.0 * (points - ends[piece]) / (ends[piece + 1] - ends[piece]) - 1.0
     parts = [local * (local - 1.0) / 2.0, 1.0 - local * local, local * (local + 1.0) / 2.0]
-    return (2 * piece).astype(np.int32), np.stack(parts, axis=1)
+    return 2 * piece, np.stack(parts, axis=1)
