@@ -9,13 +9,14 @@ from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import LoadState
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
-from tests.solver.oracle import finite as oracle
 
 PULL = LoadState(1.0, 0.28, 0.008033, -1)
 
 
 def places(fineness):
-    return Places.of(finger_mesh(Finger(), Receptor(), Sizing(fineness, 2.0, margin=2.0)), finger(fineness)[0].body)
+    return Places.of(
+        finger_mesh(Finger(), Receptor(), Sizing(fineness, 2.0, margin=2.0)), finger(fineness)[0].condensed.body
+    )
 
 
 def test_a_mesh_carries_a_state_to_itself_unchanged():
@@ -27,22 +28,17 @@ def test_a_mesh_carries_a_state_to_itself_unchanged():
     np.testing.assert_allclose(same.pressure, shape.pressure, atol=1e-7)
 
 
-def test_the_compiled_carrying_is_the_plain_one():
-    shape = settled(finger(5)[0], PULL)
-    bridge = MeshTransfer.of(places(5), places(8))
-    old, new = bridge.old, bridge.new
-    combined = np.einsum("em,eml->el", shape.pressure, old.body.combination)
-    slopes = combined.copy()
-    slopes[:, 0] -= np.einsum("ei,ei->e", combined[:, 1:], old.body.centre)
-    layers = len(old.heights) // 2
-    host = bridge.station[:, None, :, None] * layers + bridge.layer[None, :, None, :]
-    u, pressure = oracle.carry(
-        shape.u.reshape(len(old.arcs), len(old.heights), 2), slopes, (bridge.along, bridge.along_parts),
-        (bridge.across, bridge.across_parts), host.reshape(-1, 9), new.points, new.body.weight, new.body.modes,
-    )  # fmt: skip
-    found, modes = bridge.fields(shape.u, shape.pressure)
-    np.testing.assert_allclose(found, u.reshape(-1, 2), rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(modes, pressure, rtol=1e-10, atol=1e-15)
+def test_a_linear_pressure_and_a_displacement_of_the_whole_are_the_same_on_another_mesh():
+    old, new = places(5), places(8)
+    pressures = [
+        np.einsum("eq,eqm,eq->em", one.body.weight, one.body.modes, 1.0 + one.points @ [2.0, -3.0])
+        for one in (old, new)
+    ]
+    everywhere = np.tile([0.3, -0.2], (len(old.body.mesh.nodes), 1))
+    u, pressure = MeshTransfer.of(old, new).fields(everywhere, pressures[0])
+    np.testing.assert_allclose(pressure, pressures[1], rtol=1e-10, atol=1e-12)
+    held = new.body.mesh.driven
+    np.testing.assert_allclose(u, np.where(held, 0.0, [0.3, -0.2]), rtol=1e-13)
 
 
 @pytest.mark.parametrize("fineness", [8, 12])

@@ -155,28 +155,6 @@ def rubbed(x: Array, touching: Flags, mu: float) -> Array:
     return out
 
 
-def carry(
-    u: Array,
-    slopes: Array,
-    along: tuple[Indices, Array],
-    across: tuple[Indices, Array],
-    host: Indices,
-    points: Array,
-    weight: Array,
-    modes: Array,
-) -> tuple[Array, Array]:
-    """Return displacements (lines, rows, 2) and pressure modes (e, 3) of a state taken to another mesh.
-
-    `u` (old lines, old rows, 2); `along` and `across` the first of three lines or rows that each new one takes its
-    values from, and its parts; `slopes` (old e, 3) pressures as combinations of 1, x, y; `host` (e, 9) old elements
-    that hold the new quadrature points, at `points` (e, 9, 2), of `weight` (e, 9) and `modes` (e, 9, 3).
-    """
-    lines = np.einsum("ln,lnrc->lrc", along[1], u[along[0][:, None] + np.arange(3)])
-    rows = np.einsum("rn,lrnc->lrc", across[1], lines[:, across[0][:, None] + np.arange(3)])
-    field = slopes[host, 0] + slopes[host, 1] * points[..., 0] + slopes[host, 2] * points[..., 1]
-    return rows, np.einsum("eq,eqm,eq->em", weight, modes, field)
-
-
 def restated(
     state: Indices,
     sense: Indices,
