@@ -19,8 +19,8 @@ from solver.element import Q2P1
 from solver.linalg.multifrontal import Elimination, symbolic_factorization
 from solver.mesh.mesh import Mesh, distinct
 from solver.quantities import QUANTITIES, LocalState
+from solver.tolerances import IMAGINARY
 
-IMAGINARY = 1e-30  # step whose square is nothing [-]
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 
 

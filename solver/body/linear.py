@@ -19,6 +19,7 @@ from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.element import GAUSS_4, Q2P1, line
 from solver.linalg.multifrontal import factors_of, symbolic_factorization
 from solver.mesh.mesh import Mesh
+from solver.tolerances import UNHELD
 
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 
@@ -110,7 +111,6 @@ def _memory(size: int) -> Array:
 Motion = Literal["x", "y", "turn"]
 _POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
-UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]
 
 
 class CondensedLinear:

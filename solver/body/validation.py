@@ -12,8 +12,8 @@ from solver.constitutive.linear import Prony
 from solver.element import Q2P1
 from solver.mesh.mesh import Mesh, jacobians
 from solver.scene.tables import STIFFENING
+from solver.tolerances import CUT
 
-HELD = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
 MOTIONS = ("x", "y", "turn")  # of a body as a whole
 
 
@@ -177,7 +177,7 @@ def loose(mesh: Mesh) -> Array:
     moves = np.stack([np.c_[one, zero].ravel(), np.c_[zero, one].ravel(), np.c_[-y, x].ravel()], axis=1)[mesh.fixed]
     _, sizes, ways = np.linalg.svd(np.concatenate([moves, np.zeros((3, 3))]), full_matrices=False)
     ways[:, 2] /= np.ptp(mesh.nodes)
-    return ways[sizes[:3] < HELD * np.sqrt(len(mesh.fixed) + 1.0)].T
+    return ways[sizes[:3] < CUT * np.sqrt(len(mesh.fixed) + 1.0)].T
 
 
 def check_driven(mesh: Mesh) -> None:
@@ -201,7 +201,7 @@ def check_held(mesh: Mesh, free: Sequence[str] = ()) -> None:
         )
     left = loose(mesh)
     left[[MOTIONS.index(name) for name in free]] = 0.0
-    if len(mesh.fixed) and np.abs(left).max(initial=0.0) > HELD:
+    if len(mesh.fixed) and np.abs(left).max(initial=0.0) > CUT:
         raise BodyError(
             "what is held leaves the body a motion as a whole; hold more of it, or name the motion in free, for the "
             "surface to balance"

@@ -19,16 +19,30 @@ from solver.failures import Cancelled, NotConverged
 from solver.progress import report_progress
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
-TOLERANCE = 1e-6  # of a point on the branch [mm]
-FIRST, SHORTEST = 0.1, 1e-3  # steps along the branch, by what is looked through
-MOST = 400  # of them
-TURN = 0.7  # least cosine between the directions of the branch and of a step along it
-SQUEEZE = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a folded branch has less
-CREASE = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
-STEEP = 0.1  # part of the value in the branch's direction, from which a limit point is far
-HOPS, HOP = 3, (0.01, 0.03)  # tries to go on where a branch ends, by how much of its value
-STAYS = 0.05  # by how much forces change then, at most
-APART = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+
+
+@dataclass(frozen=True, slots=True)
+class BranchControl:
+    """How a branch is followed, and what counts as its end; steps by what is looked through."""
+
+    tolerance: float = 1e-6  # of a point on the branch [mm]
+    first: float = 0.1  # step along the branch
+    shortest: float = 1e-3
+    growth: float = 1.5  # of the step after a point that was easily found
+    easy: int = 5  # iterations of such a point, at most
+    corrections: int = 12  # of a point
+    most: int = 400  # points
+    turn: float = 0.7  # least cosine between the directions of the branch and of a step along it
+    squeeze: float = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a fold has less
+    crease: float = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
+    steep: float = 0.1  # part of the value in the branch's direction, from which a limit point is far
+    hops: int = 3  # tries to go on where a branch ends
+    hop: tuple[float, ...] = (0.01, 0.03)  # by how much of its value
+    stays: float = 0.05  # by how much forces change then, at most
+    apart: float = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+
+
+BRANCH = BranchControl()
 
 
 class Followed(Protocol):
@@ -75,7 +89,7 @@ def continue_branch(
 ) -> Branch:
     """Do as `follow`, and go on where the branch only turns back for a moment."""
     branch = follow(finger, start, by, target, folds, stop)
-    for _ in range(HOPS):
+    for _ in range(BRANCH.hops):
         beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
         if beyond is None:
             break
@@ -91,18 +105,18 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
     """
     last = branch.last
     compression = finger.skin_compression(last)
-    if compression.least < folds + APART:
+    if compression.least < folds + BRANCH.apart:
         return None
-    for part in HOP:
+    for part in BRANCH.hop:
         value = min((1.0 + part) * branch.value, target)
         try:
-            there = finger.newton.settle(last, with_value(last.load, by, value), TOLERANCE)
+            there = finger.newton.settle(last, with_value(last.load, by, value), BRANCH.tolerance)
         except NotConverged:
             continue
-        near = abs(there.force - last.force).max() <= STAYS * abs(last.force).max()
+        near = abs(there.force - last.force).max() <= BRANCH.stays * abs(last.force).max()
         if (
             near
-            and finger.skin_compression(there).least > compression.least - APART
+            and finger.skin_compression(there).least > compression.least - BRANCH.apart
             and not jumped_branch(finger, last, there)
         ):
             return there
@@ -127,16 +141,16 @@ def follow(
         return Branch((start,), way[0].value, limited=False)
     best = 0  # of them, by value
     reach = min(abs(target - way[0].value), LARGEST_MU)
-    length = FIRST * reach
+    length = BRANCH.first * reach
     direction, rate = _tangent(finger.newton, start, by)
     doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
-    for _ in range(MOST):
+    for _ in range(BRANCH.most):
         if stop():
             raise Cancelled
         report_progress(doing, abs(way[best].value - way[0].value) / reach)
-        step = _further(finger, way[-1], by, direction, rate, length, target, SHORTEST * reach)
+        step = _further(finger, way[-1], by, direction, rate, length, target, BRANCH.shortest * reach)
         if step is None:
-            lost = rate > STEEP and way[-1].compression.least > folds + APART
+            lost = rate > BRANCH.steep and way[-1].compression.least > folds + BRANCH.apart
             return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
         point, length = step
         if point.compression.least < folds:
@@ -146,13 +160,13 @@ def follow(
             )
             value = max(way[best].value, last.value + part * (point.value - last.value))
             return Branch(tuple(point.shape for point in way[: best + 1]), value, limited=True)
-        easy = point.shape.iterations - way[-1].shape.iterations <= 5
+        easy = point.shape.iterations - way[-1].shape.iterations <= BRANCH.easy
         way.append(point)
         if point.value > way[best].value:
             best = len(way) - 1
         if point.value >= target * (1.0 - 1e-12):
             return Branch(tuple(point.shape for point in way), point.value, limited=False)
-        length *= 1.5 if easy else 1.0
+        length *= BRANCH.growth if easy else 1.0
         before = direction, rate
         direction, rate = _tangent(finger.newton, point.shape, by)
         if direction @ before[0] + rate * before[1] < 0.0:
@@ -184,7 +198,9 @@ def _further(
         found = _next(finger.newton, last.shape, by, direction, rate, length, target)
         if found is not None:
             compression = finger.skin_compression(found)
-            if compression.least >= last.compression.least - APART and not jumped_branch(finger, last.shape, found):
+            if compression.least >= last.compression.least - BRANCH.apart and not jumped_branch(
+                finger, last.shape, found
+            ):
                 return _Point(found, compression, value_of(found.load, by)), length
         length /= 2.0
     return None
@@ -203,7 +219,7 @@ def with_value(load: LoadState, by: int, value: float) -> LoadState:
 def jumped_branch(finger: Followed, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
     one, other = finger.skin_compression(before), finger.skin_compression(after)
-    return other.least < SQUEEZE * one.least or other.kink > CREASE or finger.crosses(after)
+    return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
 
 
 def _tangent(newton: Newton, shape: EquilibriumState, by: int) -> tuple[Array, float]:
@@ -223,7 +239,7 @@ def _next(
     to_target = rate * length >= target - value
     shape, load = start, start.load
     gone = np.zeros(len(newton.steps))
-    for _ in range(12):
+    for _ in range(BRANCH.corrections):
         if not newton.linearise(shape, load, newton.skin_x):
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
@@ -241,8 +257,8 @@ def _next(
         gone = gone + step
         if not largest < 10.0:
             return None
-        if largest < TOLERANCE and not changed:
+        if largest < BRANCH.tolerance and not changed:
             way = np.sqrt(gone @ gone + (value_of(load, by) - value) ** 2)
             straight = direction @ gone + rate * (value_of(load, by) - value)
-            return shape if straight > TURN * way else None
+            return shape if straight > BRANCH.turn * way else None
     return None

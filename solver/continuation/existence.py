@@ -14,7 +14,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SHEAR_LIMITED, STEEP
 from solver.arrays import Array
-from solver.continuation.arc_length import CREASE, LARGEST_MU, TOLERANCE, Branch, continue_branch, follow
+from solver.continuation.arc_length import BRANCH, LARGEST_MU, Branch, continue_branch, follow
 from solver.continuation.surface_instability import folds_at
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
@@ -81,12 +81,12 @@ def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: F
 def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = SOUND) -> bool:
     """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
     compression = finger.skin_compression(shape)
-    return compression.lowest >= least and compression.kink <= CREASE and not finger.crosses(shape)
+    return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(shape)
 
 
 def folded(finger: FiniteFinger, shape: EquilibriumState) -> bool:
     """Return whether the skin has a crease or crosses itself."""
-    return finger.skin_compression(shape).kink > CREASE or finger.crosses(shape)
+    return finger.skin_compression(shape).kink > BRANCH.crease or finger.crosses(shape)
 
 
 def _asked(scene: Scene, load: LoadState, by: int, target: float, stop: Callable[[], bool]) -> _Question:
@@ -123,7 +123,7 @@ def _followed(finger: FiniteFinger, start: EquilibriumState, asked: _Question, f
     branch = continue_branch(finger, start, asked.by, target, folds, asked.stop)
     if branch.limited or target == asked.target:
         return branch
-    last = settled(finger.newton, branch.last.load._replace(mu=asked.target), branch.last, TOLERANCE, asked.stop)
+    last = settled(finger.newton, branch.last.load._replace(mu=asked.target), branch.last, BRANCH.tolerance, asked.stop)
     return Branch((*branch.states, last), asked.target, limited=False)
 
 
@@ -141,10 +141,12 @@ def _squeezed(finger: FiniteFinger, shape: EquilibriumState) -> float:
 def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
     """Return the state at which the branch begins. Raises NotConverged."""
     if asked.by == BY_FRICTION:
-        return settled(finger.newton, asked.load, None, TOLERANCE, asked.stop)
+        return settled(finger.newton, asked.load, None, BRANCH.tolerance, asked.stop)
     for part in STARTS:
         try:
-            start = settled(finger.newton, asked.load._replace(depth=part * asked.target), None, TOLERANCE, asked.stop)
+            start = settled(
+                finger.newton, asked.load._replace(depth=part * asked.target), None, BRANCH.tolerance, asked.stop
+            )
         except NotConverged:
             continue
         if sound(finger, start):
@@ -166,7 +168,7 @@ def _begun(
         if rough.skin_compression(state).lowest < SMOOTH:
             continue
         try:
-            shape = settled(fine.newton, state.load, fine.transfer(state, rough), TOLERANCE, asked.stop)
+            shape = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance, asked.stop)
         except NotConverged:
             continue
         if sound(fine, shape) or state is states[0]:

@@ -22,14 +22,13 @@ from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, G
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
 from solver.scene.scene import Scene
+from solver.tolerances import ALL_SLIPS, FORCE_MET
 
 FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
 LEADING = 1e-3  # tolerance of states that only lead to others [mm]
 BEYOND = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
 SEARCHES = 20  # steps of a search for the depth at which a force is met
 FURTHEST = 0.25  # of the depth, by which it may change in one
-MET = 1e-9  # relative difference within which it is
-ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
 
 
@@ -185,7 +184,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Calla
     shape, depth = start, start.load.depth
     for _ in range(SEARCHES):
         shape = sliding.settled(newton, shape.load._replace(depth=depth), shape, stop=stop)
-        if abs(shape.force[1] / force - 1.0) < MET:
+        if abs(shape.force[1] / force - 1.0) < FORCE_MET:
             return shape
         if not newton.linearise(shape, shape.load, newton.skin_x):
             break

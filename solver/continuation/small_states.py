@@ -27,6 +27,7 @@ from solver.failures import ContactLost, NoSteadyState, NotConverged, beyond_fri
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.progress import Progress, report_part
 from solver.scene.scene import Scene
+from solver.tolerances import ALL_SLIPS
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
@@ -163,7 +164,6 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
     return sqrt(low * high)
 
 
-ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
 NUDGE = 1e-4  # of a given force, to see whether the finger gives way
 
 

@@ -12,7 +12,8 @@ from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import SHALLOW, Friction, Loading, Scene, Solve
+from solver.scene.scene import Friction, Loading, Scene, Solve
+from solver.tolerances import SHALLOW
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
 COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it

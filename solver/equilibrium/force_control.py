@@ -11,14 +11,14 @@ from typing import TypeVar
 from solver._kernels import STICK
 from solver.arrays import Array
 from solver.equilibrium.load_stepping import advance
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
 from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import report_progress
+from solver.tolerances import UNMET
 
 State = TypeVar("State")
 FIRST, FURTHEST = 1e-7, 1.0  # first stride [mm], and where the search for two ends is given up
 SEARCHES = 60
-UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
 
 
 def find_root(at: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
@@ -103,7 +103,7 @@ def _iterated(
         if done is None:
             raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
         shape, largest, changed = done
-        if not largest < 1e3:
+        if not largest < CONTROL.unbounded:
             raise NotConverged("the displacements grow without bound")
         if largest < tolerance and not changed:
             return shape

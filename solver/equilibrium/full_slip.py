@@ -1,7 +1,7 @@
 """The settled sliding state directly: every touching point slips, so nothing is left of how it came there."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -13,12 +13,23 @@ from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.failures import ContactLost, NotConverged
 from solver.progress import report_progress
 
-HERTZ = 0.5  # part of the depth below which skin is first thought to touch: half as deep is half the overlap's square
-SHORT = 12  # systems after which that guess is given up
-GUESSES = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # parts of the depth in which skin is first thought to touch, in turn
-FIRST_TOLERANCE = 1e-3  # of the steps that only lead to the last one [mm]; looser ones go astray near nu = 0.5
-WORK = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
-SMALLEST = 1.0 / 64.0  # part of the way below which a failing step is given up
+
+@dataclass(frozen=True, slots=True)
+class SlipControl:
+    """Where skin is first thought to touch, and how a slide is led to that one step does not reach.
+
+    To halve or double the numbers of a slide at finite strain changes neither states nor tangents of sixteen slides.
+    """
+
+    hertz: float = 0.5  # part of the depth below which skin may touch: half as deep is half the overlap's square
+    short: int = 12  # systems after which that guess is given up
+    parts: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # of the depth in which skin may touch, in turn
+    leading: float = 1e-3  # tolerance of steps that only lead to the last [mm]; looser ones go astray near nu = 0.5
+    work: int = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
+    smallest: float = 1.0 / 64.0  # part of the way below which a failing step is given up
+
+
+CONTROL = SlipControl()
 
 
 def settled(
@@ -38,13 +49,13 @@ def settled(
         return _at_once(newton, load, start)
     shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
     begin = shape.load if start is not None else LoadState(0.0, load.mu, load.tau, load.sense)
-    most = newton.systems + WORK
+    most = newton.systems + CONTROL.work
 
     def step(part: float) -> None:
         nonlocal shape
         if part < 1.0:
             report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
-        shape = newton.settle(shape, _between(begin, load, part), tolerance if part == 1.0 else FIRST_TOLERANCE)
+        shape = newton.settle(shape, _between(begin, load, part), tolerance if part == 1.0 else CONTROL.leading)
 
     def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
         last = _between(begin, load, done)
@@ -53,7 +64,7 @@ def settled(
             f"steps of 1/{1 / part:.0f} of the way"
         )
 
-    control = StepControl(smallest=1.0 if begin == load else SMALLEST)
+    control = StepControl(smallest=1.0 if begin == load else CONTROL.smallest)
     advance(step, refusal, control, stop, exhausted=lambda: newton.systems > most)
     return shape
 
@@ -71,7 +82,7 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
     if newton.condensed.motions.shape[1]:  # how deep it lies, or a part of it, is found
         return _first_of(newton, load, float(np.ptp(height)), None)
     above = height - load.depth
-    guesses = [(above < -HERTZ * load.depth, SLIP, SHORT), (above < 0.0, SLIP, None)]
+    guesses = [(above < -CONTROL.hertz * load.depth, SLIP, CONTROL.short), (above < 0.0, SLIP, None)]
     if isfinite(load.tau):
         guesses.append((above < 0.0, SHEAR_LIMITED, None))
     for number, (low, slips, rounds) in enumerate(guesses):
@@ -112,15 +123,15 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
     """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    for number, part in enumerate(GUESSES):
+    for number, part in enumerate(CONTROL.parts):
         guess = np.where(height <= float(height.min()) + part * scale, SLIP, OPEN)
         try:
             found = slide_beside(newton, load, guess, force)
         except ContactLost:
-            if number == len(GUESSES) - 1:
+            if number == len(CONTROL.parts) - 1:
                 raise
             continue
-        if force is None or found.load.depth > 0.0 or number == len(GUESSES) - 1:
+        if force is None or found.load.depth > 0.0 or number == len(CONTROL.parts) - 1:
             return found
     raise AssertionError  # there is always a guess
 

@@ -22,6 +22,7 @@ from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBo
 from solver.failures import NotConverged, followed_to
 from solver.progress import report_progress
 from solver.scene.scene import Loading, Scene
+from solver.tolerances import SED_STILL
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
 DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
@@ -52,7 +53,6 @@ SMALL = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, pl
 FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
 RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8, by_depth=1e-7)
 LONG = 25.0  # slide within which all but those near the wedging limit settle, by the indentation
-SETTLED = 1e-10  # relative change of the ending's SED in a step of finite strain, with every touching point slipping
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,7 +279,7 @@ class _Settled:
         before = self._sed
         relaxes = isinstance(self._way, RelaxingWay)
         sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
-        still = before is not None and (relaxes or abs(sed - before) * self._times <= SETTLED * sed)
+        still = before is not None and (relaxes or abs(sed - before) * self._times <= SED_STILL * sed)
         return still and not (state.state == STICK).any()
 
 

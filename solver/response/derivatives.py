@@ -15,13 +15,13 @@ from solver import _kernels as kernels
 from solver._kernels import SHEAR_LIMITED, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
-from solver.body.finite import IMAGINARY
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Newton, load_arguments
 from solver.quantities import NAMES, SED
 from solver.scene.scene import Scene
 from solver.scene.tables import TISSUES
+from solver.tolerances import IMAGINARY
 
 MU, TAU_MAX, DEPTH = range(3)
 

@@ -1,7 +1,6 @@
 """The scene: its tables and their checks, the published finger and its ten surfaces."""
 
 from solver.scene.scene import (
-    SHALLOW,
     TISSUES,
     Finger,
     Friction,
@@ -17,7 +16,6 @@ from solver.scene.scene import (
 )
 
 __all__ = [
-    "SHALLOW",
     "TISSUES",
     "Finger",
     "Friction",

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 
 from solver.scene.tables import (
     LAWS_OF,
-    SHALLOW,
     TISSUES,
     Finger,
     Friction,
@@ -22,9 +21,9 @@ from solver.scene.tables import (
     Slide,
     Solve,
 )
+from solver.tolerances import STIFFNESSES
 
 __all__ = [
-    "SHALLOW",
     "TISSUES",
     "Finger",
     "Friction",
@@ -38,8 +37,6 @@ __all__ = [
     "Slide",
     "Solve",
 ]
-
-APART = 1e10  # largest ratio of two tissues' stiffnesses: beyond, round-off swallows the softer one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,8 +79,8 @@ class Scene:
         meshed = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
         softest = min(self.materials.of(name).E for name in meshed)
         for name in meshed:
-            if not APART * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
-                allowed = f"it must be at most {APART:g} times that of the softest tissue, {softest:g} MPa"
+            if not STIFFNESSES * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
+                allowed = f"it must be at most {STIFFNESSES:g} times that of the softest tissue, {softest:g} MPa"
                 raise SceneError(f"materials.{name}.E", self.materials.of(name).E, allowed)
 
     def _check_laws(self) -> None:
