@@ -38,7 +38,7 @@ class BranchControl:
     steep: float = 0.1  # part of the value in the branch's direction, from which a limit point is far
     hops: int = 3  # tries to go on where a branch ends
     hop: tuple[float, ...] = (0.01, 0.03)  # by how much of its value
-    stays: float = 0.05  # by how much forces change then, at most
+    force_change: float = 0.05  # of forces then, at most
     apart: float = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
 
 
@@ -113,7 +113,7 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
             there = finger.newton.settle(last, with_value(last.load, by, value), BRANCH.tolerance)
         except NotConverged:
             continue
-        near = abs(there.force - last.force).max() <= BRANCH.stays * abs(last.force).max()
+        near = abs(there.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
         if (
             near
             and finger.skin_compression(there).least > compression.least - BRANCH.apart
