@@ -23,11 +23,17 @@ from sessions.recording.text_column import TextColumn, read_texts, write_texts
 REAL = replace(INFO, simulated=False)
 
 
-@pytest.fixture
-def sealed(tmp_path):
-    folder = ended(tmp_path / "s", blocks=5, subject_simulated=True)
+@pytest.fixture(scope="module")
+def sealed_once(tmp_path_factory):
+    folder = ended(tmp_path_factory.mktemp("sealed") / "s", blocks=5, subject_simulated=True)
     seal(folder)
     return folder
+
+
+@pytest.fixture
+def sealed(sealed_once, tmp_path):
+    """Return a copy of the sealed session, to be spoilt."""
+    return shutil.copytree(sealed_once, tmp_path / "s")
 
 
 def writable(path):
