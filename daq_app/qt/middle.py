@@ -15,6 +15,7 @@ from daq_app.window.view_trials import inspection
 from daq_app.wording import tr, tr_noop
 
 GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
+AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose stroke has begun
 HIDDEN = tr_noop("Forces are not shown in this protocol.")
 
 
@@ -26,6 +27,7 @@ class Middle(QWidget):
         super().__init__()
         self._bridge = bridge
         self._inspected: int | None = None  # number of the trial
+        self._phase = ""  # of the session that was shown last
         self.strip = TrialStrip(scale, self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
         self.trial = InspectedTrial(tokens, scale, self.leave)
@@ -73,8 +75,11 @@ class Middle(QWidget):
         self.undo.setVisible(course.undo.enabled)
         self.strip.show_tiles(course.tiles)
         session = self._bridge.state.session
-        if session is not None and session.phase == "stroking":
+        phase = "" if session is None else session.phase
+        begun = phase in AFTER_ONSET and self._phase not in AFTER_ONSET  # a busy machine never shows some phases
+        if begun or phase == "stroking":
             self.leave()
+        self._phase = phase
         self._show_inspected()
 
     def inspect(self, number: int) -> None:

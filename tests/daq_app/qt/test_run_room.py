@@ -56,9 +56,8 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     QTest.keyClick(window, Qt.Key.Key_I)
     assert middle.inspected == 1
     QTest.keyClick(window, Qt.Key.Key_Space)  # the course goes on behind it
-    driver.phase("stroking", "scoring")
-    assert window.live.isVisible()
-    assert middle.inspected is None
+    driver.until(lambda: middle.inspected is None, "the next onset")
+    assert not middle.trial.isVisible()
     window.bridge.send(steps.Abort("enough"))
     driver.until(lambda: driver.session.sealing == "sealed", "the end")
     click(first)
