@@ -1,0 +1,173 @@
+"""What holds for every source file: the names it uses, the names it keeps to itself, and what it never calls."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("daq_app", "drivers", "sessions", "simulators", "solver")
+PRIVATE_IN = ("sessions", "daq_app", "drivers", "simulators")  # packages whose underscore names stay in their files
+GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+ROWS = [line.split("|") for line in GLOSSARY.splitlines() if line.startswith("|")]
+NOT_THIS = sorted({name for row in ROWS for name in re.findall(r"`(\w+)`", row[3])})
+# The solver still has these; elsewhere they are not used.
+ONLY_IN_SOLVER = {"evidence"}
+# Modules that read what can run, and calls that run what was read.
+RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})
+CALLS = frozenset({"eval", "exec", "compile", "__import__", "read_pickle"})
+LISTENS = frozenset({"bind", "listen", "create_server", "serve_forever", "start_server"})
+SIMULATORS = "simulators"  # the boxes of `sim:` and of `daq-app simulate`, on loopback
+TABLET = Path("daq_app", "tablet", "server.py")  # asked for by `--subject-screen web` alone, on a private network
+
+
+@pytest.fixture(scope="module")
+def trees() -> dict[Path, ast.Module]:
+    """Return every module of ours, parsed once."""
+    files = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    return {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in files}
+
+
+# ---- terms of the field
+
+
+def identifiers(file: Path, tree: ast.Module) -> Iterator[str]:
+    """Yield the names that a file defines: its own, and those of classes, functions, parameters and variables."""
+    yield file.parent.name if file.stem == "__init__" else file.stem
+    for node in ast.walk(tree):
+        match node:
+            case ast.FunctionDef(name) | ast.AsyncFunctionDef(name) | ast.ClassDef(name) | ast.arg(name):
+                yield name
+            case ast.Name(name, ast.Store()) | ast.Attribute(_, name, ast.Store()):
+                yield name
+            case _:
+                pass
+
+
+def test_the_glossary_names_what_a_thing_is_not_called():
+    assert {"NumberGiven", "Pacing", "CAP"} <= set(NOT_THIS)
+
+
+def test_no_name_of_the_column_not_this_is_used(trees):
+    found = []
+    for file, tree in trees.items():
+        names = {name.strip("_") for name in identifiers(file, tree)} & set(NOT_THIS)
+        found += [
+            f"{file}: {name}" for name in sorted(names - (ONLY_IN_SOLVER if file.parts[0] == "solver" else set()))
+        ]
+    assert found == []
+
+
+# ---- names that begin with an underscore belong to the file or the class that defines them
+
+
+def private(trees: dict[Path, ast.Module]) -> Iterator[tuple[Path, ast.Module]]:
+    yield from ((path, tree) for path, tree in trees.items() if path.parts[0] in PRIVATE_IN)
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.endswith("__")
+
+
+def imported_private_names(tree: ast.Module) -> Iterator[str]:
+    """Yield each underscore name that a file imports from a module of the project."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PRIVATE_IN:
+            yield from (f"imports {alias.name}" for alias in node.names if is_private(alias.name))
+
+
+def defined_in(body: ast.ClassDef) -> set[str]:
+    """Return the underscore names that a class defines: methods, fields, and attributes it sets on itself."""
+    names = {node.name for node in body.body if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)}
+    names |= {node.id for node in ast.walk(body) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    names |= {node.attr for node in of_self(body) if isinstance(node.ctx, ast.Store)}
+    return {name for name in names if is_private(name)}
+
+
+def of_self(body: ast.ClassDef) -> Iterator[ast.Attribute]:
+    """Yield each `self.name` inside a class."""
+    for node in ast.walk(body):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in ("self", "cls"):
+            yield node
+
+
+def inherited_private_names(classes: dict[str, ast.ClassDef]) -> Iterator[str]:
+    """Yield each underscore name of a base class that a class derived from it overrides or uses."""
+    for name, body in classes.items():
+        bases = [base.attr if isinstance(base, ast.Attribute) else getattr(base, "id", "") for base in body.bases]
+        theirs = {one: base for base in bases if base in classes for one in defined_in(classes[base])}
+        used = {node.attr for node in of_self(body)} | defined_in(body)
+        yield from (f"{name} takes {one} of {theirs[one]}" for one in sorted(used & set(theirs)))
+
+
+def test_no_file_imports_a_private_name_of_another(trees):
+    assert not [f"{path} {said}" for path, tree in private(trees) for said in imported_private_names(tree)]
+
+
+def test_no_class_overrides_or_uses_a_private_name_of_its_base(trees):
+    classes = {
+        node.name: node for _, tree in private(trees) for node in ast.walk(tree) if isinstance(node, ast.ClassDef)
+    }
+    assert not list(inherited_private_names(classes))
+
+
+SPOILT = """
+from sessions.plan.plan import _hidden
+class Base:
+    def __init__(self): self._kept = 1
+    def _step(self): ...
+class Derived(Base):
+    def _step(self): return self._kept
+"""
+
+
+def test_a_private_name_taken_from_elsewhere_is_found():
+    tree = ast.parse(SPOILT)
+    classes = {node.name: node for node in tree.body if isinstance(node, ast.ClassDef)}
+    assert list(imported_private_names(tree)) == ["imports _hidden"]
+    assert list(inherited_private_names(classes)) == ["Derived takes _kept of Base", "Derived takes _step of Base"]
+
+
+# ---- nothing listens on the network, and nothing that can run is read
+
+
+def called(tree):
+    """Names of what is called."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            function = node.func
+            name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+            yield name, node
+
+
+def imported(tree):
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield (node.module or "").split(".")[0]
+
+
+def test_no_module_reads_a_format_that_can_run(trees):
+    found = []
+    for path, tree in trees.items():
+        found += [(path, name) for name in imported(tree) if name in RUNS]
+        for name, node in called(tree):
+            plain = isinstance(node.func, ast.Name) or name == "read_pickle"  # `re.compile` is none of these
+            pickles = any(keyword.arg == "allow_pickle" for keyword in node.keywords)
+            if (name in CALLS and plain) or pickles:
+                found.append((path, name))
+    assert found == []
+
+
+def test_nothing_but_a_simulated_box_and_the_tablets_server_listens(trees):
+    found = [
+        (path, name)
+        for path, tree in trees.items()
+        if path.parts[0] != SIMULATORS and path != TABLET
+        for name, node in called(tree)
+        if name in LISTENS and isinstance(node.func, ast.Attribute)
+    ]
+    assert found == []
