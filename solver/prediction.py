@@ -150,6 +150,8 @@ class Prediction:
                 "evidence_s",
             )
         }
+        if self.nested is None:  # nothing is known
+            plain |= {name: None for name in plain if name == "error_estimate" or name.endswith("_error")}
         plain["title"] = self.scene.title
         plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected
         plain["row"] = {name: _plain(getattr(self.row, name)) for name in ("arc", "sed", "error")}

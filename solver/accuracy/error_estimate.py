@@ -64,11 +64,14 @@ def edge_changes(
     return here, out
 
 
-def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers:
+def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers | None:
     """Return what a nested mesh has of one scene: its `values` (COUNT + r,) and what edges of contact change of them.
 
-    `steps` are those taken where its state depends on its way.
+    `steps` are those taken where its state depends on its way. None where contact with a moved edge has no equilibrium,
+    as at a limit of friction.
     """
+    if np.isinf(changes).any():
+        return None
     numbers = values[:COUNT] if steps is None else steps.taken(values[:COUNT])
     return NestedNumbers(numbers, changes[:COUNT], values[COUNT:], changes[COUNT:])
 
@@ -113,7 +116,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     off = FROM_HALVING * np.abs(nested.numbers - numbers) + FROM_EDGES * nested.of_edges
     if steps is not None:
         off += steps.error
-    relative = np.where(off > 0.0, np.minimum(off / np.maximum(np.abs(numbers), np.finfo(float).tiny), 1.0), 0.0)
+    relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
     found = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
     return _without_given(scene, found)

@@ -85,12 +85,12 @@ class Finger(ABC, Generic[Placed]):
 
     def seds(self, states: Sequence[EquilibriumState]) -> Array:
         """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
-        displacement = self._recovered(states, self.ending, self.point)
+        displacement = self.recovered(states, self.ending, self.point)
         return np.stack([patch.average(displacement)[0] for patch in (self.ending, self.point)], axis=1)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
         """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""
-        sed = self.ending.average(self._recovered(states, self.ending))[0]
+        sed = self.ending.average(self.recovered(states, self.ending))[0]
         return np.column_stack([sed, [state.force[::-1] for state in states]])
 
     def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
@@ -99,20 +99,20 @@ class Finger(ABC, Generic[Placed]):
         They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
         quantity at the ending.
         """
-        displacement = self._recovered(states, self.ending, self.point)
+        displacement = self.recovered(states, self.ending, self.point)
         responses = self.ending.responses(displacement)[:, 0].T
         rest = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
         return np.column_stack([responses[:, 0], rest, self.point.average(displacement)[0], responses])
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
         """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
-        return np.hstack([self.all_numbers(states), self.row.average(self._recovered(states, self.row)).T])
+        return np.hstack([self.all_numbers(states), self.row.average(self.recovered(states, self.row)).T])
 
     def responses(self, states: Sequence[EquilibriumState]) -> Array:
         """Return every quantity at the reference ending of several states (c, q)."""
-        return self.ending.responses(self._recovered(states, self.ending))[:, 0].T
+        return self.ending.responses(self.recovered(states, self.ending))[:, 0].T
 
-    def _recovered(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
+    def recovered(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
         """Return the displacements (nodes, 2, c) of states, of the nodes that patches need alone."""
         return self.displacements(states, distinct(np.concatenate([patch.nodes() for patch in patches])))
 

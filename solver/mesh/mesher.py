@@ -51,6 +51,7 @@ class FingerMesh:
 
     mesh: Mesh
     outline: Outline
+    sizing: Sizing
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
     fat: int  # elements below the dermis: of the fat, and of the bone where it is meshed
@@ -104,7 +105,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
         high = min(high, int(nail[0]) // 2 - 1)
         loose &= _far(arcs, outline.dorsal, outline.nail_end, finger)
     mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), distinct(np.concatenate(held)))
-    return FingerMesh(mesh, outline, arcs, lines, below, number[:, -1].copy(), loose)
+    return FingerMesh(mesh, outline, sizing, arcs, lines, below, number[:, -1].copy(), loose)
 
 
 def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:

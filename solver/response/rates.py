@@ -21,16 +21,24 @@ class Rates(NamedTuple):
 
 
 def rates(history: History) -> Mapping[str, Rates]:
-    """Return the mean rates of every quantity, by its name. They have no error estimate."""
+    """Return the mean rates of every quantity, by its name; `solver.response.course_errors` has their errors."""
     time = np.concatenate([[0.0], history.time])  # undeformed at first touch
     values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
-    moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
-    first = int(moved[0]) if len(moved) else len(history.time)  # the instant before it, counted from first touch
-    slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(len(history.time)) >= first))
-    last = int(slip[0]) + 1 if len(slip) else len(history.time)
-    ends = [(0, first), (first, last), (last, len(history.time))]
-    parts = np.array([_mean(time, values, begin, end) for begin, end in ends])
+    first, last, end = instants(history)
+    parts = np.array([_mean(time, values, *part) for part in ((0, first), (first, last), (last, end))])
     return {name: Rates(*row) for name, row in zip(NAMES, parts.T.tolist(), strict=True)}
+
+
+def instants(history: History) -> tuple[int, int, int]:
+    """Return how many instants there are up to the end of the press, up to full slip, and in all.
+
+    They are one number where a course does not come so far.
+    """
+    count = len(history.time)
+    moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
+    first = int(moved[0]) if len(moved) else count
+    slip = np.flatnonzero((history.slipping >= ALL) & (np.arange(count) >= first))
+    return first, int(slip[0]) + 1 if len(slip) else count, count
 
 
 def _mean(time: Array, values: Array, begin: int, end: int) -> Array:

@@ -1,24 +1,40 @@
 """Every quantity along a row of receptors of a prediction, at any depth: those of the ending are in it already."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
 from solver.arrays import Array
 from solver.body.receptor import LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
-from solver.equilibrium.finger import finite_laws, settled_moduli
+from solver.continuation import small_states
+from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.finger import Finger, LinearFinger, finite_laws, forces_of, settled_moduli
+from solver.equilibrium.load_path import PARTS, Steps
+from solver.equilibrium.load_stepping import never
+from solver.equilibrium.newton import EquilibriumState
+from solver.failures import SolveFailure
+from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.scene.scene import Receptor
+
+
+class Row(NamedTuple):
+    """Every quantity of `solver.quantities` (q, r) along a row of endings, each in its own unit."""
+
+    values: Array  # nan where the finger ends before the ending does
+    errors: Array  # estimated, likewise; all nan where nothing is known
 
 
 def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, receptor: Receptor | None = None) -> Array:
     """Return every quantity of `solver.quantities` (n, q, r) at arc positions (r,) [mm] of n predictions.
 
     Each is averaged over an ending like that of `receptor`, or else of the scene: SA-I and RA endings lie less deep
-    than an SA-II. nan where the finger ends before the ending does. Unlike those in `Prediction.responses`, and the SED
-    in `Prediction.row`, these have no error estimate.
+    than an SA-II. nan where the finger ends before the ending does. `row_along` has their errors too.
     """
     out: list[Array] = []
     for _, same in groupby(predictions, lambda found: (id(found.geometry), found.scene.solve.kinematics)):
@@ -26,6 +42,63 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
         along = _probed(group[0], arcs, receptor or group[0].scene.receptor)
         out += [along.responses(found.displacement) for found in group]
     return np.array(out)
+
+
+def row_along(found: Prediction, arcs: Array = ROW, receptor: Receptor | None = None) -> Row:
+    """Return the same of one prediction with errors, for which its nested mesh is solved again."""
+    values = responses_along([found], arcs, receptor)[0]
+    try:
+        errors = _row_errors(found, values, arcs, receptor or found.scene.receptor)
+    except SolveFailure:
+        errors = np.full(values.shape, np.nan)
+    return Row(values, errors)
+
+
+def _row_errors(found: Prediction, values: Array, arcs: Array, receptor: Receptor) -> Array:
+    """Return the errors of a row (q, r). Raises SolveFailure where the nested mesh has no such state."""
+    scene, sizing = found.scene, replace(found.geometry.sizing, halved=True)
+
+    def probed(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
+        row = finger.patches(endings(finger.geometry, finger.centred, receptor, arcs))
+        return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
+
+    nested, state, coarse, ends = (_small if scene.solve.kinematics == "small" else _finite)(found, sizing)
+    (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], probed(nested))
+    errors = FROM_HALVING * np.abs(finer - values.ravel()) + FROM_EDGES * edges
+    if ends:
+        usual, *fewer = probed(coarse)(ends)
+        errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound
+    return errors.reshape(values.shape)
+
+
+_Nested = tuple[Finger[Any], EquilibriumState, Finger[Any], list[EquilibriumState]]
+
+
+def _small(found: Prediction, sizing: Sizing) -> _Nested:
+    """Return the nested finger, its state, and of a load path its ends after fewer steps and on which finger."""
+    scene = found.scene
+    nested = LinearFinger.of(scene, sizing)
+    state = small_states.nearest(scene, nested)
+    if not small_states.depends_on_way(scene, state):
+        return nested, state, nested, []
+    mesh = LinearFinger.on(scene, found.geometry)
+    ends = [small_states.end(scene, mesh, times) for times in (1.0, *PARTS.tolist())]
+    return nested, small_states.end(scene, nested), mesh, ends
+
+
+def _finite(found: Prediction, sizing: Sizing) -> _Nested:
+    """Do the same at finite strain, fewer steps on a coarse mesh."""
+    # Imported here: small strain need not wait for the compiled loops of finite strain to be loaded.
+    from solver.accuracy.adaptivity import Meshes, coarse_solution, end, solution_on
+    from solver.continuation.finite_states import depends_on_way
+
+    scene, meshes = found.scene, Meshes()
+    low = coarse_solution(scene, expected_depth(scene), sizing.fineness, never, meshes)
+    top = solution_on(scene, sizing, low, never, meshes)
+    if not depends_on_way(scene, top.shape):
+        return top.finger, top.shape, low.finger, []
+    ends = [end(low.finger, scene, never, times) for times in (1.0, *PARTS.tolist())]
+    return top.finger, end(top.finger, scene, never), low.finger, ends
 
 
 def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Patches:

@@ -273,7 +273,7 @@ def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: Solv
         warnings.append("A finer mesh did not find this state: this is the coarser one's, and its error estimate.")
         if lost.limit_mu is not None:
             warnings.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
-    if isinstance(answer, Prediction) and answer.error_estimate >= 1.0:
+    if isinstance(answer, Prediction) and answer.nested is None:
         warnings.append(UNKNOWN)
     elif missed > 1.0:
         warnings.append(MISSES)
@@ -315,7 +315,7 @@ def _missed(answer: Answer, *, limits: bool) -> float:
         return NOT_KNOWN
     if not isinstance(answer, Prediction):
         return 0.0
-    if answer.error_estimate >= 1.0:
+    if answer.nested is None:
         return NOT_KNOWN
     asked = answer.scene.solve.tolerance
     return 0.0 if asked is None else answer.error_estimate / asked

@@ -80,3 +80,8 @@ def test_solve_with_a_history_prints_its_course(tmp_path, capsys):
     assert len(document["time"]) == len(document["bone_x"]) == len(document["bone_y"]) > 10
     assert document["bone_y"][-1] == pytest.approx(-1.5)
     assert document["bone_x"][-1] < 0
+    ends = document["instants"]
+    assert list(ends) == ["press", "break_away", "slide"]
+    assert ends["slide"]["sed_ending"]["value"] == document["history"]["sed_ending"][-1]
+    assert 0.0 < ends["press"]["sed_ending"]["error"] < 0.02 * ends["press"]["sed_ending"]["value"]
+    assert document["rates"]["sed"]["errors"]["press"] == pytest.approx(ends["press"]["sed"]["error"])  # within 1 s

@@ -8,6 +8,7 @@ import pytest
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
 from solver.prediction import History
 from solver.quantities import NAMES
+from solver.response.course_errors import course_errors, course_numbers
 from solver.response.rates import rates
 
 
@@ -57,3 +58,35 @@ def test_where_tissues_relax_the_sed_alone_has_a_course():
     found = rates(solve(scene).history)
     assert np.isfinite(found["sed"]).all()
     assert np.isnan(found["pressure"]).all()
+
+
+@pytest.mark.parametrize("kinematics", ["small", pytest.param("finite", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("slide", ["-x", "none"])
+def test_errors_at_the_ends_of_press_and_break_away_and_of_rates_lie_above_the_true_ones(kinematics, slide):
+    asked = Solve(kinematics, "history", evidence="quick")
+    scene = Scene(friction=Friction(0.3), loading=Loading(1.0, slide, 10.0), solve=asked)
+    found = solve(scene)
+    fine = solve(replace(scene, solve=replace(asked, tolerance=0.0005 if kinematics == "small" else 0.002)))
+    assert fine.dofs > 2 * found.dofs
+    numbers, true, errors = course_numbers(found.history), course_numbers(fine.history), course_errors(found)
+    there = np.isfinite(true.at)
+    assert np.array_equal(there, np.isfinite(errors.at))
+    assert np.array_equal(there[:, 0], [True, slide != "none", slide != "none"])
+    assert np.mean((np.abs(numbers.at - true.at) <= errors.at)[there]) >= 0.95
+    assert np.all(errors.at[0, :4] < 0.05 * np.abs(numbers.at[0, :4]))
+    parts = np.isfinite(true.rate)
+    assert np.mean((np.abs(numbers.rate - true.rate) <= errors.rate)[parts]) >= 0.95
+
+
+def test_where_tissues_relax_the_errors_of_a_course_are_those_of_its_sed_and_forces():
+    tissue = Material(0.08, 0.48, prony=(Relaxation(0.3, 0.5),))
+    scene = Scene(
+        friction=Friction(0.3),
+        loading=Loading(0.8, "+x"),
+        materials=replace(Materials(), dermis=tissue),
+        solve=Solve("small", "history", 0.02, "quick"),
+    )
+    errors = course_errors(solve(scene))
+    assert np.all(np.isfinite(errors.at[:, :6]))
+    assert np.all(errors.at[:, 0] > 0.0)
+    assert np.isnan(errors.at[:, 6:]).all()

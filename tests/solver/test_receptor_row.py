@@ -8,7 +8,7 @@ import pytest
 from solver import Friction, Loading, Receptor, Scene, Solve, solve
 from solver.prediction import ROW
 from solver.quantities import NAMES
-from solver.response.receptor_row import responses_along
+from solver.response.receptor_row import responses_along, row_along
 from solver.response.rough_responses import rough_responses
 
 SCENES = {
@@ -47,3 +47,14 @@ def test_without_estimates_the_same_states_are_found_and_a_scene_that_cannot_sli
     exact = np.array([found.responses[name].value for name in NAMES])
     assert np.abs(rough[0, :, 0] / exact - 1.0).max() < 0.03  # a mesh of 4 to 6 elements to the tip radius
     assert np.isnan(rough[1]).all()
+
+
+@pytest.mark.parametrize("kinematics", SCENES)
+def test_errors_along_a_row_at_another_depth_lie_above_the_true_ones(kinematics):
+    scene, deep = SCENES[kinematics], Receptor(depth=0.4)
+    found = row_along(solve(replace(scene, solve=replace(scene.solve, tolerance=0.02))), receptor=deep)
+    fine = row_along(solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005))), receptor=deep)
+    told = np.isfinite(found.values) & (fine.errors < found.errors / 3.0)
+    assert told.sum() > 0.5 * told.size
+    assert np.mean((np.abs(found.values - fine.values) <= found.errors)[told]) >= 0.95
+    assert np.array_equal(np.isfinite(found.errors), np.isfinite(found.values))

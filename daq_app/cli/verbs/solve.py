@@ -1,21 +1,24 @@
 """Run the solver once, on a scene file."""
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.console import DONE, FLAWED, STOPPED, Console, WrongValue, number, table
-from solver.quantities import QUANTITIES, Quantity
+from solver.quantities import NAMES, QUANTITIES, Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from solver import Prediction, Receptor, Scene
-    from solver.response.rates import Rates
+    from solver.arrays import Array
+    from solver.response.course_errors import CourseNumbers
+    from solver.response.receptor_row import Row
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
 UNFINISHED = "Stopped before all that was asked for was done: this is what had been found by then."
+COURSE = ("SED at the ending", "SED at the point", "normal force", "tangential force", "contact width")
 AUDITS = {
     "equilibrium_x": "forces along the surface are out of balance by",
     "equilibrium_y": "forces across the surface are out of balance by",
@@ -39,8 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--row",
         type=float,
         metavar="MM",
-        help="also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie; without "
-        "error estimates",
+        help="also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie",
     )
 
 
@@ -81,24 +83,23 @@ def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
 
 
 def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
-    row = {} if deep is None else _row(found, deep)
-    changes = _rates(found)
-    told = {name: {part: _none(rate) for part, rate in one._asdict().items()} for name, one in changes.items()}
-    further = {"rates": told, "row_at": {"depth": deep.depth, **row} if deep is not None else None}
-    console.result({**found.to_dict(), **{name: value for name, value in further.items() if value}})
+    row, course = _row(found, deep), _course(found)
+    told = {} if row is None or deep is None else {"row_at": {"depth": deep.depth, **_row_in_json(row)}}
+    plain = found.to_dict()
+    console.result({**plain, **told, **({} if course is None else _course_in_json(*course))})
     console.say(title)
     rows = [
-        ["SED at the ending", number(found.sed_ending, 5, factor=1e3), "kPa", _percent(found.error_estimate)],
+        ["SED at the ending", number(found.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
         *([["corrected", number(found.sed_ending_corrected, 5, factor=1e3), "kPa", ""]] if found.nested else []),
-        ["SED at the point", number(found.sed_point, 5, factor=1e3), "kPa", _percent(found.sed_point_error)],
-        ["normal force", number(found.normal_force, 5), "N/mm", _percent(found.normal_force_error)],
-        ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(found.tangential_force_error)],
-        ["contact width", number(found.contact_width, 3), "mm", _percent(found.contact_width_error)],
-        ["indentation", number(found.indentation, 4), "mm", _percent(found.indentation_error)],
+        ["SED at the point", number(found.sed_point, 5, factor=1e3), "kPa", _percent(plain["sed_point_error"])],
+        ["normal force", number(found.normal_force, 5), "N/mm", _percent(plain["normal_force_error"])],
+        ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(plain["tangential_force_error"])],
+        ["contact width", number(found.contact_width, 3), "mm", _percent(plain["contact_width_error"])],
+        ["indentation", number(found.indentation, 4), "mm", _percent(plain["indentation_error"])],
         *(
             []
             if found.shift is None
-            else [["sideways shift", number(found.shift, 4), "mm", _length(found.shift_error)]]
+            else [["sideways shift", number(found.shift, 4), "mm", _length(plain["shift_error"])]]
         ),
         ["unknowns", str(found.dofs), "", ""],
         ["solving took", number(found.wall_s, factor=1e3), "ms", ""],
@@ -109,17 +110,18 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
     responses = [_response(one, *found.responses[one.name]) for one in QUANTITIES]
     console.say(table(responses, head=["", "", "", "error, estimated"]).lstrip("\n"))
-    if changes:
-        console.say("\nMean rates at the ending in the press, from break-away to full slip, and in the slide:")
-        mean = [[one.label, *map(_rate, changes[one.name]), _unit(one)] for one in QUANTITIES]
-        console.say(table(mean, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
-    if deep is not None:
-        console.say(
-            f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; MPa and shares):"
-        )
-        head = ["arc [mm]", *(one.name for one in QUANTITIES)]
-        columns = zip(*row.values(), strict=True)
-        console.say(table([[number(cell, 4) for cell in cells] for cells in columns], head=head).lstrip("\n"))
+    if course is not None:
+        _say_course(*course, console)
+    if row is not None and deep is not None:
+        from solver.prediction import ROW
+
+        console.say(f"\nAlong a row {deep.depth:g} mm deep (arc from first touch, positive to the tip; MPa, shares):")
+        cells = [
+            [_with_error(*pair) for pair in zip(*pairs, strict=True)]
+            for pairs in zip(row.values.T, row.errors.T, strict=True)
+        ]
+        lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
+        console.say(table(lines, head=["arc [mm]", *NAMES]).lstrip("\n"))
     left = [[name, _percent(entry["estimate"])] for name, entry in found.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
@@ -131,33 +133,84 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
     console.note(*(f"note: {warning}" for warning in found.warnings))
 
 
-def _rates(found: "Prediction") -> "Mapping[str, Rates]":
-    """Return the rates of every quantity; none where no course was asked for."""
-    from solver.response.rates import rates
+def _course(found: "Prediction") -> "tuple[CourseNumbers, CourseNumbers] | None":
+    """Return the named instants and the rates of a course, and their errors; None where no course was asked for."""
+    from solver.response.course_errors import course_errors, course_numbers
 
-    return {} if found.history is None else rates(found.history)
+    return None if found.history is None else (course_numbers(found.history), course_errors(found))
+
+
+def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
+    from solver.response.course_errors import INSTANTS, NUMBERS
+
+    def pairs(names: Sequence[str], values: "Array", off: "Array") -> dict[str, dict[str, float | None]]:
+        columns = zip(names, values.tolist(), off.tolist(), strict=True)
+        return {name: {"value": _none(value), "error": _none(error)} for name, value, error in columns}
+
+    parts = list(zip(INSTANTS, numbers.at, errors.at, numbers.rate, errors.rate, strict=True))
+    at = {part: pairs((*NUMBERS, *NAMES), value, error) for part, value, error, _, _ in parts}
+    rates = {part: pairs(NAMES, value, error) for part, _, _, value, error in parts}
+    by_name = {
+        name: {
+            **{part: rates[part][name]["value"] for part in INSTANTS},
+            "errors": {part: rates[part][name]["error"] for part in INSTANTS},
+        }
+        for name in NAMES
+    }
+    return {"instants": at, "rates": by_name}
+
+
+def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
+    labels = [*COURSE, *(one.label for one in QUANTITIES)]
+    units = ["MPa", "MPa", "N/mm", "N/mm", "mm", *(one.unit for one in QUANTITIES)]
+    for title, values, off, names, per in (
+        (
+            "At the ends of the press, of the break-away (full slip) and of the slide:",
+            numbers.at,
+            errors.at,
+            labels,
+            "",
+        ),
+        (
+            "Mean rates in the press, the break-away and the slide:",
+            numbers.rate,
+            errors.rate,
+            labels[len(COURSE) :],
+            "/s",
+        ),
+    ):
+        lines = [
+            [name, *(_with_error(*pair) for pair in zip(value, error, strict=True)), f"{unit}{per}"]
+            for name, value, error, unit in zip(names, values.T, off.T, units[-len(names) :], strict=True)
+        ]
+        console.say(f"\n{title}")
+        console.say(table(lines, head=["", "press", "break-away", "slide", ""]).lstrip("\n"))
+    if not isfinite(errors.at[0, 0]):
+        console.say("Their errors are not known: the nested mesh has no such course.")
 
 
 def _none(value: float) -> float | None:
-    return value if value == value else None
+    return value if isfinite(value) else None
 
 
-def _rate(value: float) -> str:
-    return number(_none(value), 4)
+def _with_error(value: float, error: float) -> str:
+    return "–" if not isfinite(value) else f"{number(value, 4)} ± {number(_none(error), 2)}"
 
 
-def _unit(quantity: Quantity) -> str:
-    return "MPa/s" if quantity.unit == "MPa" else "1/s"
+def _row(found: "Prediction", receptor: "Receptor | None") -> "Row | None":
+    from solver.response.receptor_row import row_along
+
+    return None if receptor is None else row_along(found, receptor=receptor)
 
 
-def _row(found: "Prediction", receptor: "Receptor") -> dict[str, list[float | None]]:
-    """Return arc positions [mm] and every quantity there, None where the finger ends."""
+def _row_in_json(row: "Row") -> dict[str, object]:
+    """Return arc positions [mm], every quantity there and its errors, None where the finger ends."""
     from solver.prediction import ROW
-    from solver.response.receptor_row import responses_along
 
-    columns = zip(QUANTITIES, responses_along([found], receptor=receptor)[0].tolist(), strict=True)
-    told = {one.name: [value if value == value else None for value in values] for one, values in columns}
-    return {"arc": ROW.tolist(), **told}
+    values, errors = (
+        {name: [_none(one) for one in line] for name, line in zip(NAMES, table.tolist(), strict=True)} for table in row
+    )
+    return {"arc": ROW.tolist(), **values, "errors": errors}
 
 
 def _response(quantity: Quantity, value: float, error: float) -> list[str]:
