@@ -57,13 +57,13 @@ def complete(document: Mapping[str, Any], form: type[T]) -> T:
 def _missing(document: object, complete: object, where: str = "") -> Iterator[str]:
     """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
     if isinstance(complete, list | tuple):
-        for at, (found, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
-            yield from _missing(found, item, f"{where}[{at}]")
+        for at, (part, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
+            yield from _missing(part, item, f"{where}[{at}]")
     elif isinstance(complete, dict):
-        found = cast("Mapping[str, Any]", document)
+        part = cast("Mapping[str, Any]", document)
         for name, item in cast("dict[str, Any]", complete).items():
             path = f"{where}.{name}" if where else name
-            if name in found:
-                yield from _missing(found[name], item, path)
+            if name in part:
+                yield from _missing(part[name], item, path)
             elif item is not None:
                 yield path

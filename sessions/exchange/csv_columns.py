@@ -80,17 +80,17 @@ def columns(
 
 def _headed(header: Sequence[str] | None) -> list[tuple[str, int]]:
     """Return axis and position of every column whose heading names one."""
-    found: list[tuple[str, int]] = []
+    places: list[tuple[str, int]] = []
     for position, heading in enumerate(header or ()):
         match = _HEADING.match(heading.strip())
         if match is None:
             continue
         name = match[1].lower()
         axis = TIME if name in {"t", "time"} else name.replace("m", "t")[0].upper() + name[1]
-        if axis in {already for already, _ in found}:
+        if axis in {already for already, _ in places}:
             raise ColumnsUnknown(f"two columns are headed {axis}: give --axes, with - for the one to leave out")
-        found.append((axis, position))
-    return found
+        places.append((axis, position))
+    return places
 
 
 def _stated(axes: Sequence[str], width: int) -> list[tuple[str, int]]:

@@ -74,12 +74,12 @@ class Study:
 
     def member(self, subject: str) -> Member:
         """Return a subject that is enrolled. Raises StudyError."""
-        found = self.members.get(subject)
-        if found is None:
+        member = self.members.get(subject)
+        if member is None:
             raise StudyError(f"{subject} is not enrolled in {self.name}: 'daq-app enrol' reserves a row")
-        if found.withdrawn is not None:
-            raise StudyError(f"{subject} was withdrawn from {self.name} ({found.withdrawn}); enrol under another code")
-        return found
+        if member.withdrawn is not None:
+            raise StudyError(f"{subject} was withdrawn from {self.name} ({member.withdrawn}); enrol under another code")
+        return member
 
     def row(self, slot: int) -> int:
         """Return the row of the design, from 1, that a slot stands for.

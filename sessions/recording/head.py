@@ -141,18 +141,18 @@ def info_from_dict(data: Mapping[str, Any]) -> TransducerInfo:
     Raises ValueError for another shape, and when the matrix is not the one its hash was taken of.
     """
     info = converted(data, _Info)
-    told = info.calibration
-    if len(told.tool) not in (0, 6):
+    stored = info.calibration
+    if len(stored.tool) not in (0, 6):
         raise ValueError("the tool transform is no list of six numbers")
     calibration = Calibration(
-        serial=told.serial,
-        raw_unit=told.raw_unit,
-        matrix=np.array(told.matrix, np.float64),
-        rated=np.array([_number(value) for value in told.rated]),
-        source=told.source,
-        tool=told.tool,
+        serial=stored.serial,
+        raw_unit=stored.raw_unit,
+        matrix=np.array(stored.matrix, np.float64),
+        rated=np.array([_number(value) for value in stored.rated]),
+        source=stored.source,
+        tool=stored.tool,
     )
-    if calibration_hash(calibration) != told.sha256:
+    if calibration_hash(calibration) != stored.sha256:
         raise ValueError("the calibration matrix is not the one its SHA-256 was taken of")
     return TransducerInfo(
         **{name: getattr(info, name) for name in _IDENTITY},

@@ -73,7 +73,7 @@ def _files(folder: Path) -> dict[str, Any]:
     path = folder / MANIFEST_FILE
     try:
         files = json_object(read_limited(path))["files"]
-        return {str(name): {"sha256": str(told["sha256"]), "bytes": told["bytes"]} for name, told in files.items()}
+        return {str(name): {"sha256": str(entry["sha256"]), "bytes": entry["bytes"]} for name, entry in files.items()}
     except OSError as error:
         raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:

@@ -111,10 +111,10 @@ class Recording:
     @cached_property
     def losses(self) -> tuple[str, ...]:
         """Name what the file lost or holds damaged, a sentence each; reads the whole file once."""
-        found = list(self._log_losses)
-        for _ in self.blocks(found):
+        problems = list(self._log_losses)
+        for _ in self.blocks(problems):
             pass
-        return tuple(found)
+        return tuple(problems)
 
     @property
     def flaws(self) -> tuple[str, ...]:
@@ -128,8 +128,8 @@ class Recording:
         for data in losses:
             flagged.update(data.get("flagged", {}))
         trouble += [f"what their status said: {flagged_words(flagged)}"] if flagged else []
-        found = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
-        trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(found)]
+        rates = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
+        trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(rates)]
         for record in self.trials:
             allowed = self.plan.strokes_allowed(record.trial)
             if record.take and record.take.strokes > allowed:
@@ -182,13 +182,15 @@ class Recording:
 
     def readings_between(self, start_ns: int, stop_ns: int | None) -> ReadingBlock:
         """Return the readings received from `start_ns` up to, not including, `stop_ns` (None: to the end) [ns]."""
-        found: list[ReadingBlock] = []
+        blocks_read: list[ReadingBlock] = []
         for block in self.blocks(between=(start_ns, stop_ns)):
             inside = block.received_ns >= start_ns
             if stop_ns is not None:
                 inside &= block.received_ns < stop_ns
-            found.append(ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)}))
-        return ReadingBlock.joined(found)
+            blocks_read.append(
+                ReadingBlock(**{field.name: getattr(block, field.name)[inside] for field in fields(block)})
+            )
+        return ReadingBlock.joined(blocks_read)
 
     def last_block(self) -> ReadingBlock:
         """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""
@@ -253,8 +255,8 @@ def _blocks(
 def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
     """Return one block. Raises ValueError when it is not what was written."""
     names = ", ".join(COLUMNS)
-    told = "readings, crc32, sequence_first, sequence_last, counter_first, counter_last"
-    row = connection.execute(f"SELECT {told}, {names} FROM blocks WHERE number=?", (number,)).fetchone()
+    sql_columns = "readings, crc32, sequence_first, sequence_last, counter_first, counter_last"
+    row = connection.execute(f"SELECT {sql_columns}, {names} FROM blocks WHERE number=?", (number,)).fetchone()
     readings, crc, ends, columns = row[0], row[1], list(row[2:6]), row[6:]
     if blobs_crc(columns) != crc:
         raise ValueError("its bytes do not give the CRC-32 stored with them")
@@ -291,13 +293,13 @@ def _mounted(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
     return {event.trial: event.data["code"] for event in events if event.kind == kind and event.trial is not None}
 
 
-def _readable(made: Any) -> bool:  # noqa: ANN401  any JSON value
+def _readable(form: Any) -> bool:  # noqa: ANN401  any JSON value
     """Say whether the head's `format` is one that this program reads."""
-    if not isinstance(made, dict):
+    if not isinstance(form, dict):
         return False
-    form = cast("dict[str, Any]", made)
-    version = form.get("version", 0)
-    return form.get("name") == FORMAT and isinstance(version, int) and version <= FORMAT_VERSION
+    known = cast("dict[str, Any]", form)
+    version = known.get("version", 0)
+    return known.get("name") == FORMAT and isinstance(version, int) and version <= FORMAT_VERSION
 
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:

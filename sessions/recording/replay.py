@@ -140,9 +140,9 @@ class ReplayTransducer:
         return block
 
 
-def health_of(told: Iterable[LoggedEvent]) -> Health:
+def health_of(log: Iterable[LoggedEvent]) -> Health:
     """Return the totals of what "losses" events tell."""
-    events = list(told)
+    events = list(log)
     counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED}
     words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
     flagged: Counter[str] = Counter()

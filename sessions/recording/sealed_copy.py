@@ -67,16 +67,16 @@ def write_copy(
                 column[-len(values) :] = values
             if progress is not None:
                 progress(min(len(readings["time"]) / expected, 1.0))
-        for made in (*data_sets(recording), *more):
-            kind = made.values.dtype
+        for one in (*data_sets(recording), *more):
+            kind = one.values.dtype
             if kind.kind == "S":
                 # Some readers (GNU Octave) know no UTF-8; most texts need none.
-                plain = all(text.isascii() for text in made.values.tolist())
+                plain = all(text.isascii() for text in one.values.tolist())
                 kind = h5py.string_dtype("ascii" if plain else "utf-8", kind.itemsize)
             # An empty data set has no chunks, and so nothing to protect.
-            protected = {"chunks": made.values.shape, "fletcher32": True} if made.values.size else {}
-            data_set = file.create_dataset(made.name, data=made.values.astype(kind), **protected)
-            _describe(data_set, made.unit, made.note)
+            protected = {"chunks": one.values.shape, "fletcher32": True} if one.values.size else {}
+            data_set = file.create_dataset(one.name, data=one.values.astype(kind), **protected)
+            _describe(data_set, one.unit, one.note)
         column = event_data(recording)
         data_set, ends = write_texts(file, column)
         _describe(data_set, "", column.note)
@@ -89,11 +89,11 @@ def differences(recording: Recording) -> Iterator[str]:
         with h5py.File(recording.folder / SEALED_FILE, "r") as file:
             yield from _different_readings(recording, file)
             older = int(file.attrs.get("format_version", 0)) < FORMAT_VERSION
-            for made in data_sets(recording):
-                if older and made.name not in file:
+            for one in data_sets(recording):
+                if older and one.name not in file:
                     continue  # a later version holds more
-                if not _same(np.asarray(file[made.name]), made.values):
-                    yield f"{made.name} of {SEALED_FILE} differs from the live file"
+                if not _same(np.asarray(file[one.name]), one.values):
+                    yield f"{one.name} of {SEALED_FILE} differs from the live file"
             yield from _different_texts(event_data(recording), file)
             if file.attrs.get("SIMULATED") != _attribute(recording.simulated_sentence):
                 yield f"{SEALED_FILE} does not say of itself what the live file says: {recording.simulated_sentence}"

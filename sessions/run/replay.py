@@ -73,7 +73,7 @@ def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
 
 def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
     """Yield a sentence for each column of the readings that is not what it was."""
-    before, after = (digest_of(made.blocks(), ()) for made in (recorded, replayed))
+    before, after = (digest_of(part.blocks(), ()) for part in (recorded, replayed))
     if before.readings != after.readings:
         yield f"the recording holds {before.readings} readings and the replay {after.readings}"
     yield from (
@@ -94,16 +94,16 @@ class _Rewriter(SessionWriter):
         self._later = [event for event in recording.events if event.kind in LATER]
         self._log: Sequence[LoggedEvent] = ()
         self._cut = False
-        self._told = 0
+        self._next_event = 0
         self._closing = False
-        self.made: list[LoggedEvent] = []
+        self.log_written: list[LoggedEvent] = []
 
     def follow_part(self, log: Sequence[LoggedEvent]) -> None:
         """Take the instants from the log of a part, which may have been cut short."""
         super().commit()  # a part begins with all that came before acknowledged
         self._log = log
         self._cut = not any(event.kind == "ended" for event in log)
-        self._told = 0
+        self._next_event = 0
 
     def event(
         self,
@@ -115,15 +115,15 @@ class _Rewriter(SessionWriter):
         commit: bool = True,
     ) -> LoggedEvent:
         """Write an event down. Raises _CutShort where the recording ends without an end."""
-        if self._cut and (kind == "ended" or self._told == len(self._log)):
+        if self._cut and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")
-        ahead = range(self._told, len(self._log))
+        ahead = range(self._next_event, len(self._log))
         place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
         if place is not None:
-            self._told = place + 1
+            self._next_event = place + 1
             time_ns = self._log[place].time_ns
-        self.made.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
-        return self.made[-1]
+        self.log_written.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
+        return self.log_written[-1]
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
@@ -262,7 +262,7 @@ class _Player:
         if step.losses is not None:
             self._reported.append(step.losses)
             self._move_past("losses", step, self.settings.losses_every)
-        elif step.told:
+        elif step.zero_missing:
             self._move_past("told", step, self.settings.zero_patience)
         elif step.act is None:
             self.clock.move(step.instant_ns)
@@ -300,8 +300,8 @@ def recorded_settings(log: Sequence[LoggedEvent]) -> RunnerSettings:
     """Return how a session, or a part of it, was run, as its log tells; what it does not tell is as it is now."""
     for event in log:
         if event.kind in ("started", "resumed"):
-            told = event.data["settings"] if event.kind == "started" else event.data["run"]
-            return msgspec.convert({name: setting["value"] for name, setting in told.items()}, RunnerSettings)
+            settings = event.data["settings"] if event.kind == "started" else event.data["run"]
+            return msgspec.convert({name: setting["value"] for name, setting in settings.items()}, RunnerSettings)
     return RunnerSettings()
 
 
@@ -320,7 +320,7 @@ def _run(
                 progress((number + part) / len(logs), what)
 
             player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
-            resumed = None if number == 0 else _resumed(recording.plan, writer.made, log)
+            resumed = None if number == 0 else _resumed(recording.plan, writer.log_written, log)
             writer.follow_part(log)
             _run_part(recording.plan, player, writer, resumed)
     finally:

@@ -38,7 +38,7 @@ class Step:
     instant_ns: int  # session clock [ns]
     act: Event | None = None  # what somebody did then
     losses: LoggedEvent | None = None  # what was reported of lost and distrusted readings
-    told: bool = False  # somebody was told that the zero cannot be measured
+    zero_missing: bool = False  # somebody was told that the zero cannot be measured
     end: Mapping[str, Any] | None = None  # how the session ended; empty for one that was cut short
 
 
@@ -54,25 +54,25 @@ def parts(events: Sequence[LoggedEvent]) -> tuple[tuple[LoggedEvent, ...], ...]:
 
 def steps(events: Sequence[LoggedEvent]) -> tuple[Step, ...]:
     """Return the steps of a session from its log; the last is its end, or where it was cut short."""
-    steps: list[Step] = []
+    history: list[Step] = []
     for i, event in enumerate(events):
         place = event.readings, event.time_ns
         refused = event.kind == "refused"
         kind = event.data.get("event") if refused else event.kind
         if event.kind == "ended":
-            steps.append(Step(*place, end=event.data))
+            history.append(Step(*place, end=event.data))
         elif kind is not None and kind in ACTS:
-            steps.append(Step(*place, act=event_from_data(kind, event.data["given"] if refused else event.data)))
+            history.append(Step(*place, act=event_from_data(kind, event.data["given"] if refused else event.data)))
         elif kind in NOTICED:
-            steps.append(Step(*place))
+            history.append(Step(*place))
         elif event.kind == "losses" and not _at_the_end(events, i):
-            steps.append(Step(*place, losses=event))
+            history.append(Step(*place, losses=event))
         elif event.kind == "told" and event.trial is not None:  # the machine's own words belong to no trial
-            steps.append(Step(*place, told=True))
-    if not steps or steps[-1].end is None:
+            history.append(Step(*place, zero_missing=True))
+    if not history or history[-1].end is None:
         last = events[-1] if events else LoggedEvent(0, 0, "", None, 0, {})
-        steps.append(Step(last.readings, last.time_ns, end={}))
-    return tuple(steps)
+        history.append(Step(last.readings, last.time_ns, end={}))
+    return tuple(history)
 
 
 def _at_the_end(events: Sequence[LoggedEvent], position: int) -> bool:

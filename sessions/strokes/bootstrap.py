@@ -265,9 +265,9 @@ class _Repeats:
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
         """Return the instants (repeats,) that the analysis told and nobody decided."""
-        stroke, curve, found = self._stroke, self._curve, dict[str, Array]()
+        stroke, curve, instants = self._stroke, self._curve, dict[str, Array]()
         if stroke.steady is None:
-            return found
+            return instants
         inside = (curve.time >= stroke.steady[0]) & (curve.time <= stroke.steady[1])
         if stroke.break_away is not None and "stick" not in stroke.decided:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[1])
@@ -276,14 +276,14 @@ class _Repeats:
             zero = (self._zero_t, self._zero_n)
             peaked = stroke.mu_static is not None
             draws = break_away_draws(columns, shortest, zero, self._settings, self._draw, peaked=peaked)
-            found |= {} if draws is None else {"break_away": draws}
+            instants |= {} if draws is None else {"break_away": draws}
         if stroke.slide_onset is not None and speed is not None and "slide_onset" not in stroke.decided:
             part = (curve.time >= (stroke.onset or -np.inf)) & (curve.time <= stroke.steady[0])
             noise = float(np.nanstd(curve.speed[inside])) * self._draw.standard_normal(len(speed))
             threshold = self._draw.uniform(*self._settings.slide_share, len(speed)) * speed
             draws = slide_onset_draws(curve.time[part], curve.speed[part], threshold, noise, self._draw)
-            found |= {} if draws is None else {"slide_onset": draws}
-        return found
+            instants |= {} if draws is None else {"slide_onset": draws}
+        return instants
 
     def _onset(self) -> dict[str, Array]:
         """Return the onset (repeats,), where the contact began there and nobody decided it."""

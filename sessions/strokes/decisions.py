@@ -199,19 +199,19 @@ class Decisions:
 
     def of_stroke(self, trial: int | None, stroke: int) -> StrokeDecisions:
         """Return what is in force of a stroke, its number counted within the trial from 1."""
-        found = [one for one in self.in_force if (one.trial, one.stroke) == (trial, stroke)]
-        return StrokeDecisions({decision.what: decision for decision in found})
+        of_stroke = [one for one in self.in_force if (one.trial, one.stroke) == (trial, stroke)]
+        return StrokeDecisions({decision.what: decision for decision in of_stroke})
 
     def choice(self, trial: int | None) -> Decision | None:
         """Return the decision which stroke of a trial the model gets, None where nobody decided."""
-        found = (one for one in self.in_force if one.trial == trial and one.what == "choice")
-        return next(found, None)
+        choices = (one for one in self.in_force if one.trial == trial and one.what == "choice")
+        return next(choices, None)
 
     @property
     def tilt(self) -> Span | None:
         """Return how far the face leans to +x and to +y [degrees], where that was decided."""
-        found = (one for one in self.in_force if one.what == "tilt")
-        decision = next(found, None)
+        tilts = (one for one in self.in_force if one.what == "tilt")
+        decision = next(tilts, None)
         return None if decision is None else cast("Span", decision.new)
 
     def with_line(self, decision: Decision) -> "Decisions":
@@ -242,13 +242,13 @@ def parse(content: bytes) -> Decisions:
     problems: list[str] = []
     *complete, rest = content.split(b"\n")
     for place, line in enumerate(complete, 1):
-        found = _decision(line)
-        if isinstance(found, str):
-            problems.append(f"line {place} of {DECISIONS} is left out: {found}")
-        elif found is not None and lines and found.number <= lines[-1].number:
-            problems.append(f"line {place} of {DECISIONS} is left out: its number, {found.number}, comes before it")
-        elif found is not None:
-            lines.append(found)
+        decision = _decision(line)
+        if isinstance(decision, str):
+            problems.append(f"line {place} of {DECISIONS} is left out: {decision}")
+        elif decision is not None and lines and decision.number <= lines[-1].number:
+            problems.append(f"line {place} of {DECISIONS} is left out: its number, {decision.number}, comes before it")
+        elif decision is not None:
+            lines.append(decision)
     if rest:
         problems.append(f"the last line of {DECISIONS} is torn and left out: it was never acknowledged, or was cut off")
     missing = sorted({*range(1, max((line.number for line in lines), default=0))} - {line.number for line in lines})

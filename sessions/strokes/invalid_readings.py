@@ -84,7 +84,7 @@ def constant_runs(time: Array, raw: Array, ignored: Mask, settings: SignalSettin
     A run counts where it is long against the runs that its axis shows elsewhere, so that coarse steps are no fault.
     Readings `ignored` (n,) are no axis' greatest or least value.
     """
-    return tuple(found for axis in range(raw.shape[1]) for found in _of_axis(axis, time, raw, ignored, settings))
+    return tuple(run for axis in range(raw.shape[1]) for run in _of_axis(axis, time, raw, ignored, settings))
 
 
 def at_the_same_value(raw: Array, runs: tuple[ConstantRun, ...], *, clipped: bool) -> Mask:

@@ -229,11 +229,11 @@ def _dead_flaws(dead: tuple[str, ...]) -> _Found:
 def _time_flaws(step: float, even: bool, stalled: int) -> _Found:
     if not step > 0.0:
         return [(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")]
-    found: _Found = []
+    flaws: _Found = []
     if stalled:
         sentence = f"At {stalled} readings the device's time did not advance; they are left out."
-        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+        flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
     if not even:
         sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
-        found.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
-    return found
+        flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+    return flaws

@@ -5,24 +5,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
-from sessions.run.steps import (
-    AskBegin,
-    AskChoice,
-    AskFinish,
-    AskMount,
-    AskNumber,
-    AskRest,
-    AskScore,
-    AskStroke,
-    Begin,
-    Finish,
-    MagnitudeEstimate,
-    PairedChoice,
-    Resume,
-    Scored,
-    StimulusMounted,
-    StrokeDone,
-)
+from sessions.run import steps
 
 RATE = 200.0
 CALIBRATION = Calibration(
@@ -122,24 +105,24 @@ class Hands:
 
     def answers(self, command, now):
         match command:
-            case AskBegin():
-                return [Begin()]
-            case AskMount(trial):
-                return [StimulusMounted(trial.stimulus.code)]
-            case AskStroke():
+            case steps.AskBegin():
+                return [steps.Begin()]
+            case steps.AskMount(trial):
+                return [steps.StimulusMounted(trial.stimulus.code)]
+            case steps.AskStroke():
                 if self.transducer is None:
-                    return [StrokeDone()]
+                    return [steps.StrokeDone()]
                 self.stroke(now)
-            case AskScore(trial):
-                return [Scored(float(trial.stimulus.index))]
-            case AskNumber(trial):
-                return [MagnitudeEstimate(trial.stimulus.index + 1.0)]
-            case AskChoice(first, second):
-                return [PairedChoice("first" if first.stimulus.index > second.stimulus.index else "second")]
-            case AskRest(None):
-                return [Resume()]
-            case AskFinish():
-                return [Finish()]
+            case steps.AskScore(trial):
+                return [steps.Scored(float(trial.stimulus.index))]
+            case steps.AskNumber(trial):
+                return [steps.MagnitudeEstimate(trial.stimulus.index + 1.0)]
+            case steps.AskChoice(first, second):
+                return [steps.PairedChoice("first" if first.stimulus.index > second.stimulus.index else "second")]
+            case steps.AskRest(None):
+                return [steps.Resume()]
+            case steps.AskFinish():
+                return [steps.Finish()]
         return []
 
     def stroke(self, now, newtons=2.0):

@@ -207,7 +207,7 @@ class _Blocks:
 
     def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
         """Return the order of each repetition."""
-        made: list[tuple[int, ...]] = []
+        orders: list[tuple[int, ...]] = []
         if outline.adaptive is not None and outline.standard is not None:
             return self._adaptive_orders(outline, outline.standard, outline.adaptive)
         for repetition in range(1, outline.repetitions + 1):
@@ -215,12 +215,12 @@ class _Blocks:
             if self.protocol.scale.answer == "choice":
                 by_code = self._by_code(outline)
                 drawn_pairs = self._pairs(outline, tuple(by_code), repetition, name)
-                made.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
+                orders.append(tuple(by_code[str(code)] for pair in drawn_pairs for code in pair))
             elif self.row is not None:
-                made.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
+                orders.append(self._row_of_design(outline, self.row - 1 + repetition - 1))
             else:
-                made.append(self._shuffled(outline, name, [order[0] for order in made]))
-        return made
+                orders.append(self._shuffled(outline, name, [order[0] for order in orders]))
+        return orders
 
     def _adaptive_orders(self, outline: BlockOutline, standard: int, comparisons: int) -> list[tuple[int, ...]]:
         """Return each comparison as the answers that there are not yet ask for it; half begin with the standard."""
@@ -243,8 +243,8 @@ class _Blocks:
         if outline.standard is None:
             return pairs(codes, self.seed, name)
         standard = self.labels[outline.descriptor, outline.standard]
-        others = [code for code in codes if code != standard]
-        return pairs_with(standard, others, self.seed, outline.name, repetition)
+        comparisons = [code for code in codes if code != standard]
+        return pairs_with(standard, comparisons, self.seed, outline.name, repetition)
 
     def _shuffled(self, outline: BlockOutline, name: str, begun_with: Sequence[int] = ()) -> tuple[int, ...]:
         """Return an order by chance that meets the protocol's constraints. Codes are drawn: an order tells no index."""
