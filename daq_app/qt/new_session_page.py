@@ -317,7 +317,8 @@ class NewSessionPage(QFrame):
                 self.studies.clear()
                 self.studies.addItems(there)
                 self.studies.setEditText(typed)
-            self.studies.completer().setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
+            if (completer := self.studies.completer()) is not None:  # as an editable list has
+                completer.setCompletionMode(QCompleter.CompletionMode.PopupCompletion)
         code = next_code(codes_in(place_of(self.form())))
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
         self._proposal.setText(code)
