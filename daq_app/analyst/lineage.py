@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.analyst.shown import condition
+from daq_app.analyst.shown import condition, sed_with_errors
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
@@ -32,9 +32,9 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
     if said is not None and said.sed is not None:
         made.append(
             Link(
-                f"SED {1000.0 * said.sed:.3f} kPa",
+                f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
                 "prediction",
-                tr("{condition}, averaged over the ending", condition=condition(state.report, said)),
+                tr("averaged over the ending"),
             )
         )
     if stroke is None:

@@ -3,7 +3,7 @@
 from daq_app.analyst import messages as m
 from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
 from daq_app.analyst.frame import Finger, Frame
-from daq_app.analyst.shown import condition
+from daq_app.analyst.shown import condition, sed_with_errors
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
@@ -52,7 +52,7 @@ def finger_words(state: AnalystState | None) -> str:
     finger = state.fingers.get(row.key)
     parts = [
         tr("Finger of {name}, settled", name=name),
-        f"SED {condition(state.report, said)} {1000.0 * said.sed:.3f} kPa",
+        f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
     ]
     if finger is not None:
         parts.append(_contact_words(finger.frame))
@@ -73,7 +73,7 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
     finger = None if found is None else other.fingers.get((found.trial, found.stroke))
     if found is None or found.sed is None or finger is None:
         return None, tr("{session} has no answer to this stimulus.", session=other.report.session)
-    sed = f"SED {condition(other.report, found)} {1000.0 * found.sed:.3f} kPa"
+    sed = f"SED {condition(other.report, found)} {sed_with_errors(other.report, found)}"
     return finger, " · ".join((other.report.session, sed, _contact_words(finger.frame)))
 
 

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from operator import itemgetter
 
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
@@ -65,15 +64,12 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
         ]
     if (said := row.prediction) is not None:
-        mesh = said.error_estimate
-        error = "" if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh)
         told += [
             (
                 tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
-                _value(_kpa(said.sed), "{:.3f} kPa" + error, said.reasons, "sed"),
+                sed_with_errors(state.report, said) if said.sed is not None else _value(None, "", said.reasons, "sed"),
             ),
             *_other_response(state, said),
-            (tr("by what the model leaves out, all trials"), _left_out(state.report)),
             (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
             (tr("model: indentation"), _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
             (tr("model: normal force"), _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
@@ -94,12 +90,18 @@ def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[
     return [(tr("{response}, averaged over the ending", response=tr(shown.label)), told)]
 
 
-def _left_out(report: Report | None) -> str:
-    """Return which thing that the model leaves out may have changed the SED most, and by how much."""
-    facts = () if report is None else report.left_out
-    numbers = [(max(map(float, PLAIN.findall(fact.value)), default=0.0), fact) for fact in facts]
-    most = max((pair for pair in numbers if pair[1].name != "warning"), key=itemgetter(0), default=None)
-    return "–" if most is None else tr("{effect} {change}; more in Scene", effect=most[1].name, change=most[1].value)
+def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
+    """Return a SED with its error from the mesh, and the greatest from what the model leaves out, over all trials."""
+    assert said.sed is not None  # a trial without an answer has a reason in its place
+    facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]
+    most = max(facts, key=lambda fact: max(map(float, PLAIN.findall(fact.value)), default=0.0), default=None)
+    mesh = said.error_estimate
+    return tr(
+        "{sed:.3f} kPa{mesh}; model: {effect}",
+        sed=1000.0 * said.sed,
+        mesh=tr("; mesh: no estimate") if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh),
+        effect=tr("no estimate") if most is None else f"{most.name} {most.value}",
+    )
 
 
 def condition(report: Report | None, said: PredictionFinding) -> str:

@@ -50,6 +50,7 @@ ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
 LOW = 500  # below it an empty notice gives up its line
 CARDS, PLAN = 600, 316  # widths of the checklist and of the plan
+LEAST_CARDS = 260  # width in which no field of the checklist is cut
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
@@ -412,7 +413,11 @@ class MainWindow(QMainWindow):
         shown = wide if self._bench_shown is None else self._bench_shown
         self.bench.setVisible(shown)
         cards = self._left.currentIndex() == 0 and width >= WIDE
-        self._left.setMaximumWidth(round((CARDS if cards else PLAN) * min(self._scale, 1.4)))
+        scale = self._scale if wide else min(self._scale, 1.4)
+        least = LEAST_CARDS * self._scale if self._left.currentIndex() == 0 and (wide or not shown) else 0.0
+        self._left.setMaximumWidth(round((CARDS if cards else max(PLAN, least / scale)) * scale))
+        self._left.setMinimumWidth(round(max(PLAN * scale, least)))
+        self.bench.setFixedWidth(round(290 * scale))
         self.strip.setVisible(not shown and width >= 800)
         self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
         self.to_do.show_small(height < TALL or width < ROOMY)
@@ -425,8 +430,6 @@ class MainWindow(QMainWindow):
         window.setObjectName("window")
         body = QHBoxLayout()
         body.setSpacing(GRID)
-        self._left.setMinimumWidth(round(PLAN * min(self._scale, 1.4)))
-        self.bench.setFixedWidth(round(290 * min(self._scale, 1.4)))
         body.addWidget(self._left, 4)
         body.addWidget(self.middle, 3)
         for part in (self.bench, self.strip):

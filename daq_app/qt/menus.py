@@ -32,7 +32,7 @@ PANELS = (
     ("hold", tr_noop("Hold the picture")),
     ("model", tr_noop("Live model at finite strain")),
 )
-LIBRARIES = ("PySide6", "numpy", "scipy", "numba")
+LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 
 
 class Menus:

@@ -157,11 +157,10 @@ def is_text_field(widget: QWidget | None) -> bool:
 
 
 def scrolled(inside: QWidget) -> QScrollArea:
-    """Return a frameless area in which `inside` moves up and down where it is taller than its room."""
+    """Return a frameless area in which `inside` moves where it is greater than its room."""
     area = QScrollArea()
     area.setWidget(inside)
     area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     inside.setObjectName("inside")
     area.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")

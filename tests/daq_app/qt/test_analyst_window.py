@@ -30,6 +30,7 @@ from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.field_bar import ALL_TRIALS, FIXED
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.tokens import LIGHT
+from sessions.report.contents import Fact
 from tests.sessions.report_example import example
 
 SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "sealed"
@@ -170,13 +171,17 @@ def test_ctrl_c_copies_the_selected_range_as_tab_separated_values(window):
     assert QGuiApplication.clipboard().text() == f"{first[1]}\t{first[2]}\n{second[1]}\t{second[2]}"
 
 
-def test_every_sed_carries_its_depth_and_its_strain(window):
-    window.take(m.Found("predicted", replace(example(), model="small strain, settled sliding, τ max mean")))
+def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model(window):
+    effects = (Fact("viscosity", "below 0.01 to 4 % of the SED"), Fact("warning", "99 mm"), Fact("bone", "2 %"))
+    report = replace(example(), model="small strain, settled sliding, τ max mean", left_out=effects)
+    window.take(m.Found("predicted", report))
     [said] = [row.prediction for row in rows(window.state)[:1]]
-    expected = f"at {said.indentation:.3g} mm, small strain"
-    assert f"SED {expected}" in finger_words(window.state)
-    assert any(name.startswith(f"SED {expected}") for name, _ in numbers(window.state))
-    assert any(expected in link.more for link in lineage(window.state))
+    condition = f"SED at {said.indentation:.3g} mm, small strain"
+    error = f"{1000 * said.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
+    assert said.error_estimate == pytest.approx(0.001)
+    assert f"{condition} {error}" in finger_words(window.state)
+    assert dict(numbers(window.state))[f"{condition}, averaged over the ending"] == error
+    assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
 
 
 def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_again(application, window):

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QPushButton,
     QRadioButton,
+    QScrollArea,
     QStyle,
     QStyleFactory,
     QStyleOptionButton,
@@ -211,6 +212,9 @@ def settle(application):
 def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, size, scale, theme):
     window = windows(size, scale, theme)
     assert all(value.isVisible() for value in window.live.bar.values.values())
+    for panel in (window.page, window.bench):
+        (area,) = panel.findChildren(QScrollArea)
+        assert not panel.isVisible() or area.horizontalScrollBar().maximum() == 0
     assert cut_off(window) == []
     window.act("keys")
     settle(driver.application)

@@ -134,4 +134,5 @@ def test_the_window_opens_where_it_was_closed(driver):
 
 def test_about_names_the_versions_it_stands_on():
     words = about_words()
+    assert "unknown" not in words
     assert all(name in words for name in ("daq-app", "Python 3", "Qt 6", "numpy", "numba"))
