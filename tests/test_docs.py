@@ -46,7 +46,8 @@ def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
     marks = [
         mark for page in PAGES for mark in re.findall(r"<!-- ([\w-]+): begin -->", page.read_text(encoding="utf-8"))
     ]
-    assert sorted(marks) == sorted(name for names in docs_tables.PAGES.values() for name in names)
+    of_the_survey = ["judged"]  # which fills its own table
+    assert sorted(marks) == sorted([*of_the_survey, *(name for names in docs_tables.PAGES.values() for name in names)])
     for page, names in docs_tables.PAGES.items():
         text = (ROOT / "docs" / page).read_text(encoding="utf-8")
         assert all("new" in docs_tables.filled(text, name, "new") for name in names), page

@@ -142,13 +142,13 @@ def test_what_a_disk_took_no_more_of_is_rescued_elsewhere_when_its_folder_is_gon
 
     writer = begun(tmp_path / "s")
     writer.readings(readings(0, 10))
-    written = writer._written
+    write_waiting = writer._write_waiting
 
     def fails():
-        monkeypatch.setattr(writer, "_written", written)
+        monkeypatch.setattr(writer, "_write_waiting", write_waiting)
         raise sqlite3.OperationalError("disk I/O error")
 
-    monkeypatch.setattr(writer, "_written", fails)
+    monkeypatch.setattr(writer, "_write_waiting", fails)
     shutil.rmtree(tmp_path / "s")
     writer.commit()
     assert "s-rescued" in writer.must_end
