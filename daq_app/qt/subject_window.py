@@ -306,6 +306,7 @@ class _Scale(QWidget):
         for end in self._ends:
             end.setParent(self)
             end.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+            end.setMargin(GRID)  # keeps the words apart; Arabic letters reach beyond the height of the label's own font
 
     def show_ends(self, ends: tuple[str, str]) -> None:
         """Show what the two ends mean."""
@@ -324,7 +325,7 @@ class _Scale(QWidget):
         line = self._line
         line.move((self.width() - line.width()) // 2, 0)
         ends = [line.x() + line.place_of(position).x() for position in (0.0, 100.0)]
-        width = int(min(abs(ends[1] - ends[0]) - 2 * GRID, 2 * min(ends)))
+        width = int(min(abs(ends[1] - ends[0]), 2 * min(ends)))
         tallest = 0
         for shown, at in zip(self._ends, ends, strict=True):
             tallest = max(tallest, shown.heightForWidth(width))
