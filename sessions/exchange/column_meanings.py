@@ -33,7 +33,7 @@ TRIAL = {
 }
 
 _MEASURED = meanings()
-_FURTHER: Mapping[str, Columns] = {  # what an analysis says of a stroke beside its own numbers, after which of them
+_FURTHER: Mapping[str, Columns] = {  # further columns of a stroke, by the column they follow
     "direction_from": {"direction_agrees": ("", "share of bootstrap repeats with that direction")},
     "flaws": {
         **{f"{name}_bootstrap": (_MEASURED[name].unit, f"95 % bootstrap interval of {name}") for name in NUMBERS},

@@ -24,8 +24,8 @@ class BootstrapSettings:
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
     tilt_origin: str = "assumed: too few presses tell it"
     confidence: float = 0.95
-    fewest_blocks: int = 4  # of which a spread is told
-    fewest_quiet: int = 10  # readings before the onset of which noise is told ...
+    fewest_blocks: int = 4  # from which a spread is estimated
+    fewest_quiet: int = 10  # readings before the onset from which noise is estimated ...
     quiet_before: float = 0.02  # ... which end so long before it: later ones may be the touch's already [s]
     top_share: float = 0.97  # readings above this share of the peak may be the peak [-]
     top_alike: float = 0.25  # ... and filtered ones nearer than this share of a block are alike [-]
@@ -33,7 +33,7 @@ class BootstrapSettings:
     least_free: float = 2.0  # degrees of freedom of a mean, likewise
     onset_fewest: int = 3  # readings that tell how steeply the force climbs
     onset_most: int = 400  # readings about the crossing in which noise is drawn
-    onset_steep: float = 0.2  # of its mean steepness: a force that bends climbed at least so steeply [-]
+    onset_steep: float = 0.2  # least steepness of a bent rise of force, by its mean steepness [-]
     onset_reach: float = 4.0  # standard deviations of the noise within which it may move the crossing [-]
     climb_ends: int = 5  # of the fit of a climb, from that of the steady window inwards
     detector: DetectorSettings = field(default_factory=DetectorSettings)  # those of the analysis

@@ -24,7 +24,7 @@ class StrokeCurve:
 
     time: Array  # (n,) [s, device time]
     normal: Array  # (n,) filtered normal force [N]
-    unfiltered: Array  # (n,) the same as it was felt, not filtered: by it the contact's onset is told [N]
+    unfiltered: Array  # (n,) the same before filtering, from which the onset of contact is found [N]
     tangential: Array  # (n,) filtered tangential force [N]
     force: Array  # (n, 2) filtered force along x and y of the face [N]
     ratio: Array  # (n,) T/N [-]
