@@ -98,6 +98,9 @@ def test_a_redo_that_is_undone_leaves_every_trial_as_it_was(walk):
         if isinstance(commands[0], Refuse):
             assert isinstance(before, Taring | Ready | Stroking)
             continue
+        if isinstance(before, Taring | Ready):
+            assert before.place.before_redo is not None
+            before = before.place.before_redo
         counted = {number: trial.take for number, trial in enumerate(before.place.progress) if trial.kept}
         if isinstance(before, Settling):
             counted[before.place.index] = before.place.take
