@@ -7,5 +7,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program has it; rea
 from hypothesis import HealthCheck, settings
 
 # Machines that run the tests are shared: how long an example takes says nothing about the code.
-settings.register_profile("shared machine", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("shared machine")
+shared = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# The quick run draws the same examples each time, so that it judges a change; the long run draws fresh ones.
+settings.register_profile("fresh examples", shared)
+settings.register_profile("same examples", shared, derandomize=True)
+settings.load_profile("same examples")

@@ -26,6 +26,10 @@ PARALLEL = ["pytest", "-n", "3", "--dist", "loadfile"]
 QUICK = [("every sentence a test proves", [*PARALLEL, "-m", "not slow and not hardware"])]
 LONG = [
     ("every slow sentence", [*PARALLEL, "-m", "slow", "--ignore", "tests/endurance", "tests"]),
+    (
+        "every law on fresh examples",
+        [*PARALLEL, "-m", "hypothesis and not slow", "--hypothesis-profile", "fresh examples"],
+    ),
     ("the endurance runs", ["pytest", "-s", "-m", "slow", "tests/endurance"]),
 ]
 
