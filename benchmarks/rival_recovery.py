@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from sessions.prediction import QUANTITIES
 from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from solver import Friction
-from solver.response.rough_responses import rough_responses
+from solver.response.receptor_row import rough_responses
 from solver.scene.published import STICKINESS, scene
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from sessions.prediction.series_slopes import SERIES
 from sessions.statistics.scores import pearson
 from solver import Prediction, Solve, solve_many
 from solver.quantities import NAMES
-from solver.response.rough_responses import rough_responses
+from solver.response.receptor_row import rough_responses
 from solver.scene.published import Surface, scene
 
 HEAD = """# Against the paper, point by point

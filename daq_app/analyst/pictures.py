@@ -10,8 +10,7 @@ from sessions.report import Field
 from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step
 from solver.prediction import ROW, Skin
-from solver.response.fields import Fields, Sketch, fields_of
-from solver.response.film import Still, most_squeezed, stills, way_until
+from solver.response.fields import Fields, Sketch, Still, fields_of, most_squeezed, stills, way_until
 
 MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn before progress is told

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from solver import Friction, Loading, Scene, SceneError, Solve
 from solver.quantities import NAMES
-from solver.response.rough_responses import rough_responses
+from solver.response.receptor_row import rough_responses
 from solver.scene.published import SLIPPERINESS, STICKINESS, Surface
 from solver.scene.published import scene as published
 

@@ -7,8 +7,7 @@ from sessions.prediction.options import PredictionOptions, bound, template
 from sessions.prediction.scenes import SLIDES
 from solver import Cancelled, Friction, Loading, Prediction, Scene, Solve, SolveFailure, solve_many
 from solver.accuracy.audits import inside_out
-from solver.response.derivatives import By
-from solver.response.nearby import Nearby, nearby
+from solver.response.nearby import By, Nearby, nearby
 
 Progress = Callable[[float], bool]
 

@@ -7,19 +7,23 @@ What two meshes may agree on by chance is where contact states change: an edge o
 slips at the bound, lies anywhere between two nodes. Each edge is moved by one node of h to either side, every other
 state kept, and the linearised body is solved again. The true edge lies within half that distance, so half the larger
 change counts. Edges err independently: their changes are added as squares.
+
+Much of what a mesh makes wrong is the same for all surfaces of one finger and falls out of their differences. What is
+left in a difference is estimated in the same way: each surface has its edges of contact elsewhere.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
-from solver.equilibrium.load_path import Steps
+from solver.equilibrium.load_path import PARTS, Steps
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
-from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Response
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response
 from solver.quantities import NAMES
 from solver.scene.scene import Scene
 
@@ -146,3 +150,100 @@ def _without_given(scene: Scene, found: Errors) -> Errors:
         indentation=found.indentation if by_force else None,
         shift=found.shift if dragged else None,
     )
+
+
+COMPARED = ("SED", "normal force", "drag", "indentation")  # what is compared: the first four of all numbers
+WARNED = 0.05  # part of their range from which on a warning says how far differences may be off
+LEAST = 1e-5  # part of the numbers below which nobody minds
+NOTICED = 1e-3  # part of a force or depth that a sensor may tell
+
+
+def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
+    """Return the sets of scenes that are compared: two or more surfaces of one finger, pressed and moved alike.
+
+    Scenes asked for with quick evidence are variants of one surface, whose differences have their own ways
+    (`solver.response.nearby`), and belong to none.
+    """
+    sets: dict[object, list[int]] = {}
+    for number, scene in enumerate(scenes):
+        if scene.solve.evidence != "quick":
+            sets.setdefault(scene.pressed, []).append(number)
+    return [numbers for numbers in sets.values() if len({scenes[n] for n in numbers}) > 1]
+
+
+class ContrastError(NamedTuple):
+    """By how much of their range differences between surfaces may be off."""
+
+    share: float  # in SED, at worst [-]
+    warning: str = ""  # a sentence where that is too much of it, or of a force or depth
+
+
+def contrast_error(found: Sequence[Prediction]) -> ContrastError:
+    """Return what differences between these surfaces may be off by.
+
+    Of forces and depth only what is off by more than sensors tell is warned of. A surface that has no state on the
+    nested mesh is left out: nothing is known of it.
+    """
+    known = [(one, one.nested) for one in found if one.nested is not None]
+    if len(known) < 2:
+        return ContrastError(0.0)
+    count = len(COMPARED)
+    numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in known])
+    change = np.abs([nested.numbers[:count] for _, nested in known]) - numbers
+    edges = np.array([nested.of_edges[:count] for _, nested in known])
+    pairs = np.array(list(combinations(range(len(known)), 2))).T
+    worst = FROM_HALVING * np.abs(change[pairs[0]] - change[pairs[1]])
+    worst += FROM_EDGES * np.hypot(edges[pairs[0]], edges[pairs[1]])
+    off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
+    shares = off_by / np.maximum(np.maximum(np.ptp(numbers, axis=0), LEAST * mean / WARNED), np.finfo(float).tiny)
+    minded = off_by > NOTICED * mean
+    minded[0] = True
+    warned = np.where((shares > WARNED) & minded, shares, 0.0)
+    first = int(warned.argmax())
+    return ContrastError(
+        float(shares[0]), _in_a_sentence(COMPARED[first], float(warned[first])) if warned.any() else ""
+    )
+
+
+def _in_a_sentence(name: str, share: float) -> str:
+    part = f"{100.0 * share:.2g} %" if share < 1.0 else "more than all"
+    small = f"Differences in {name} from the surfaces solved with this one are small"
+    return f"{small}, and may be off by {part} of their range."
+
+
+Numbers = Callable[[Newton, EquilibriumState], Array]
+
+
+class Estimated(NamedTuple):
+    """Numbers (n,) of a state, each in its own unit."""
+
+    value: Array
+    corrected: Array  # the same on the nested mesh, the best value there is
+    error: Array  # half width of the interval about either
+
+
+def estimated(
+    numbers: Numbers,
+    newton: Newton,
+    state: EquilibriumState,
+    nested: tuple[Newton, EquilibriumState],
+    given: Given | None = None,
+    fewer: Sequence[EquilibriumState] = (),
+) -> Estimated:
+    """Return the `numbers` (n,) of a state and how far each may be off.
+
+    `nested` is the same state on the halved mesh (`solver.mesh.mesh`), `given` the forces it is under, if any. Where
+    the state is the end of a load path on which skin sticks, `fewer` are its ends on the same mesh after `PARTS` of
+    the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
+    """
+    value = numbers(newton, state)
+    finer, there = nested
+    (corrected,), (edges,) = edge_changes(
+        finer, [(there, given)], lambda states: np.array([numbers(finer, one) for one in states])
+    )
+    error = FROM_HALVING * np.abs(corrected - value) + FROM_EDGES * edges
+    if fewer:
+        if len(fewer) != len(PARTS):
+            raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")
+        error += Steps.of(value, np.array([numbers(newton, one) for one in fewer]), None).bound
+    return Estimated(value, corrected, error)

@@ -31,7 +31,7 @@ from solver.arrays import Array
 
 OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # as the compiled loops number them, which a plain solve does not load
 STEEP = 1.0  # coefficient from which skin that slips at a bound does so up to where contact ends, likewise
-NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
+STATE_NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
 
 
 @dataclass(frozen=True, slots=True)

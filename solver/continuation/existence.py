@@ -14,8 +14,7 @@ import numpy as np
 
 from solver._kernels import OPEN, SHEAR_LIMITED, STEEP
 from solver.arrays import Array
-from solver.continuation.arc_length import BRANCH, LARGEST_MU, Branch, continue_branch, follow
-from solver.continuation.surface_instability import folds_at
+from solver.continuation.arc_length import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton

@@ -10,9 +10,8 @@ from solver import _kernels as kernels
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import Law
 from solver.contact.skin import SkinCompression
-from solver.continuation.arc_length import LARGEST_MU, continue_branch, jumped_branch
+from solver.continuation.arc_length import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
-from solver.continuation.surface_instability import folds_at
 from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finger import FiniteFinger, sliding_load

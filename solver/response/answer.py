@@ -11,7 +11,7 @@ from solver.accuracy.error_estimate import errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body.receptor import Patches
-from solver.contact.law import NAMES
+from solver.contact.law import STATE_NAMES
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import Instant, Steps
 from solver.equilibrium.newton import EquilibriumState
@@ -95,7 +95,7 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
         gap=np.where(touching, 0.0, place[:, 1] - state.load.depth),
         pressure=state.normal / length,
         traction=state.tangential / length,
-        state=tuple(NAMES[int(s)] for s in state.state),
+        state=tuple(STATE_NAMES[int(s)] for s in state.state),
     )
 
 

@@ -1,6 +1,7 @@
-"""A prediction as a picture: the deformed finger in triangles with its fields at their corners, and its outlines."""
+"""The deformed finger as a picture: triangles with fields at their corners, outlines, and stills of a course."""
 
-from collections.abc import Mapping
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +10,16 @@ from solver.arrays import Array, Indices
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.element import Q2P1
-from solver.equilibrium.finger import finite_laws, settled_moduli
+from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
+from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
+from solver.equilibrium.newton import EquilibriumState
+from solver.failures import SolveFailure
 from solver.mesh.mesh import Mesh
-from solver.mesh.outline import Outline
-from solver.prediction import Prediction
+from solver.mesh.mesher import Outline
+from solver.prediction import Prediction, Skin
+from solver.progress import Progress, report_part
 from solver.quantities import FIELDS, SED
+from solver.response.answer import skin_of
 from solver.scene.scene import Scene
 
 # Eight triangles of each element, in its nine nodes
@@ -176,3 +182,67 @@ def _holding(mesh: Mesh, points: Array) -> Indices:
     local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((len(tried), 2)))
     outside = np.abs(local).max(axis=1).reshape(near.shape)
     return near[np.arange(len(points)), np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Still:
+    """One state of the way, at small strain."""
+
+    instant: Instant
+    fields: Fields
+    skin: Skin
+    row: Array  # (r,) SED of the row of receptors [MPa]
+    sed: float  # averaged over the ending [MPa]
+
+
+def stills(finger: LinearFinger, instants: Sequence[Instant], sketch: Sketch) -> tuple[Still, ...]:
+    """Return the pictures of states that `finger` was in; tissues at rest, so for ways on which nothing relaxes."""
+    displacement = finger.body.displacement(np.stack([instant.state.u for instant in instants], axis=2))
+    values = sketch.values(displacement)
+    rows = finger.row.average(displacement)
+    ending = finger.ending.average(displacement)[0]
+    return tuple(
+        Still(
+            instant,
+            sketch.fields(displacement[:, :, number], instant.depth, values[:, :, number]),
+            skin_of(finger, instant.state),
+            rows[:, number],
+            float(ending[number]),
+        )
+        for number, instant in enumerate(instants)
+    )
+
+
+def way_until(
+    scene: Scene, finger: LinearFinger, progress: Progress | None = None
+) -> tuple[tuple[Instant, ...], SolveFailure | None]:
+    """Return the states from first touch on, and why there are no more where they end before the finger settles.
+
+    They end before tissue folds: states beyond solve the equations of small strain and are none of a finger's. Raises
+    Cancelled where `progress` says so.
+    """
+    way = way_of(scene, finger)
+    try:
+        follow(way, finger, scene.loading_per_mm, SMALL, 1.0, lambda _, part: report_part(progress, part))
+    except SolveFailure as failure:
+        return _unfolded(finger, way.instants), failure
+    return tuple(way.instants), None
+
+
+def _unfolded(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:
+    """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
+
+    def folds(instant: Instant) -> bool:
+        return finger.body.smallest_det(finger.displacement(instant.state)) <= 0.0
+
+    return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
+
+
+def most_squeezed(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
+    """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
+    displacement = finger.displacement(state)
+    mesh = finger.geometry.mesh
+    corner = int(np.argmin(finger.body.stretches(displacement)[0]))
+    node = mesh.elements[corner // 4, corner % 4]
+    x, y = mesh.nodes[node] + displacement[node]
+    return float(x), float(y - depth)

@@ -15,9 +15,7 @@ from solver.equilibrium.finger import FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesh import Mesh
 from solver.mesh.mesher import Sizing
-from solver.response.finite_stepper import FiniteStepper
-from solver.response.small_stepper import Condensed, SmallStepper
-from solver.response.stepper import Stepper
+from solver.response.stepper import Condensed, FiniteStepper, SmallStepper, Stepper
 from solver.scene.scene import Scene
 
 FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak

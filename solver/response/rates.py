@@ -1,13 +1,27 @@
-"""How fast every quantity at the ending changes in the three parts of a course: press, break-away and slide."""
+"""How fast the quantities at the ending change in the parts of a course: press, break-away and slide; with errors.
 
-from collections.abc import Mapping
-from typing import NamedTuple
+For its errors the course is marched again on the nested mesh, and on the answer's own in parts of its load steps
+(`solver.accuracy.error_estimate`, `solver.equilibrium.load_path`). What edges of contact add is left out where tissues
+relax, since what is left of their past holds with no edge moved.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
 from solver.arrays import Array
-from solver.prediction import History
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
+from solver.equilibrium.load_path import PARTS, RelaxingWay, march
+from solver.equilibrium.newton import EquilibriumState, Given
+from solver.failures import SolveFailure
+from solver.mesh.mesher import finger_mesh
+from solver.prediction import History, Prediction
 from solver.quantities import NAMES
+from solver.response.answer import history
+from solver.scene.scene import Scene
 
 ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 
@@ -21,7 +35,7 @@ class Rates(NamedTuple):
 
 
 def rates(history: History) -> Mapping[str, Rates]:
-    """Return the mean rates of every quantity, by its name; `solver.response.course_errors` has their errors."""
+    """Return the mean rates of every quantity, by its name; `solver.response.rates` has their errors."""
     time = np.concatenate([[0.0], history.time])  # undeformed at first touch
     values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
     first, last, end = instants(history)
@@ -46,3 +60,80 @@ def _mean(time: Array, values: Array, begin: int, end: int) -> Array:
     step = float(time[end] - time[begin])
     grown: Array = values[end] - values[begin]
     return grown / (step if step > 0.0 else np.nan)
+
+
+INSTANTS = ("press", "break_away", "slide")  # whose ends they are
+NUMBERS = ("sed_ending", "sed_point", "normal_force", "tangential_force", "contact_width")  # before the quantities
+_PLACES = [0, 6, 1, 2, 5]  # of those among `Finger.all_numbers`, which quantities follow from the seventh on
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CourseNumbers:
+    """A course in three instants and three parts, or how far that is off; nan where there is none, or not known."""
+
+    at: Array  # (3, 5 + q) of INSTANTS: NUMBERS, then every quantity at the ending, each in its own unit
+    rate: Array  # (3, q) of the parts that end there, per second
+
+
+def course_numbers(course: History) -> CourseNumbers:
+    """Return the numbers of a course."""
+    table = np.column_stack([*(getattr(course, name) for name in NUMBERS), course.responses])
+    ends = instants(course)
+    at = np.array(
+        [table[end - 1] if end > begin else table[0] * np.nan for begin, end in zip((0, *ends), ends, strict=False)]
+    )
+    return CourseNumbers(at, np.array([rates(course)[name] for name in NAMES]).T)
+
+
+def course_errors(found: Prediction) -> CourseNumbers:
+    """Return how far the numbers of a prediction's history may be off; all nan where the nested mesh has no course."""
+    assert found.history is not None
+    usual = course_numbers(found.history)
+    mesh, nested = _fingers(found)
+    try:
+        fewer = [course_numbers(_marched(found.scene, mesh, part)[0]) for part in PARTS.tolist()]
+        course, states = _marched(found.scene, nested, float(PARTS[0]))
+    except SolveFailure:
+        return CourseNumbers(usual.at * np.nan, usual.rate * np.nan)
+    finer = course_numbers(course)
+    ends = instants(course)
+    relaxes = found.scene.materials.relax
+    edges = np.array(
+        [
+            0.0 * one if relaxes else _of_edges(found, nested, states[end - 1])
+            for one, end in zip(usual.at, ends, strict=True)
+        ]
+    )
+    times = np.concatenate([[0.0], course.time])[[0, *ends]]
+    of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(NUMBERS) :]])
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
+        rate_edges = np.hypot(of_quantities[1:], of_quantities[:-1]) / np.diff(times)[:, None]
+
+    def error(name: str, changed_by_edges: Array) -> Array:
+        value, nested_value, *few = (getattr(one, name) for one in (usual, finer, *fewer))
+        by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(few, PARTS.tolist(), strict=True))
+        return FROM_HALVING * np.abs(nested_value - few[0]) + by_steps + FROM_EDGES * changed_by_edges
+
+    return CourseNumbers(error("at", edges), error("rate", rate_edges))
+
+
+def _of_edges(found: Prediction, nested: Finger[Any], state: EquilibriumState) -> Array:
+    """Return what the numbers at an instant change by when edges of contact move by a node (5 + q,)."""
+    by_force = found.scene.normal_force is not None
+    given = Given(float(state.normal.sum()), None, state.load.travel) if by_force else None
+    changes = edge_changes(nested.newton, [(state, given)], nested.all_numbers)[1][0]
+    return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])
+
+
+def _fingers(found: Prediction) -> tuple[Finger[Any], Finger[Any]]:
+    """Return the answer's finger and the nested one."""
+    scene, sizing = found.scene, replace(found.geometry.sizing, halved=True)
+    of = LinearFinger.on if scene.solve.kinematics == "small" else FiniteFinger.on
+    return of(scene, found.geometry), of(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+
+
+def _marched(scene: Scene, finger: Finger[Any], part: float) -> tuple[History, Sequence[EquilibriumState]]:
+    """Return a course in a part of its load steps, and its states. Raises NotConverged."""
+    way = march(scene, finger, part, relaxing=scene.materials.relax)
+    over_time = np.array(way.energies) if isinstance(way, RelaxingWay) else None
+    return history(scene, finger, way.instants[1:], over_time), way.states

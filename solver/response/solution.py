@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import TYPE_CHECKING
 
-from solver.accuracy.contrasts import ContrastError, compared_sets, contrast_error
-from solver.accuracy.measured_effects import COARSE, Answers, measured
+from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
+from solver.accuracy.omitted_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
 from solver.contact.law import STEEP
 from solver.equilibrium.expected_depth import expected_depth

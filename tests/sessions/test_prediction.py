@@ -10,8 +10,7 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver import Finger, Friction, Loading, Scene, SceneError, solve
-from solver.response.fields import Sketch
-from solver.response.film import most_squeezed, stills, way_until
+from solver.response.fields import Sketch, most_squeezed, stills, way_until
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
 

@@ -14,7 +14,7 @@ from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.uncertainty import with_intervals
 from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings
-from solver.response.derivatives import By
+from solver.response.nearby import By
 
 # Of a levelled face and a calibration without cross-talk, so that the friction's interval is narrow.
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)

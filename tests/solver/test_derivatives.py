@@ -22,7 +22,7 @@ from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.newton import LoadState, Newton
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
-from solver.response.derivatives import of_skin, of_slide, slope
+from solver.response.nearby import of_skin, of_slide, slope
 from tests.solver.finite_examples import block
 
 NAMES = ("mu", "tau_max", "press")

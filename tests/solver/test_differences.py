@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Scene, Solve, solve_many
-from solver.accuracy.contrasts import compared_sets, contrast_error
+from solver.accuracy.error_estimate import compared_sets, contrast_error
 from solver.scene.published import STICKINESS, scene
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Finger, Friction, Material, Materials, Receptor, SceneError, Solve, solve
-from solver.mesh.mesher import BONE, Sizing, finger_mesh
-from solver.mesh.outline import Outline
+from solver.mesh.mesher import BONE, Outline, Sizing, finger_mesh
 from solver.scene.published import SLIPPERINESS, scene
 
 KINEMATICS = ("small", "finite")

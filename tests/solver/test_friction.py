@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import law as friction
-from solver.contact.law import LAWS, NAMES, OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from solver.contact.law import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import (
     BY_DEPTH,
@@ -23,7 +23,7 @@ from solver.equilibrium.newton import (
     Newton,
 )
 from solver.mesh.mesh import block
-from solver.response.small_stepper import Condensed, SmallStepper
+from solver.response.stepper import Condensed, SmallStepper
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.active_set import Course, touchable, untouched
 
@@ -191,7 +191,7 @@ def test_wherever_contact_is_looked_for_what_is_found_is_what_the_law_says(cours
 def test_every_state_is_met_in_every_course(cushion):
     courses = [driven(BOUND), driven(BOUND), pressed_by_forces(BOUND), finite(BOUND_OF_CUSHION, cushion)]
     for points in courses:
-        assert {NAMES[int(state)] for at in points for state in at.state} == set(NAMES.values())
+        assert {STATE_NAMES[int(state)] for at in points for state in at.state} == set(STATE_NAMES.values())
 
 
 @pytest.mark.parametrize(

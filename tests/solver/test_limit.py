@@ -10,8 +10,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.continuation import existence, finite_states
 from solver.continuation import existence as reach
-from solver.continuation.arc_length import follow
-from solver.continuation.surface_instability import folds_at
+from solver.continuation.arc_length import folds_at, follow
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_FRICTION, LoadState, Newton

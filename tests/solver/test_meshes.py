@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from solver import Finger, Receptor
 from solver.element import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
 from solver.mesh.mesh import MeshError, grid_mesh, quality
-from solver.mesh.mesher import DERMIS, EPIDERMIS, FAT, Sizing, finger_mesh
-from solver.mesh.outline import Outline
+from solver.mesh.mesher import DERMIS, EPIDERMIS, FAT, Outline, Sizing, finger_mesh
 
 
 def test_gauss_rules_are_those_of_numpy():

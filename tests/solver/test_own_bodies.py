@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.own_bodies import estimated
+from solver.accuracy.error_estimate import estimated
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Elastic
@@ -15,8 +15,7 @@ from solver.equilibrium.full_slip import settled, slide_under
 from solver.equilibrium.load_path import PARTS
 from solver.equilibrium.load_stepping import march
 from solver.equilibrium.newton import Given, LoadState, Newton
-from solver.mesh.halving import HalvedMesh
-from solver.mesh.mesh import block, quality
+from solver.mesh.mesh import HalvedMesh, block, quality
 
 SLIDES = LoadState(0.15, 0.3, sense=-1)
 

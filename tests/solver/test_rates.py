@@ -8,8 +8,7 @@ import pytest
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
 from solver.prediction import History
 from solver.quantities import NAMES
-from solver.response.course_errors import course_errors, course_numbers
-from solver.response.rates import rates
+from solver.response.rates import course_errors, course_numbers, rates
 
 
 def course(time, bone_x, slipping, response):

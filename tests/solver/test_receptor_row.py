@@ -8,8 +8,7 @@ import pytest
 from solver import Friction, Loading, Receptor, Scene, Solve, solve
 from solver.prediction import ROW
 from solver.quantities import NAMES
-from solver.response.receptor_row import responses_along, row_along
-from solver.response.rough_responses import rough_responses
+from solver.response.receptor_row import responses_along, rough_responses, row_along
 
 SCENES = {
     kind: Scene(friction=Friction(0.3, 0.02), loading=Loading(1.2, "-x"), solve=Solve(kind, "steady", 0.005, "quick"))

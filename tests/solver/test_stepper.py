@@ -16,8 +16,7 @@ from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import Given
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
-from solver.response.finite_stepper import FiniteStepper
-from solver.response.small_stepper import Condensed, SmallStepper
+from solver.response.stepper import Condensed, FiniteStepper, SmallStepper
 
 KINEMATICS = ("small", "finite")
 

@@ -13,7 +13,7 @@ from solver.quantities import NAMES, QUANTITIES, Quantity
 if TYPE_CHECKING:
     from solver import Prediction, Receptor, Scene
     from solver.arrays import Array
-    from solver.response.course_errors import CourseNumbers
+    from solver.response.rates import CourseNumbers
     from solver.response.receptor_row import Row
 
 EXAMPLE = "daq-app solve stickiness-100.toml --json"
@@ -135,13 +135,13 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
 
 def _course(found: "Prediction") -> "tuple[CourseNumbers, CourseNumbers] | None":
     """Return the named instants and the rates of a course, and their errors; None where no course was asked for."""
-    from solver.response.course_errors import course_errors, course_numbers
+    from solver.response.rates import course_errors, course_numbers
 
     return None if found.history is None else (course_numbers(found.history), course_errors(found))
 
 
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
-    from solver.response.course_errors import INSTANTS, NUMBERS
+    from solver.response.rates import INSTANTS, NUMBERS
 
     def pairs(names: Sequence[str], values: "Array", off: "Array") -> dict[str, dict[str, float | None]]:
         columns = zip(names, values.tolist(), off.tolist(), strict=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.accuracy.contrasts import contrast_error
+from solver.accuracy.error_estimate import contrast_error
 from solver.arrays import Array
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
