@@ -10,14 +10,7 @@ from solver._kernels.iterating import condense_forces, move
 from solver._kernels.multifrontal import back_substitute, condense, eliminate
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
-from solver._kernels.skin import (
-    STEEP,
-    assemble_contact_system,
-    bounded_length,
-    rubbed,
-    solve,
-    tributary,
-)
+from solver._kernels.skin import STEEP, assemble_contact_system, bounded_length, rubbed, solve, tributary
 
 __all__ = [
     "HELD_X",

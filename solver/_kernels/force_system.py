@@ -1,13 +1,6 @@
 """The skin's system of contact for its forces, where the compliance of the linearised body is known."""
 
-from solver._kernels.arguments import (
-    CondensedArrays,
-    ContactStates,
-    ContactSystem,
-    LoadArguments,
-    Skin,
-    SkinPosition,
-)
+from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver.arrays import Array, Narrow
 

@@ -84,11 +84,7 @@ class Meshes:
 
 
 def coarse_solution(
-    scene: Scene,
-    expected: float,
-    fineness: float,
-    stop: Callable[[], bool],
-    meshes: Meshes,
+    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], meshes: Meshes
 ) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which finer ones begin.
 
@@ -163,12 +159,7 @@ def refine(
 
 
 def solution_on(
-    scene: Scene,
-    sizing: Sizing,
-    below: MeshSolution,
-    stop: Callable[[], bool],
-    meshes: Meshes,
-    times: int = 1,
+    scene: Scene, sizing: Sizing, below: MeshSolution, stop: Callable[[], bool], meshes: Meshes, times: int = 1
 ) -> MeshSolution:
     """Return the settled state on a mesh of `sizing`, begun at the state `below`.
 

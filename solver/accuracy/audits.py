@@ -7,7 +7,7 @@ import numpy as np
 from solver import _kernels as kernels
 from solver.arrays import Array
 from solver.body.receptor import Patches
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.failures import NoSteadyState, NotConverged

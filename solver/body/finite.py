@@ -16,7 +16,7 @@ from solver.body.receptor import Endings, patch_means
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law, log1p, shape, slopes
 from solver.element import Q2P1
-from solver.linalg.multifrontal import Elimination, symbolic_factorization
+from solver.linalg import Elimination, symbolic_factorization
 from solver.mesh.mesh import Mesh, distinct
 from solver.quantities import QUANTITIES, LocalState
 from solver.tolerances import IMAGINARY

@@ -17,7 +17,7 @@ from solver.arrays import Array, Indices, Narrow
 from solver.body.stiffness import Elastic, Isotropic, Probes, condensed_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.element import GAUSS_4, Q2P1, line
-from solver.linalg.multifrontal import factors_of, symbolic_factorization
+from solver.linalg import factors_of, symbolic_factorization
 from solver.mesh.mesh import Mesh
 from solver.tolerances import UNHELD
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array
 from solver.constitutive.hyperelastic import Law, stress, tangent
-from solver.contact.skin import SkinCompression
+from solver.contact import SkinCompression
 from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import Cancelled, NotConverged
 from solver.progress import report_progress

@@ -9,7 +9,7 @@ import numpy as np
 from solver import _kernels as kernels
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import Law
-from solver.contact.skin import SkinCompression
+from solver.contact import SkinCompression
 from solver.continuation.arc_length import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import force_control as finite_forced

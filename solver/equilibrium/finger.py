@@ -20,7 +20,7 @@ from solver.body.receptor import Endings, LinearPatches, Patches, endings, middl
 from solver.body.stiffness import Centred
 from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
 from solver.constitutive.linear import Moduli, Prony
-from solver.contact.skin import SkinCompression, arcs_of, width
+from solver.contact import SkinCompression, arcs_of, width
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.mesh.mesh import MeshError, distinct

@@ -7,7 +7,7 @@ import numpy as np
 from solver import _kernels as kernels
 from solver.arrays import Array, Flags, Indices
 from solver.body.finite import VALUES, FiniteBody
-from solver.contact.skin import arcs_of
+from solver.contact import arcs_of
 from solver.element import Q2P1
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesher import FingerMesh, with_middles

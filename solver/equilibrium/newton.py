@@ -27,7 +27,7 @@ from solver._kernels.arguments import (
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
 from solver.body.validation import finite
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.failures import ContactLost, NotConverged
 
 States = NDArray[np.int32]

@@ -11,7 +11,7 @@ from solver.accuracy.error_estimate import errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body.receptor import Patches
-from solver.contact.law import STATE_NAMES
+from solver.contact import STATE_NAMES
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import Instant, Steps
 from solver.equilibrium.newton import EquilibriumState

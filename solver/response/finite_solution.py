@@ -33,11 +33,7 @@ Pressed = tuple[float, float, str]  # how deep or hard, and which way: `Scene.pr
 
 
 def answers(
-    scenes: Sequence[Scene],
-    expected: float,
-    fineness: float,
-    progress: Progress | None,
-    kept: dict[Pressed, Meshes],
+    scenes: Sequence[Scene], expected: float, fineness: float, progress: Progress | None, kept: dict[Pressed, Meshes]
 ) -> list[Answer]:
     """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 

@@ -19,7 +19,7 @@ from solver._kernels import SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver.arrays import Array
 from solver.body.receptor import Patches
-from solver.contact.law import STATE_NAMES
+from solver.contact import STATE_NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.existence import sound
 from solver.equilibrium import force_control, full_slip

@@ -99,12 +99,7 @@ class Fingers:
 
 
 def answers(
-    scenes: list[Scene],
-    depth: float,
-    fineness: float,
-    progress: Progress | None,
-    watch: Watch | None,
-    fingers: Fingers,
+    scenes: list[Scene], depth: float, fineness: float, progress: Progress | None, watch: Watch | None, fingers: Fingers
 ) -> list[Answer]:
     """Solve all scenes on one mesh, and on its nested one for the estimate; look wider where contact reaches out."""
     fingers.begin(fineness)

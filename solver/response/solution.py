@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
-from solver.contact.law import STEEP
+from solver.contact import STEEP
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
@@ -50,11 +50,7 @@ def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None
 
 
 def solve_many(
-    scenes: Sequence[Scene],
-    progress: Progress | None = None,
-    watch: Watch | None = None,
-    *,
-    rough: Rough | None = None,
+    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, *, rough: Rough | None = None
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene, in their order, or the failure that says why it has none.
 
@@ -86,10 +82,7 @@ def solve_many(
 
 
 def _answers(
-    scenes: Sequence[Scene],
-    progress: Progress | None = None,
-    watch: Watch | None = None,
-    rough: Rough | None = None,
+    scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, rough: Rough | None = None
 ) -> tuple[Answer, ...]:
     """Do the same, evidence as far as it comes with the answers."""
     out: dict[int, Answer] = {}

@@ -277,7 +277,7 @@ def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
 def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_for_its_caller():
     mesher, contact, library = (
         ("/x/solver/mesh/mesher.py", 1, "a"),
-        ("/x/solver/contact/law.py", 1, "b"),
+        ("/x/solver/contact.py", 1, "b"),
         ("/lib/np.py", 1, "c"),
     )
     calls = {mesher: (1, 1, 3.0, 4.0), contact: (1, 1, 1.0, 3.0)}

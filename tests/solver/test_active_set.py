@@ -9,7 +9,7 @@ from solver import ContactLost, Finger, Loading, Receptor
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import Aim, Way

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.verification.published import contacts
 from solver.verification.published.contacts import ELEMENT
 from solver.verification.published.problems import BELOW, CAPPED, HERTZ, PARTS

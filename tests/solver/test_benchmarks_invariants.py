@@ -8,7 +8,7 @@ import pytest
 
 from solver import Friction, Loading, Material, Materials, Scene
 from solver._kernels import SHEAR_LIMITED, SLIP
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.equilibrium.finger import LinearFinger, sliding_load
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_path import march

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from solver import _kernels as kernels
+from solver import contact as friction
 from solver._kernels.arguments import ContactStates, LoadArguments
 from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
-from solver.contact import law as friction
-from solver.contact.law import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
+from solver.contact import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import (
     BY_DEPTH,

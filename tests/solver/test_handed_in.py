@@ -8,7 +8,7 @@ from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import loaded, march

@@ -6,7 +6,7 @@ from solver.body.linear import LinearBody
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.constitutive.linear import MATERIALS, Hooke
 from solver.element import Q2P1
-from solver.linalg.multifrontal import Tree, places
+from solver.linalg import Tree, places
 from solver.mesh.mesh import block
 from solver.mesh.mesher import Sizing, finger_mesh
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Probes, local_coordinates
-from solver.contact.law import OPEN, SLIP
+from solver.contact import OPEN, SLIP
 from solver.element import Q2P1
 from solver.equilibrium.newton import Newton
 from solver.mesh.mesh import Mesh, grid_mesh

@@ -12,7 +12,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive.linear import Hooke
-from solver.contact.law import OPEN, STICK, FrictionLaw
+from solver.contact import OPEN, STICK, FrictionLaw
 from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton

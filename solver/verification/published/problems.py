@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.contact.law import FrictionLaw
+from solver.contact import FrictionLaw
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.published import contacts, finite_contacts, locking
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array
-from solver.contact.skin import last_edge
+from solver.contact import last_edge
 
 
 def half_width(x: Array, force: Array, inside: NDArray[np.bool_]) -> float:

@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 from solver import ContactLost
 from solver.body.linear import CondensedLinear
 from solver.body.validation import finite
-from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]

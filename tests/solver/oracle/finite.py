@@ -9,7 +9,7 @@ from solver._kernels.skin import STEEP
 from solver.arrays import Array, Flags, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
-from solver.contact.law import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 
@@ -165,7 +165,7 @@ def restated(
     law: FrictionLaw,
     direction: int,
 ) -> tuple[Indices, Indices]:
-    """Return states and senses (k,) as `solver.contact.law` asks for them, for the forces and places of a solution.
+    """Return states and senses (k,) as `solver.contact` asks for them, for the forces and places of a solution.
 
     Arguments as those of the loop `update_contact_states`, which changes its own.
     """

@@ -4,7 +4,7 @@ import numpy as np
 
 from solver._kernels.outline import SQUEEZED
 from solver.arrays import Array, Flags
-from solver.contact.skin import SkinCompression
+from solver.contact import SkinCompression
 
 
 def crosses_itself(outline: Array) -> bool:

@@ -1,1 +1,0 @@
-"""Elimination of a body down to its skin."""
