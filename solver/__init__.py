@@ -33,16 +33,15 @@ from solver.scene import (
 
 if TYPE_CHECKING:
     from solver.prediction import Prediction
-    from solver.response.live_picture import stepper
     from solver.response.solution import solve, solve_many
-    from solver.response.stepper import Stepper
+    from solver.response.stepper import Stepper, stepper
 
 _LATER = {
     "Prediction": "solver.prediction",
     "solve": "solver.response.solution",
     "solve_many": "solver.response.solution",
     "Stepper": "solver.response.stepper",
-    "stepper": "solver.response.live_picture",
+    "stepper": "solver.response.stepper",
 }
 __all__ = [
     "Cancelled",

@@ -4,6 +4,7 @@ ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that
 CUT = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
 FORCE_MET = 1e-9  # relative difference within which a searched state has the normal force given
 IMAGINARY = 1e-30  # step of a complex derivative: its square is nothing [-]
+NO_ENERGY = 1e-14  # part of an energy that is left out of its quadratic form [-]
 SED_STILL = 1e-10  # relative change of the ending's SED in a step from which on a slide at finite strain has settled
 SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as what there is to find
 FEEBLE = 1e-12  # least friction that is not none [-, MPa]: below, round-off is as large as the drag

@@ -22,8 +22,7 @@ from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
 from solver.prediction import ROW
 from solver.response.fields import fields_of
-from solver.response.live_picture import LivePicture, stepper_and_picture
-from solver.response.stepper import Stepper
+from solver.response.stepper import LivePicture, Stepper, stepper
 
 TOUCH = 0.05  # less normal force is no touch [N]
 FLOOR = RatioSettings().force_floor  # a ratio means nothing below this normal force [N]
@@ -80,9 +79,10 @@ class _Model:
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
-        stepper, picture = stepper_and_picture(scene)
-        assert picture is not None
-        return cls(stepper, picture)
+        follower = stepper(scene)
+        picture = LivePicture(follower.finger)
+        picture.sed(follower.state)  # what it needs is made at once
+        return cls(follower, picture)
 
     def drawn(self) -> tuple[Picture, Array]:
         """Return what is drawn, and where its nodes are while nothing touches (n, 2) [mm]."""

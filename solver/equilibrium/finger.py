@@ -27,6 +27,7 @@ from solver.mesh.mesh import MeshError, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene.scene import Material, Materials, Scene, SceneError
+from solver.tolerances import NO_ENERGY
 
 Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them
 
@@ -157,6 +158,17 @@ class LinearFinger(Finger[LinearPatches]):
     def patches(self, placed: Endings) -> LinearPatches:
         """Do as `Finger` says."""
         return LinearPatches(self.geometry.mesh, self.body.elastic, placed)
+
+    @cached_property
+    def ending_by_skin(self) -> Array:
+        """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
+        endings, elastic = self.ending.endings, self.body.elastic
+        shear, lame = (modulus[endings.probes.element] for modulus in (elastic.shear, elastic.lame))
+        lines = endings.probes.strains(self.geometry.mesh, self.body.every_step())  # (p, 4, 2 k)
+        lines *= np.sqrt(endings.weights / endings.areas * [shear, shear, shear, lame / 2.0]).T[:, :, None]
+        _, sizes, turns = np.linalg.svd(lines.reshape(-1, lines.shape[2]), full_matrices=False)
+        large = sizes**2 > NO_ENERGY * sizes[0] ** 2
+        return sizes[large, None] * turns[large]
 
     def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
         """Return whether skin outside the part that may touch would, so that the part must be made larger."""

@@ -7,22 +7,22 @@ bordered system, usually in one iteration a reading. What one iteration leaves o
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite
-from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from solver._kernels import OPEN, SLIP, STICK
 from solver.arrays import Array
-from solver.body.condensed import CondensedBody
-from solver.body.linear import CondensedLinear
-from solver.body.receptor import LinearPatches
-from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.body.receptor import Endings, Patches
+from solver.body.stiffness import Probes
+from solver.equilibrium.expected_depth import expected_depth
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.force_control import corrected
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, lowered
 from solver.failures import ContactLost
+from solver.mesh.mesher import Sizing
+from solver.scene.scene import Scene
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch
@@ -39,12 +39,12 @@ class Stepper(ABC):
     (True, True)
     """
 
-    def __init__(self, body: CondensedBody, mu: float, tau: float) -> None:
-        """Start untouched."""
-        self._rest = body
+    def __init__(self, finger: Finger[Patches], mu: float, tau: float = np.inf) -> None:
+        """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
+        self.finger, self.newton = finger, finger.newton
         self.mu = mu  # coefficient of friction, taken anew with every reading [-]
         self.tau = tau  # traction bound, likewise [MPa]
-        self.state = EquilibriumState.undeformed(body)
+        self.state = EquilibriumState.undeformed(self.newton.condensed)
 
     @property
     def depth(self) -> float:
@@ -69,25 +69,27 @@ class Stepper(ABC):
         if normal < LIGHT:
             self.forget()
             return 0.0
-        return self._advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
+        return self.advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
 
     def forget(self) -> None:
         """Start afresh from the untouched finger."""
-        self.state = EquilibriumState.undeformed(self._rest)
+        self.state = EquilibriumState.undeformed(self.newton.condensed)
 
     @abstractmethod
-    def _advance(self, normal: float, tangential: float) -> float:
+    def advance(self, normal: float, tangential: float) -> float:
         """Return what `step` does of forces [N/mm] that press the finger and that friction carries."""
 
-    @abstractmethod
     def row(self) -> Array:
-        """Return the SED of the row of endings as it is now (r,) [MPa], at `receptor.ROW`; nan beyond the finger."""
+        """Return the SED of the row of endings as it is now (r,) [MPa], at `prediction.ROW`; nan beyond the finger."""
+        return self.finger.row.average(self.finger.displacement(self.state))
 
-    @abstractmethod
     def outline(self) -> Array:
         """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
+        whole = self.finger.geometry.whole
+        displacement = self.finger.displacement(self.state)
+        return self.finger.geometry.mesh.nodes[whole] + displacement[whole] - [0.0, self.depth]
 
-    def _under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
+    def under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
         """Return the last state under today's friction; all that touches slips to `sense` where it `slides`."""
         last, load = self.state, self.state.load
         state = np.where(last.state == STICK, SLIP, last.state).astype(np.int32) if slides else last.state.copy()
@@ -97,81 +99,26 @@ class Stepper(ABC):
 
 
 CHANGES = 60  # systems after which a reading is given up: 1 to 3 are usual
-NOTHING = 1e-14  # part of an energy that is left out of its quadratic form
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Condensed:
-    """A finger as the displacements (2 k,) of its skin see it, x and y of one node after the other."""
-
-    skin: CondensedLinear
-    ending: Array  # (a, 2 k): the reference ending's SED is the sum of squares of this times the displacements
-    row: Array  # (b, 2 k): likewise, one ending of the row after the other
-    row_starts: NDArray[np.int64]  # (r,) first line of each ending in `row`
-    row_known: NDArray[np.bool_]  # (r,) whether the finger reaches there
-    outline: Array  # (w, 2) undeformed skin, from the palmar cut round the tip to the dorsal one [mm]
-    outline_by_skin: Array  # (2 w, 2 k) its displacements, x and y in turn [-]
-
-    @classmethod
-    def of(cls, finger: LinearFinger) -> Self:
-        """Condense `finger`."""
-        everywhere = finger.body.every_step()  # (nodes, 2, 2 k)
-        parts = _square_roots(finger.row, everywhere)
-        starts = np.cumsum([0, *(len(part) for part in parts[:-1])])
-        whole = finger.geometry.whole
-        return cls(
-            finger.body.condensed,
-            _square_roots(finger.ending, everywhere)[0],
-            np.concatenate(parts),
-            starts,
-            np.array([bool(part.any()) for part in parts]),
-            finger.geometry.mesh.nodes[whole],
-            np.ascontiguousarray(everywhere[whole].reshape(2 * len(whole), -1)),
-        )
-
-
-def _square_roots(patches: LinearPatches, everywhere: Array) -> list[Array]:
-    """Return for each ending a matrix (a, 2 k): the SED is the sum of squares of it times the skin's unknowns."""
-    mesh, elastic, endings = patches.mesh, patches.elastic, patches.endings
-    probes = endings.probes
-    shear, lame = elastic.shear[probes.element, None, None], elastic.lame[probes.element, None, None]
-    lines = probes.strains(mesh, everywhere)  # (p, 4, 2 k)
-    lines *= np.sqrt(np.concatenate([shear, shear, shear, lame / 2.0], axis=1))  # W = G eps:eps + lambda/2 theta^2
-    area = endings.areas
-    out: list[Array] = []
-    for number in range(endings.count):
-        mine = endings.patch == number
-        if not mine.any():
-            out.append(np.zeros((1, lines.shape[2])))
-            continue
-        scaled = np.sqrt(endings.weights[mine] / area[number])[:, None, None] * lines[mine]
-        _, sizes, turns = np.linalg.svd(scaled.reshape(-1, lines.shape[2]), full_matrices=False)
-        kept = sizes**2 > NOTHING * sizes[0] ** 2
-        out.append(sizes[kept, None] * turns[kept])
-    return out
 
 
 class SmallStepper(Stepper):
     """Follows one finger on one surface at small strain."""
 
-    def __init__(self, finger: Condensed, mu: float, tau: float = np.inf) -> None:
-        """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
-        super().__init__(finger.skin, mu, tau)
-        self._finger, self._newton = finger, Newton(finger.skin)
+    finger: LinearFinger
 
-    def _advance(self, normal: float, tangential: float) -> float:
+    def advance(self, normal: float, tangential: float) -> float:
         """Do as `Stepper` says.
 
         Backward Euler: a point sticks where it was, or slips from there against its friction force.
         """
         slides = abs(tangential) >= SLIDING * self._most(normal)
-        start = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        start = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not start.state.any():
-            start = lowered(self._newton.condensed, start)
+            start = lowered(self.newton.condensed, start)
         given = Given(normal, None, start.load.travel) if slides else Given(normal, tangential)
-        x = start.u[:, 0] + self._newton.skin_x
+        x = start.u[:, 0] + self.newton.skin_x
         try:
-            found = self._newton.solved(start, start.load, x, given, CHANGES)
+            found = self.newton.solved(start, start.load, x, given, CHANGES)
         except ContactLost:
             self.forget()
             return float("nan")
@@ -179,7 +126,7 @@ class SmallStepper(Stepper):
             self.forget()
             return float("nan")
         self.state = found
-        stretched = self._finger.ending @ found.u.ravel()
+        stretched = self.finger.ending_by_skin @ found.u.ravel()
         return float(stretched @ stretched)
 
     def _most(self, normal: float) -> float:
@@ -191,20 +138,7 @@ class SmallStepper(Stepper):
         if total <= 0.0:
             return self.mu * normal
         part = self.mu * normal / total
-        return float(np.minimum(part * push, self.tau * self._finger.skin.fixed_length).sum())
-
-    def row(self) -> Array:
-        """Return the SED of the row of endings as it is now (r,) [MPa]; nan where the finger ends before one."""
-        finger = self._finger
-        stretched = finger.row @ self.state.u.ravel()
-        sed = np.add.reduceat(stretched * stretched, finger.row_starts)
-        return np.where(finger.row_known, sed, np.nan)
-
-    def outline(self) -> Array:
-        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
-        finger = self._finger
-        moved = (finger.outline_by_skin @ self.state.u.ravel()).reshape(-1, 2)
-        return finger.outline + moved - [0.0, self.depth]
+        return float(np.minimum(part * push, self.tau * self.newton.skin.fixed_length).sum())
 
 
 MET = 0.02  # part of the normal force by which a state may miss the forces and still be shown
@@ -221,10 +155,11 @@ FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [
 class FiniteStepper(Stepper):
     """Follows one finger on one surface at finite strain."""
 
+    finger: FiniteFinger
+
     def __init__(self, finger: FiniteFinger, mu: float, tau: float = np.inf) -> None:
-        """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
-        super().__init__(finger.body.condensed, mu, tau)
-        self._finger, self._newton = finger, finger.newton
+        """Start untouched, as `Stepper`."""
+        super().__init__(finger, mu, tau)
         self._lost_at: float | None = None  # normal force [N/mm]
         self._hopeless = False  # whether these forces were led to in vain
         self._behind = False  # whether the last state had not caught up with its forces
@@ -235,7 +170,7 @@ class FiniteStepper(Stepper):
         super().forget()
         self._lost_at, self._hopeless, self._behind = None, False, False
 
-    def _advance(self, normal: float, tangential: float) -> float:
+    def advance(self, normal: float, tangential: float) -> float:
         """Do as `Stepper` says.
 
         A state is lost where contact leaves the skin that may touch, and where skin is squeezed so far that it may have
@@ -267,7 +202,7 @@ class FiniteStepper(Stepper):
 
     def _followed(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
-        newton = self._newton
+        newton = self.newton
         shape = self._ready(normal, tangential)
         origin, before = shape.place(newton.condensed)[:, 0], shape.load.travel
         given, hurried = Given(normal, tangential), self._goes_far(normal)
@@ -277,13 +212,13 @@ class FiniteStepper(Stepper):
             done = corrected(newton, shape, given, origin, before, kept=kept)
             if kept and (done is None or done[1] > FURTHEST):
                 continue
-            if done is None or done[1] > FURTHEST or self._finger.runs_out(done[0]):
+            if done is None or done[1] > FURTHEST or self.finger.runs_out(done[0]):
                 return self._lose(normal)
             shape = done[0]
             if number >= iterations and not kept and done[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
-        compression = self._finger.skin_compression(shape)
+        compression = self.finger.skin_compression(shape)
         if compression.least < FOLDING:
             return self._lose(normal)
         self.state = shape
@@ -294,7 +229,7 @@ class FiniteStepper(Stepper):
             return float("nan")
         if compression.lowest < FOLDING or compression.kink > CREASING:
             return self._lose(normal)
-        return self._finger.sed_ending(shape.u)
+        return self.finger.sed_ending(shape.u)
 
     def _goes_far(self, normal: float) -> bool:
         """Return whether the finger is about to move far: then the tangent of the last reading leads a part of the way.
@@ -303,28 +238,65 @@ class FiniteStepper(Stepper):
         """
         missing = abs(normal - float(self.state.force[1]))
         far = self.state.touching.any() and 0.0 < FAR * self._stiffness < missing
-        return bool(far) and self._newton.bulk < STIFF
+        return bool(far) and self.newton.bulk < STIFF
 
     def _lose(self, normal: float) -> float:
         self.forget()
         self._lost_at = normal
         return float("nan")
 
-    def row(self) -> Array:
-        """Return the SED of the row of endings as it is now (r,) [MPa]; nan where the finger ends before one."""
-        return self._finger.row.average(self.state.u)
-
-    def outline(self) -> Array:
-        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
-        whole = self._finger.geometry.whole
-        return self._finger.geometry.mesh.nodes[whole] + self.state.u[whole] - [0.0, self.depth]
-
     def _ready(self, normal: float, tangential: float) -> EquilibriumState:
         """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
         slides = abs(tangential) > SLIDING * self.mu * normal
-        shape = self._under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        shape = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not shape.touching.any():
-            shape.state[int(np.argmin(shape.place(self._newton.condensed)[:, 1]))] = SLIP if slides else STICK
+            shape.state[int(np.argmin(shape.place(self.newton.condensed)[:, 1]))] = SLIP if slides else STICK
         elif not slides and not (shape.state == STICK).any():
             shape.state[shape.state != OPEN] = STICK
         return shape
+
+
+FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
+MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
+# A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
+QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
+MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+
+
+class LivePicture:
+    """A finger in quadrilaterals, four to an element: `faces` (f, 4) of nodes that lie at `rest` (n, 2) [mm]."""
+
+    def __init__(self, finger: Finger[Patches]) -> None:
+        """Place a probe in the middle of each face."""
+        mesh, count = finger.geometry.mesh, 4 * len(finger.geometry.mesh.elements)
+        self.faces, self.rest = mesh.elements[:, QUARTERS].reshape(-1, 4), mesh.nodes
+        each = np.arange(count)
+        probes = Probes.at(mesh, finger.centred, each // 4, MIDDLES[each % 4])
+        middles = Endings(probes, np.ones(count), each, count, np.tile([1.0, 0.0], (count, 1)))
+        self._finger, self._middles = finger, finger.patches(middles)
+
+    def nodes(self, state: EquilibriumState) -> Array:
+        """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
+        return self.rest + self._finger.displacement(state) - [0.0, state.load.depth]
+
+    def sed(self, state: EquilibriumState) -> Array:
+        """Return the SED in the middle of each face (f,) [MPa]."""
+        return self._middles.average(self._finger.displacement(state))
+
+
+def stepper(scene: Scene) -> Stepper:
+    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation or force.
+
+    Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
+    """
+    kind = scene.solve.kinematics
+    sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
+    mu, tau = float(scene.friction.mu), scene.friction.cap
+    follower: Stepper
+    if kind == "finite":
+        follower = FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)
+    else:
+        follower = SmallStepper(LinearFinger.of(scene, sizing), mu, tau)
+    follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
+    follower.forget()
+    return follower

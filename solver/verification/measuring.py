@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from solver.failures import SolveFailure
-from solver.response.live_picture import stepper
 from solver.response.solution import solve
+from solver.response.stepper import stepper
 from solver.verification.asked import Asked, Found, Host, LeftOut
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, Guaranteed

@@ -14,8 +14,7 @@ import numpy as np
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import EquilibriumState, LoadState
-from solver.response.live_picture import stepper
-from solver.response.stepper import Stepper
+from solver.response.stepper import Stepper, stepper
 from solver.scene.scene import Friction, Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.methods import MESHED, Kinematics

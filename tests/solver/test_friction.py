@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from solver.equilibrium.newton import (
     Newton,
 )
 from solver.mesh.mesh import block
-from solver.response.stepper import Condensed, SmallStepper
+from solver.response.stepper import SmallStepper
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.active_set import Course, touchable, untouched
 
@@ -99,16 +100,13 @@ def slid_at_once(law):
 
 def pressed_by_forces(law):
     """Forces given, the drag up to 0.9 of what the law allows: something always sticks where friction is."""
-    nothing = np.zeros((1, 10))
-    finger = Condensed(
-        springs(), nothing, nothing, np.zeros(1, np.int64), np.zeros(1, bool), np.zeros((1, 2)), np.zeros((2, 10))
-    )
+    finger = SimpleNamespace(newton=Newton(springs()), ending_by_skin=np.zeros((1, 10)))
     points, out = SmallStepper(finger, law.mu, law.tau_max), []
     for normal, part in [(0.02, 0.0), (0.1, 0.0), (0.1, 0.5), (0.1, 0.9), (0.1, -0.9), (0.05, -0.8), (0.15, 0.0)]:
         before = points.state
         most = law.limit(before.normal * normal / max(before.normal.sum(), 1e-300), LENGTH).sum()
         assert np.isfinite(points.step(normal, part * most if part else 0.0))
-        now = told(finger.skin, points.state, before)
+        now = told(finger.newton.condensed, points.state, before)
         # what slides does so against its force, and how far forces do not tell
         sliding = STICK not in points.state.state
         out.append(replace(now, slip=np.full(5, -np.sign(now.tangential.sum()))) if sliding else now)

@@ -9,7 +9,7 @@ from solver import Friction, Loading, Scene
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
-from solver.response.live_picture import SmallPicture
+from solver.response.stepper import LivePicture
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def state(finger):
 
 
 def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(finger, state):
-    picture = SmallPicture.of(finger)
+    picture = LivePicture(finger)
     moved = finger.displacement(state)
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     assert picture.nodes(state) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
@@ -38,7 +38,7 @@ def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(fing
 
 
 def test_faces_cover_the_tissue_once(finger):
-    picture = SmallPicture.of(finger)
+    picture = LivePicture(finger)
     corners = picture.nodes(EquilibriumState.undeformed(finger.body.condensed))[picture.faces]
     x, y = corners[..., 0], corners[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, 1) - np.roll(x, -1, 1) * y, axis=1)

@@ -16,7 +16,7 @@ from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import Given
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
-from solver.response.stepper import Condensed, FiniteStepper, SmallStepper
+from solver.response.stepper import FiniteStepper, SmallStepper
 
 KINEMATICS = ("small", "finite")
 
@@ -28,13 +28,12 @@ def meshed(kinematics, fineness):
     return made.of(scene, Sizing(fineness, 2.0, margin=4.0))
 
 
-@cache
-def condensed():
-    return Condensed.of(meshed("small", 6))
-
-
 def made(kinematics, mu, tau=np.inf):
-    return SmallStepper(condensed(), mu, tau) if kinematics == "small" else FiniteStepper(meshed("finite", 5), mu, tau)
+    return (
+        SmallStepper(meshed("small", 6), mu, tau)
+        if kinematics == "small"
+        else FiniteStepper(meshed("finite", 5), mu, tau)
+    )
 
 
 def readings(kinematics, depth, mu, direction):
