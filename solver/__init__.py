@@ -17,7 +17,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from solver.failures import Cancelled, ContactLost, NoSteadyState, NotConverged, SolveFailure
-from solver.scene import (
+from solver.scene.scene import Scene
+from solver.scene.tables import (
     Finger,
     Friction,
     Loading,
@@ -25,7 +26,6 @@ from solver.scene import (
     Materials,
     Receptor,
     Relaxation,
-    Scene,
     SceneError,
     Slide,
     Solve,

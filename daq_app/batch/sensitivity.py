@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sessions.toml_file import SettingsError, toml_value
 from solver import Scene, SolveFailure, solve
-from solver.scene import TISSUES
+from solver.scene.tables import TISSUES
 
 Design = Mapping[str, tuple[float, float]]  # dotted key of the scene file -> least and greatest value
 

@@ -19,7 +19,8 @@ from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction
-from solver.scene.scene import Material, Materials, Scene, Solve
+from solver.scene.scene import Scene
+from solver.scene.tables import Material, Materials, Solve
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are

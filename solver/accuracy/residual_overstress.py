@@ -21,7 +21,8 @@ from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
-from solver.scene.scene import Finger, Friction, Loading, Materials, Receptor, Relaxation, Scene
+from solver.scene.scene import Scene
+from solver.scene.tables import Finger, Friction, Loading, Materials, Receptor, Relaxation
 
 ROUGH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
 STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide

@@ -12,7 +12,7 @@ from solver.element import GAUSS_3
 from solver.mesh.mesh import Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import QUANTITIES
-from solver.scene.scene import Receptor
+from solver.scene.tables import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
 _ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides

@@ -20,7 +20,8 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
-from solver.scene.scene import Finger, Materials, Receptor, Scene
+from solver.scene.scene import Scene
+from solver.scene.tables import Finger, Materials, Receptor
 
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact

@@ -12,7 +12,8 @@ from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import Friction, Loading, Scene, Solve
+from solver.scene.scene import Scene
+from solver.scene.tables import Friction, Loading, Solve
 from solver.tolerances import SHALLOW
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth

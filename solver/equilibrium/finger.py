@@ -26,7 +26,8 @@ from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.mesh.mesh import MeshError, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
-from solver.scene.scene import Material, Materials, Scene, SceneError
+from solver.scene.scene import Scene
+from solver.scene.tables import Material, Materials, SceneError
 from solver.tolerances import NO_ENERGY
 
 Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them

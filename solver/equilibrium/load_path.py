@@ -21,7 +21,8 @@ from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, followed_to
 from solver.progress import report_progress
-from solver.scene.scene import Loading, Scene
+from solver.scene.scene import Scene
+from solver.scene.tables import Loading
 from solver.tolerances import SED_STILL
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
 from solver.mesh.mesh import Mesh, distinct, grid_mesh
-from solver.scene.scene import Finger, Receptor
+from solver.scene.tables import Finger, Receptor
 
 
 @dataclass(frozen=True, slots=True)

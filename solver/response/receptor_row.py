@@ -28,7 +28,8 @@ from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
-from solver.scene.scene import Receptor, Scene, SceneError
+from solver.scene.scene import Scene
+from solver.scene.tables import Receptor, SceneError
 
 
 class Row(NamedTuple):

@@ -45,7 +45,8 @@ from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, report_part
 from solver.response.answer import Solved, history, prediction
-from solver.scene.scene import Scene, SceneError
+from solver.scene.scene import Scene
+from solver.scene.tables import SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
 

@@ -8,7 +8,8 @@ pascals: 0.8033e4 Pa, not 0.8033e-4 MPa. "computed" takes that reading, "as-prin
 from dataclasses import dataclass
 from typing import Literal
 
-from solver.scene.scene import Friction, Loading, Scene
+from solver.scene.scene import Scene
+from solver.scene.tables import Friction, Loading
 
 Reading = Literal["computed", "as-printed"]
 SCALE: dict[Reading, float] = {"computed": 1e-2, "as-printed": 1e-4}  # of the printed number, to MPa

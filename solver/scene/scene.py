@@ -1,7 +1,7 @@
 """Scene: all that defines one run of the solver, frozen, checked when made.
 
-Its tables and their units stand in `scene_tables.py`, each with what it allows by itself; here is what several decide
-together, and the other scenes that one scene leads to. All of it is imported from here.
+Each of its tables (`scene.tables`) checks itself; here is what several decide together, and the other scenes that one
+scene leads to.
 """
 
 import math
@@ -13,30 +13,12 @@ from solver.scene.tables import (
     Finger,
     Friction,
     Loading,
-    Material,
     Materials,
     Receptor,
-    Relaxation,
     SceneError,
-    Slide,
     Solve,
 )
 from solver.tolerances import STIFFNESSES
-
-__all__ = [
-    "TISSUES",
-    "Finger",
-    "Friction",
-    "Loading",
-    "Material",
-    "Materials",
-    "Receptor",
-    "Relaxation",
-    "Scene",
-    "SceneError",
-    "Slide",
-    "Solve",
-]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,7 @@ from time import perf_counter
 from typing import cast
 
 from solver.response.solution import solve
-from solver.scene.scene import Solve
+from solver.scene.tables import Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import Kinematics
 from solver.verification.truth import KINEMATICS, cases

@@ -12,7 +12,7 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.scene.scene import Solve
+from solver.scene.tables import Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics

@@ -30,7 +30,7 @@ MEMORY = """
 import json
 from dataclasses import replace
 from solver.scene.published import SLIPPERINESS, scene
-from solver.scene.scene import Solve
+from solver.scene.tables import Solve
 from solver.response.solution import solve
 asked = scene(SLIPPERINESS[4])
 solve(replace(asked, solve=Solve("{kinematics}", tolerance=0.05)))

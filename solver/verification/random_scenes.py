@@ -20,18 +20,8 @@ from typing import Literal
 import numpy as np
 
 from solver.scene.published import scenes
-from solver.scene.scene import (
-    Finger,
-    Friction,
-    Loading,
-    Material,
-    Materials,
-    Receptor,
-    Relaxation,
-    Scene,
-    SceneError,
-    Solve,
-)
+from solver.scene.scene import Scene
+from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, SceneError, Solve
 from solver.verification.methods import Kinematics
 
 CLOSE = 0.06  # how far the coefficients of every other set of surfaces lie from the first, at most

@@ -14,7 +14,8 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.response.solution import solve_many
 from solver.scene.published import scenes
-from solver.scene.scene import Scene, Solve
+from solver.scene.scene import Scene
+from solver.scene.tables import Solve
 from solver.verification.asked import Asked, Found, LeftOut, clock
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
 

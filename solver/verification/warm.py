@@ -15,7 +15,8 @@ from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.response.stepper import Stepper, stepper
-from solver.scene.scene import Friction, Scene
+from solver.scene.scene import Scene
+from solver.scene.tables import Friction
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.methods import MESHED, Kinematics
 from solver.verification.truth import KINEMATICS, cases
