@@ -4,8 +4,9 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import prod
 from threading import Lock
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -24,8 +25,11 @@ from solver.tolerances import UNHELD
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 
 
+Carried = tuple[Array, Array]  # a load condensed on the unknowns (n,), and the moves (e, 2) of centres under it alone
+
+
 class LinearElimination:
-    """A body at small strain reduced to the displacements of its skin, normal ones first: m of them."""
+    """A body at small strain reduced to the displacements of its k nodes of skin: x, y of one, x, y of the next."""
 
     def __init__(self, mesh: Mesh, materials: Sequence[Isotropic]) -> None:
         """Assemble `mesh` of `materials` by region, and eliminate all but its skin.
@@ -34,72 +38,49 @@ class LinearElimination:
         """
         plan = symbolic_factorization(mesh)
         count, width = len(mesh.elements), int(plan.border[-1])
-        values, skin = np.empty(plan.factors), np.empty((width, width))
+        values = np.empty(plan.factors)
+        self.stiffness = np.empty((width, width))  # of the skin
         with _ALONE:
             memory = _memory(256 * count + plan.waiting)
             outer, waiting = memory[: 256 * count].reshape(count, 16, 16), memory[256 * count :]
             self.elastic, self._recovery_matrix = condensed_elements(mesh, materials, outer)
-            regular = kernels.eliminate(outer, plan, values, waiting, skin)
+            regular = kernels.eliminate(outer, plan, values, waiting, self.stiffness)
         self._factors = factors_of(plan, values)
         if not regular or not hooke.definite(self._factors):
             raise LinAlgError("the stiffness inside the body is not positive definite")
         self._mesh, self._plan = mesh, plan
-        nodes = np.arange(width // 2)
-        self._kept = np.concatenate([2 * nodes + 1, 2 * nodes])  # where in the plan's skin they stand
-        self.stiffness = skin[np.ix_(self._kept, self._kept)]  # (m, m)
-        self.load = np.zeros((width, 0))  # (m, l) dead loads as the skin feels them
-        self._still = self._loaded = np.zeros(plan.size), np.zeros((count, 2))
+        self.unloaded: Carried = np.zeros(plan.size), np.zeros((count, 2))
 
-    def loaded(self, loads: Array) -> Self:
-        """Return the same body under dead `loads` (size,) on its unknowns."""
-        other = copy(self)
-        other._loaded = self._condensed(loads)  # noqa: SLF001 - of its own kind
-        other.load = self._felt(other._loaded[0])[:, None]  # noqa: SLF001
-        return other
-
-    def all_unknowns(self, kept: Array, loaded: bool = False, only: Indices | None = None) -> Array:
-        """Return all unknowns (size, c) for the kept ones (m, c): fixed ones 0; with the dead loads where `loaded`.
-
-        With `only` (unknowns), others may be left at 0.
-        """
-        return self._unfolded(kept, self._loaded if loaded else self._still, only)
-
-    def condensed(self, load: Array) -> tuple[Array, Callable[[Array], Array]]:
-        """Return what the skin feels (m,) of a `load` (size,), and what makes all unknowns (size,) of the skin's (m,).
-
-        Those are then under that load.
-        """
-        under = self._condensed(load)
-        return self._felt(under[0]), lambda kept: self._unfolded(kept[:, None], under, None)[:, 0]
-
-    def _condensed(self, load: Array) -> tuple[Array, Array]:
-        """Return a load (size,) condensed on the unknowns (n,), and the moves (e, 2) of the centres under it alone."""
-        mesh, plan, nodal = self._mesh, self._plan, load.reshape(-1, 2)
-        centre = nodal[mesh.elements[:, 8], :, None]
+    def condense(self, loads: Array) -> Carried:
+        """Return dead `loads` (nodes, 2) as the factors carry them."""
+        mesh, plan = self._mesh, self._plan
+        centre = loads[mesh.elements[:, 8], :, None]
         own: Array = np.asarray(np.linalg.solve(self.elastic.stiffness[:, 16:, 16:], centre)[:, :, 0], np.float64)
         passed = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
-        force[plan.unknown[free]] = -nodal[mesh.elements[:, :8]].reshape(-1, 16)[free]
+        force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
         np.add.at(force, plan.unknown[free], passed[free])
         kernels.condense(force, self._factors)
         return force, own
 
-    def _felt(self, carried: Array) -> Array:
-        """Return what the skin feels (m,) of a condensed load."""
-        return -carried[self._plan.size - len(self._kept) :][self._kept]
+    def skin_load(self, carried: Carried) -> Array:
+        """Return what the skin feels (2 k,) of a load; nothing where it is held."""
+        felt = -carried[0][self._plan.size - len(self.stiffness) :]
+        return np.where(self._mesh.driven[self._mesh.skin].ravel(), 0.0, felt)
 
-    def _unfolded(self, kept: Array, under: tuple[Array, Array], only: Indices | None) -> Array:
-        mesh, plan = self._mesh, self._plan
-        asked = np.full(len(mesh.nodes), only is None)
+    def displacement(self, skin: Array, carried: Carried, only: Indices | None = None) -> Array:
+        """Return the displacements (nodes, 2, c) that go with those of the skin (2 k, c) under a load.
+
+        With `only` (node numbers), other nodes may be left at 0.
+        """
+        needed = np.full(len(self._mesh.nodes), only is None)
         if only is not None:
-            asked[only // 2] = True
-        skin = np.empty((kept.shape[1], len(kept)))
-        skin[:, self._kept] = kept.T
-        out = np.zeros((*mesh.nodes.shape, kept.shape[1]))
-        recovery = RecoveryArrays(mesh.elements, self._recovery_matrix)
-        hooke.displace(skin, *under, asked, plan, self._factors, recovery, out)
-        return out.reshape(-1, kept.shape[1])
+            needed[only] = True
+        out = np.zeros((*self._mesh.nodes.shape, skin.shape[1]))
+        recovery = RecoveryArrays(self._mesh.elements, self._recovery_matrix)
+        hooke.displace(np.ascontiguousarray(skin.T), *carried, needed, self._plan, self._factors, recovery, out)
+        return out
 
 
 @lru_cache(maxsize=1)
@@ -201,7 +182,8 @@ class LinearBody:
 
     mesh: Mesh
     elastic: Elastic
-    reduced: LinearElimination
+    elimination: LinearElimination
+    carried: Carried  # its dead loads
     condensed: CondensedLinear
     prescribed: Array  # (nodes, 2) displacement of what is held relative to the drive, 0 elsewhere [mm]
 
@@ -227,16 +209,15 @@ class LinearBody:
             check_held(mesh, free)
         whole = LinearElimination(mesh, materials)
         moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
-        force = np.zeros(mesh.nodes.size) if loads is None else np.array(loads, np.float64).ravel()
+        force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
-            unknowns = _unknowns(mesh)
-            pushed = whole.elastic.stiffness @ moved.ravel()[unknowns][:, :, None]
-            np.subtract.at(force, unknowns.ravel(), pushed.ravel())
-        reduced = whole.loaded(force) if force.any() else whole
-        condensed = _condensed(mesh, reduced.stiffness, reduced.load, free)
+            pushed = whole.elastic.stiffness @ moved[mesh.elements].reshape(-1, 18, 1)
+            np.subtract.at(force, mesh.elements, pushed.reshape(-1, 9, 2))
+        carried = whole.condense(force) if force.any() else whole.unloaded
+        condensed = _condensed(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
             _ = condensed.compliance  # which is none where the body can move
-        return LinearBody(mesh, reduced.elastic, reduced, condensed, moved)
+        return LinearBody(mesh, whole.elastic, whole, carried, condensed, moved)
 
     @property
     def dofs(self) -> int:
@@ -248,14 +229,9 @@ class LinearBody:
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        if u.ndim == 2:
-            return self.displacement(u[:, :, None], only)[:, :, 0]
-        unknowns = None if only is None else np.concatenate([2 * only, 2 * only + 1])
-        loaded = self.reduced.load.shape[1] > 0
-        skin = np.concatenate([u[:, 1], u[:, 0]])
-        out = self.reduced.all_unknowns(skin, loaded, unknowns).reshape(*self.mesh.nodes.shape, -1)
-        out += self.prescribed[:, :, None]
-        return out
+        skin = u.reshape(2 * len(self.mesh.skin), prod(u.shape[2:]))
+        out = self.elimination.displacement(skin, self.carried, only) + self.prescribed[:, :, None]
+        return out.reshape(*self.mesh.nodes.shape, *u.shape[2:])
 
     def every_step(self) -> Array:
         """Return the displacements (nodes, 2, 2 k) that one of the skin's unknowns after the other makes."""
@@ -279,13 +255,12 @@ class LinearBody:
 
         That makes those of all nodes (nodes, 2) of the skin's (k, 2) [mm], what is held staying where it is.
         """
-        felt, recovered = self.reduced.condensed(loads.ravel())
+        carried = self.elimination.condense(loads)
 
         def recover(u: Array) -> Array:
-            return recovered(np.concatenate([u[:, 1], u[:, 0]])).reshape(self.mesh.nodes.shape)
+            return self.elimination.displacement(u.reshape(-1, 1), carried)[:, :, 0]
 
-        felt = np.where(self.mesh.driven[self.mesh.skin].ravel(), 0.0, _interleaved(felt))
-        return self.condensed.loaded(felt), recover
+        return self.condensed.loaded(self.elimination.skin_load(carried)), recover
 
     def following(self, skin: Array) -> Array:
         """Do as `Body` says."""
@@ -329,29 +304,16 @@ class LinearBody:
         return np.ascontiguousarray(np.swapaxes(gradient, 1, 2).reshape(count, 8, 9))
 
 
-def _unknowns(mesh: Mesh) -> Indices:
-    """Return the numbers (e, 18) of the elements' unknowns: x of node n is 2 n, y is 2 n + 1."""
-    return (2 * mesh.elements[:, :, None] + np.arange(2)).reshape(len(mesh.elements), 18)
-
-
-def _interleaved(normal_first: Array) -> Array:
-    """Return what belongs to the skin's unknowns (2 k,), normal ones first, as x, y of one node, x, y of the next."""
-    return normal_first.reshape(2, -1)[::-1].T.ravel()
-
-
-def _condensed(mesh: Mesh, stiffness: Array, loads: Array, free: Sequence[Motion]) -> CondensedLinear:
-    """Return the skin of a body by its `stiffness` (2 k, 2 k) and `loads` (2 k, l), normal unknowns first."""
-    k = len(mesh.skin)
-    order = np.stack([np.arange(k, 2 * k), np.arange(k)], axis=1).ravel()
+def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
+    """Return the skin of a body by its `stiffness` (2 k, 2 k) and dead `load` (2 k,)."""
     held = (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
-    load = np.where(mesh.driven[mesh.skin].ravel(), 0.0, loads.sum(axis=1)[order])
     place = mesh.nodes[mesh.skin]
-    (x, y), one, zero = place.T, np.ones(k), np.zeros(k)
+    (x, y), one, zero = place.T, np.ones(len(place)), np.zeros(len(place))
     shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
     rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
-    skin = CondensedLinear(place, stiffness[np.ix_(order, order)], load, skin_lengths(mesh), held)
+    skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held)
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
-    skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * k, 0))
+    skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * len(place), 0))
     return skin
 
 

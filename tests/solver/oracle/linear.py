@@ -54,7 +54,7 @@ def elastic(mesh, materials):
 
 
 class Reduced:
-    """A body reduced to the displacements of its skin, normal ones first, by one dense elimination of all others."""
+    """A body reduced to the displacements of its skin, x and y in turn, by one dense elimination of all others."""
 
     def __init__(self, mesh, stiffness, loads=None):
         count = mesh.nodes.size
@@ -62,7 +62,7 @@ class Reduced:
         whole = np.zeros((count, count))
         np.add.at(whole, (at[:, :, None], at[:, None, :]), stiffness)
         self.loads = np.zeros((count, 1)) if loads is None else loads
-        self.kept = np.concatenate([2 * mesh.skin + 1, 2 * mesh.skin])
+        self.kept = (2 * mesh.skin[:, None] + np.arange(2)).ravel()
         self.inner = np.setdiff1d(np.arange(count), np.concatenate([mesh.fixed, self.kept]))
         self.inside = whole[np.ix_(self.inner, self.inner)]
         self.across = whole[np.ix_(self.inner, self.kept)]
