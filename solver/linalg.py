@@ -224,13 +224,14 @@ class Elimination:
         skin = int(plan.border[-1])
         self.plan = plan
         self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
-        self.found: Array | None = None  # the displacements found with the tangent that is eliminated
         self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
         self._still = np.zeros(plan.size)
         values, waiting = np.empty(plan.factors), np.empty(plan.waiting)
         self.felt = self.carried[plan.size - skin :]
         self.factors = factors_of(plan, values)
         self._eliminate = kernels.bind_arguments(kernels.eliminate, plan, values, waiting, self.stiffness)
+        self._condense = kernels.bind_arguments(kernels.condense, self.factors)
+        self._back_substitute = kernels.bind_arguments(kernels.back_substitute, self.factors)
 
     def factorise(self, tangent: Array) -> bool:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
@@ -239,13 +240,13 @@ class Elimination:
     def condense(self, force: Array) -> Array:
         """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `back_substitute`."""
         self.carried[:] = force
-        kernels.condense(self.carried, self.factors)
+        self._condense(self.carried)
         return self.felt
 
     def back_substitute(self, skin: Array, *, still: bool = False) -> Array:
         """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
         out = np.empty(self.plan.size)
-        kernels.back_substitute(self._still if still else self.carried, np.ascontiguousarray(skin), self.factors, out)
+        self._back_substitute(self._still if still else self.carried, np.ascontiguousarray(skin), out)
         return out
 
 

@@ -5,8 +5,7 @@ The tests hold a plain twin of them in NumPy, and compare the two.
 
 from solver._kernels.active_set import meet, solve_active_set, update_contact_states
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, bind_arguments
-from solver._kernels.elements import assemble, energies, forces
-from solver._kernels.iterating import condense_forces, move
+from solver._kernels.elements import advance, assemble, energies, forces
 from solver._kernels.multifrontal import back_substitute, condense, eliminate
 from solver._kernels.outline import crosses, pinched
 from solver._kernels.overstress import add_overstress
@@ -21,19 +20,18 @@ __all__ = [
     "STEEP",
     "STICK",
     "add_overstress",
+    "advance",
     "assemble",
     "assemble_contact_system",
     "back_substitute",
     "bind_arguments",
     "bounded_length",
     "condense",
-    "condense_forces",
     "crosses",
     "eliminate",
     "energies",
     "forces",
     "meet",
-    "move",
     "pinched",
     "rubbed",
     "solve",

@@ -230,7 +230,7 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
 
 
 @compiled
-def back_substitute(carried: Array, skin: Array, factors: Factors, out: Array) -> None:
+def back_substitute(carried: Array, skin: Array, out: Array, factors: Factors) -> None:
     """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,)."""
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):

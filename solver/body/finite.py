@@ -219,6 +219,8 @@ def _excess(H: Array, log: Array) -> Array:
 class CondensedFinite:
     """A body at finite strain with the memory for its tangent."""
 
+    found: Array | None  # displacements of the equilibrium that the tangent led to
+
     def __init__(self, body: FiniteBody) -> None:
         """Set memory aside for `body`."""
         count = len(body.nodes)
@@ -234,13 +236,11 @@ class CondensedFinite:
         self.compliance, self.motions = np.zeros((0, 0)), np.zeros((0, 0))
         self.bulk = float((body.lame / body.shear).max())
         self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.mesh.skin))
-        elements, inside = body.elements, self.inside
+        elements = body.elements
         self._assemble = bind_arguments(kernels.assemble, elements, self.system)
         self._forces = bind_arguments(kernels.forces, elements, self.system)
-        self._condense = bind_arguments(
-            kernels.condense_forces, self.all_forces, self.load, inside.carried, inside.factors
-        )
-        self._move = bind_arguments(kernels.move, inside.carried, inside.factors, elements, self.system)
+        self._advance = bind_arguments(kernels.advance, elements, self.system)
+        self.found = None
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
@@ -253,7 +253,7 @@ class CondensedFinite:
 
     def linearise(self, u: Array, pressure: Array) -> bool:
         """Assemble and eliminate the tangent at a state; False where it is turned inside out or has no factors."""
-        self.inside.found = None
+        self.found = None
         if not self.assemble(u, pressure) > 0.0 or not self.inside.factorise(self.system.tangent):
             return False
         self._condense()
@@ -266,6 +266,10 @@ class CondensedFinite:
         self._condense()
         return True
 
+    def _condense(self) -> None:
+        self.all_forces -= self.load
+        self.inside.condense(self.all_forces)
+
     def assemble(self, u: Array, pressure: Array) -> float:
         """Fill tangents and forces at a state and return the least det F."""
         return self._assemble(u, pressure)
@@ -274,19 +278,10 @@ class CondensedFinite:
         """Fill the forces at a state for the tangent that is there and return the least det F."""
         return self._forces(u)
 
-    @property
-    def found(self) -> Array | None:
-        """The displacements of the equilibrium that the tangent led to, which is that of whichever shares it."""
-        return self.inside.found
-
-    @found.setter
-    def found(self, u: Array | None) -> None:
-        self.inside.found = u
-
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
         after = BodyState(np.empty_like(u), np.empty_like(pressure))
-        largest = self._move(BodyState(u, pressure), step, scale, after)
+        largest = self._advance(BodyState(u, pressure), self.inside.back_substitute(step), scale, after)
         return after.u, after.pressure, largest
 
     def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked

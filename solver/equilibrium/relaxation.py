@@ -178,6 +178,8 @@ class RelaxingBody:
 class CondensedRelaxing(CondensedFinite):
     """A body that relaxes, whose own laws are the relaxed ones."""
 
+    found: Array | None
+
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
         super().__init__(body)
