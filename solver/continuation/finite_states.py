@@ -12,11 +12,11 @@ from solver.constitutive.hyperelastic import Law
 from solver.contact import SkinCompression
 from solver.continuation.arc_length import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
-from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
+from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger, sliding_load
-from solver.equilibrium.force_control import balanced
 from solver.equilibrium.load_path import Way, march
+from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
@@ -172,10 +172,9 @@ def _sliding_under(
 
 def _grown(newton: Newton, load: LoadState, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
     """Yield slides with the friction of `load` as the normal force grows to `force`. Raises NotConverged."""
-    begin = finite_forced.untouched(newton, load.mu, load.tau)
-    begin = replace(begin, load=begin.load._replace(sense=load.sense))
+    begin = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, load.mu, load.tau, load.sense))
     grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
-    return finite_forced.march(newton, begin, Given(0.0, None), grows, stop)
+    return load_stepping.march(newton, grows, begin, stop=stop)
 
 
 def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:

@@ -15,8 +15,7 @@ from solver._kernels import OPEN, STICK
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, load_of, relaxing_laws
-from solver.equilibrium.force_control import balanced
-from solver.equilibrium.load_stepping import StepControl, advance, never
+from solver.equilibrium.load_stepping import StepControl, advance, balanced, never
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, followed_to
@@ -119,9 +118,7 @@ class Way:
         self.by_force = loading.normal_force is not None
         # without friction there is no drag to speak of, and nothing that it could hold
         self.by_drag = loading.dragged and not self.frictionless
-        rest = replace(
-            EquilibriumState.undeformed(newton.condensed), load=LoadState(0.0, friction.mu, friction.tau).checked()
-        )
+        rest = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, friction.mu, friction.tau))
         self.instants = [Instant(0.0, rest)]
         self.aim = Aim(0.0, 0.0, 0.0)
 

@@ -85,6 +85,9 @@ class LoadState(NamedTuple):
         return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
 
 
+UNLOADED = LoadState(0.0, 0.0)
+
+
 class Given(NamedTuple):
     """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
 
@@ -120,11 +123,11 @@ class EquilibriumState:
     iterations: int  # linear systems solved on the way here, from undeformed
 
     @staticmethod
-    def undeformed(body: CondensedBody) -> "EquilibriumState":
-        """Return the body before anything touches it."""
+    def undeformed(body: CondensedBody, load: LoadState = UNLOADED) -> "EquilibriumState":
+        """Return the body before anything touches it, under a surface with the friction of `load`."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
-        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), LoadState(0.0, 0.0), 0)
+        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.checked(), 0)
 
     def place(self, body: CondensedBody) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""

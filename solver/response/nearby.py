@@ -22,9 +22,10 @@ from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.existence import sound
-from solver.equilibrium import force_control, full_slip
+from solver.equilibrium import full_slip
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_beside
+from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton, load_arguments
 from solver.failures import ContactLost, NotConverged
 from solver.prediction import Prediction, Skin
@@ -268,7 +269,7 @@ class _FiniteNearby(Nearby):
             if scene.normal_force is None:
                 there = full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
             else:
-                there = force_control.balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
+                there = balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
         except NotConverged:
             return None
         beyond = there.load.mu > here.load.mu or there.load.depth > here.load.depth

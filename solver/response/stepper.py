@@ -18,7 +18,7 @@ from solver.body.receptor import Endings, Patches
 from solver.body.stiffness import Probes
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.force_control import corrected
+from solver.equilibrium.load_stepping import corrected
 from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, lowered
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing

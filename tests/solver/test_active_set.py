@@ -10,9 +10,9 @@ from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.contact import FrictionLaw
-from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import Aim, Way
+from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched

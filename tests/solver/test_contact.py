@@ -9,8 +9,8 @@ from solver import ContactLost
 from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
-from solver.equilibrium.force_control import balanced
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
+from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.mesh.mesh import block
 

@@ -16,8 +16,8 @@ from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown
 from solver.constitutive.linear import Hooke
 from solver.continuation.small_states import settled
-from solver.equilibrium import force_control as finite_forced
 from solver.equilibrium import full_slip as sliding
+from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.newton import LoadState, Newton
 from solver.mesh.mesher import Sizing
@@ -189,7 +189,7 @@ def slip(finger, scene, start=None):
     shape = sliding.settled(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
         return shape
-    return finite_forced.balanced(finger.newton, shape, finite_forced.Given(scene.normal_force, None), 1e-12)
+    return load_stepping.balanced(finger.newton, shape, load_stepping.Given(scene.normal_force, None), 1e-12)
 
 
 def finite_numbers(finger, scene, here):

@@ -22,7 +22,7 @@ from solver import (
     solve,
 )
 from solver.continuation import existence as reach
-from solver.equilibrium import force_control as finite_forced
+from solver.equilibrium import load_stepping
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 KINEMATICS = ("small", "finite")
@@ -282,18 +282,18 @@ def test_a_limit_under_a_force_has_a_slide_a_little_less_deep_and_none_a_little_
 def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(monkeypatch):
     """Planted: the force is lost while it grows, and the branch seems to end at two thirds of the depth."""
     given = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
-    whole, followed, grown = solve(given), reach.of_depth, finite_forced.march
+    whole, followed, grown = solve(given), reach.of_depth, load_stepping.march
 
     def ends_too_early(scene, load, stop=lambda: False):
         depth = whole.indentation / 1.5
         return replace(followed(scene, load._replace(depth=depth), stop), value=depth, limited=True, lost=False)
 
-    def lost_on_its_way(newton, start, begin, course, stop=lambda: False):
-        yield from grown(newton, start, begin, course[:3], stop)
+    def lost_on_its_way(newton, course, start, stop):
+        yield from grown(newton, course[:3], start, stop=stop)
         raise NotConverged("lost")
 
     monkeypatch.setattr(reach, "of_depth", ends_too_early)
-    monkeypatch.setattr(finite_forced, "march", lost_on_its_way)
+    monkeypatch.setattr(load_stepping, "march", lost_on_its_way)
     found = solve(given)
     assert found.normal_force == pytest.approx(0.1, rel=1e-8)
     assert found.indentation == pytest.approx(whole.indentation, rel=1e-3)

@@ -9,10 +9,9 @@ from solver.body.validation import BodyError
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.linear import Hooke, Prony
 from solver.contact import FrictionLaw
-from solver.equilibrium.force_control import untouched
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import loaded, march
-from solver.equilibrium.newton import Given, LoadState, Newton
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh.mesh import Mesh, MeshError, block
 
@@ -107,7 +106,7 @@ def as_handed_in(mesh, whole, lengths):
             "travel = nan",
         ),
         (lambda: loaded(FiniteBody.of(MESH, SKIN), load=LoadState(0.0, -0.3)), "mu = -0.3"),
-        (lambda: untouched(Newton(FiniteBody.of(MESH, SKIN).condensed), -0.3, np.inf), "mu = -0.3"),
+        (lambda: EquilibriumState.undeformed(FiniteBody.of(MESH, SKIN).condensed, LoadState(0.0, -0.3)), "mu = -0.3"),
         (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
         (
             lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), LoadState(np.nan, 0.3, sense=1)),

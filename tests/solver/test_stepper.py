@@ -10,10 +10,8 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve, stepper
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.force_control import march as forced_march
-from solver.equilibrium.force_control import untouched as at_rest
 from solver.equilibrium.load_stepping import march, press_and_slide
-from solver.equilibrium.newton import Given
+from solver.equilibrium.newton import EquilibriumState, Given, LoadState
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.stepper import FiniteStepper, SmallStepper
@@ -168,7 +166,7 @@ def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
     course = [Given(0.1 * p, 0.0) for p in np.linspace(0.05, 1.0, 30)]
     course += [Given(0.1, -0.0399 * p) for p in np.linspace(0.05, 1.0, 30)]
     course += [Given(0.1 * p, -0.0399 * p) for p in lift.tolist()]
-    balanced = forced_march(finger.newton, at_rest(finger.newton, mu, np.inf), Given(0.0, 0.0), course)
+    balanced = march(finger.newton, course, EquilibriumState.undeformed(finger.newton.condensed, LoadState(0.0, mu)))
     truth = np.array([finger.sed_ending(shape.u) for shape in balanced])
     told = np.array([follows.step(given.normal, given.tangential) for given in course])
     assert np.abs(told - truth).max() < 0.02 * truth.max()
