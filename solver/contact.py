@@ -32,11 +32,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
 from solver.mesh.mesher import FingerMesh, with_middles
 
-OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # as the compiled loops number them, which a plain solve does not load
-STEEP = 1.0  # coefficient from which skin that slips at a bound does so up to where contact ends, likewise
 STATE_NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
 
 

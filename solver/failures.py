@@ -68,6 +68,9 @@ def beyond_friction(drag: float, most: float, normal_force: float) -> NoSteadySt
     )
 
 
+MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
+
+
 class NotConverged(SolveFailure):
     """The equations have not been solved; whether they have a solution is not known."""
 

@@ -125,31 +125,8 @@ class Prediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""
-        plain: dict[str, Any] = {
-            name: getattr(self, name)
-            for name in (
-                "sed_ending",
-                "sed_point",
-                "normal_force",
-                "tangential_force",
-                "contact_width",
-                "indentation",
-                "shift",
-                "error_estimate",
-                "sed_point_error",
-                "normal_force_error",
-                "tangential_force_error",
-                "indentation_error",
-                "shift_error",
-                "contact_width_error",
-                "dofs",
-                "newton_iterations",
-                "wall_s",
-                "setup_s",
-                "estimate_s",
-                "evidence_s",
-            )
-        }
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("history", "nested")}
+        plain: dict[str, Any] = {k: value for k, value in values.items() if isinstance(value, int | float | None)}
         if self.nested is None:  # nothing is known
             plain |= {name: None for name in plain if name == "error_estimate" or name.endswith("_error")}
         plain["title"] = self.scene.title

@@ -10,14 +10,13 @@ from solver.body.receptor import Patches
 from solver.contact import FrictionLaw
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.failures import NoSteadyState, NotConverged
+from solver.failures import MIXED, NoSteadyState, NotConverged
 from solver.scene.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
 DOUBTED = 1e-8  # and from which a warning says so
 PIERCED = 1e-7  # part of the indentation by which skin may lie too low without a warning [-]
-MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many orders of magnitude,"
 
 
 def audits(

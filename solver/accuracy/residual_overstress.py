@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from solver.accuracy.adaptivity import MARGIN
 from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
+from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import LinearFinger, load_of, relaxing_laws
+from solver.equilibrium.finger import FiniteFinger, LinearFinger, load_of, relaxing_laws
 from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, way_of
 from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
@@ -138,11 +140,6 @@ def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: floa
 
 def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[float, float]:
     """Do the same at finite strain."""
-    # Imported here: small strain need not wait for the compiled loops to be loaded.
-    from solver.accuracy.adaptivity import MARGIN
-    from solver.continuation.finite_states import roughly
-    from solver.equilibrium.finger import FiniteFinger
-
     finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))
     at_last = finger.sed_ending(roughly(finger, scene, stop).u)
     way = way_of(scene, finger, relaxing=True, stop=stop)

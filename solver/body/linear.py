@@ -15,8 +15,9 @@ from solver import _kernels as kernels
 from solver._kernels import HELD_X, HELD_Y, hooke
 from solver._kernels.arguments import RecoveryArrays
 from solver.arrays import Array, Indices, Narrow
-from solver.body.stiffness import Elastic, Isotropic, Probes, condensed_elements
+from solver.body.stiffness import Elastic, Probes, condensed_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
+from solver.constitutive.linear import Elasticity
 from solver.element import GAUSS_4, Q2P1, line
 from solver.linalg import factors_of, symbolic_factorization
 from solver.mesh.mesh import Mesh
@@ -31,7 +32,7 @@ Carried = tuple[Array, Array]  # a load condensed on the unknowns (n,), and the 
 class LinearElimination:
     """A body at small strain reduced to the displacements of its k nodes of skin: x, y of one, x, y of the next."""
 
-    def __init__(self, mesh: Mesh, materials: Sequence[Isotropic]) -> None:
+    def __init__(self, mesh: Mesh, materials: Sequence[Elasticity]) -> None:
         """Assemble `mesh` of `materials` by region, and eliminate all but its skin.
 
         Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
@@ -190,7 +191,7 @@ class LinearBody:
     @staticmethod
     def of(
         mesh: Mesh,
-        materials: Sequence[Isotropic],
+        materials: Sequence[Elasticity],
         loads: Array | None = None,
         prescribed: Array | None = None,
         free: Sequence[Motion] = (),

@@ -12,6 +12,7 @@ from solver._kernels import hooke
 from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.arrays import Array, Indices
 from solver.constitutive.hyperelastic import PLAIN
+from solver.constitutive.linear import Elasticity
 from solver.element import Q2P1
 from solver.mesh.mesh import Mesh
 from solver.quantities import SED, LocalState
@@ -20,20 +21,6 @@ _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _SHAPES = ShapeFunctions(
     _VALUES, np.ascontiguousarray(_GRADIENTS[..., 0]), np.ascontiguousarray(_GRADIENTS[..., 1]), Q2P1.weights
 )
-
-
-class Isotropic(Protocol):
-    """What elements ask of a material at small strain."""
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus [MPa]."""
-        ...
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant [MPa]."""
-        ...
 
 
 class Centred(Protocol):
@@ -56,7 +43,7 @@ class Elastic:
     lame: Array  # (e,) [MPa]
 
     @staticmethod
-    def of(mesh: Mesh, materials: Sequence[Isotropic]) -> "Elastic":
+    def of(mesh: Mesh, materials: Sequence[Elasticity]) -> "Elastic":
         """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
 
         K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
@@ -66,7 +53,7 @@ class Elastic:
         return condensed_elements(mesh, materials, np.empty((len(mesh.elements), 16, 16)))[0]
 
 
-def condensed_elements(mesh: Mesh, materials: Sequence[Isotropic], outer: Array) -> tuple[Elastic, Array]:
+def condensed_elements(mesh: Mesh, materials: Sequence[Elasticity], outer: Array) -> tuple[Elastic, Array]:
     """Return the elements of `mesh`, and the matrices (e, 2, 16) that recover their centre nodes.
 
     Filled: `outer` (e, 16, 16), lower half, their stiffness when the centre nodes are eliminated. Raises LinAlgError

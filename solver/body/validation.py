@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Protocol
 
 import numpy as np
 
 from solver.arrays import Array
 from solver.constitutive.hyperelastic import Law
-from solver.constitutive.linear import Prony
+from solver.constitutive.linear import Elasticity, Prony
 from solver.element import Q2P1
 from solver.mesh.mesh import Mesh, jacobians
 from solver.scene.tables import STIFFENING
@@ -21,21 +20,7 @@ class BodyError(ValueError):
     """A body that cannot be solved as it was handed in: what is wrong, where, and what to do."""
 
 
-class Stiff(Protocol):
-    """What is asked of a material at the door."""
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus [MPa]."""
-        ...
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant [MPa]."""
-        ...
-
-
-def check_body(mesh: Mesh, materials: Sequence[Stiff]) -> None:
+def check_body(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
     """Raise BodyError where arrays of `mesh` or its `materials` by region make no body.
 
     Raises MeshError where an element is folded at a point of its quadrature, which is all that is asked of it.
@@ -72,7 +57,7 @@ def _check_arrays(mesh: Mesh) -> None:
         raise BodyError(f"mesh.region has {len(mesh.region)} entries for {len(mesh.elements)} elements; give one each")
 
 
-def check_moduli(mesh: Mesh, materials: Sequence[Stiff]) -> None:
+def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
     """Raise BodyError where a region of `mesh` has no material, or one of them is no tissue."""
     if not (mesh.region.min() >= 0 and mesh.region.max() < len(materials)):
         worst = int(mesh.region.max() if mesh.region.min() >= 0 else mesh.region.min())

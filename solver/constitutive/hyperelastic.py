@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol, cast
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.linear import Isotropic
+from solver.constitutive.linear import Elasticity, Isotropic
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
@@ -19,20 +19,10 @@ NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by d
 TERMS = 14  # of it: enough up to an exponent of 20
 
 
-class Law(Protocol):
-    """What an element asks of a law."""
+class Law(Elasticity, Protocol):
+    """What an element asks of a law at finite strain."""
 
     name: ClassVar[str]
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus of the undeformed tissue [MPa]."""
-        ...
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant of the undeformed tissue [MPa]."""
-        ...
 
     @property
     def stiffening(self) -> float:

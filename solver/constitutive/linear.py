@@ -1,6 +1,7 @@
 """Energy and stress of the tissues, a class each; the list of materials is at the foot."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -23,6 +24,20 @@ def lame_modulus(E: float, nu: float) -> float:
     0.64864865
     """
     return E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+
+class Elasticity(Protocol):
+    """What elements ask of a material."""
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus of the undeformed tissue [MPa]."""
+        ...
+
+    @property
+    def lame(self) -> float:
+        """Lamé's first constant of the undeformed tissue [MPa]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,16 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-from numpy.linalg import LinAlgError
-
 from solver.equilibrium.finger import LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_under
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
-from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
-from solver.scene.tables import Friction, Loading, Solve
+from solver.scene.tables import Friction, Loading, SceneError, Solve
 from solver.tolerances import SHALLOW
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
@@ -44,7 +41,7 @@ def expected_depth(scene: Scene) -> float:
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
         finger = _finger(_bare(scene, deepest))
-    except (MeshError, LinAlgError):  # who makes the meshes that count will tell
+    except (SceneError, NotConverged):  # who makes the meshes that count will tell
         return deepest
     found = _pressed(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
@@ -93,7 +90,7 @@ def _bare(scene: Scene, deepest: float) -> Scene:
 
 @lru_cache(maxsize=1)
 def _finger(bare: Scene) -> LinearFinger:
-    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it. Raises MeshError."""
+    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it."""
     return LinearFinger.of(bare, Sizing(FINENESS, bare.loading.depth))
 
 

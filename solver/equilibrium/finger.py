@@ -23,6 +23,7 @@ from solver.constitutive.linear import Moduli, Prony
 from solver.contact import SkinCompression, arcs_of, width
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
+from solver.failures import MIXED, NotConverged
 from solver.mesh.mesh import MeshError, distinct
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
@@ -140,9 +141,14 @@ class LinearFinger(Finger[LinearPatches]):
     def of(scene: Scene, sizing: Sizing) -> "LinearFinger":
         """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
 
-        Raises MeshError where the outline cannot be meshed.
+        Raises SceneError where the outline cannot be meshed, NotConverged where round-off has swallowed its stiffness.
         """
-        return LinearFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+        try:
+            return LinearFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+        except MeshError as bad:
+            raise _not_meshed(scene, bad) from bad
+        except LinAlgError as bad:
+            raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
     @staticmethod
     def on(scene: Scene, geometry: FingerMesh) -> "LinearFinger":
@@ -194,7 +200,7 @@ class FiniteFinger(Finger[FinitePatches]):
         try:
             return FiniteFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
         except (MeshError, LinAlgError) as bad:
-            raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
+            raise _not_meshed(scene, bad) from bad
 
     @staticmethod
     def on(scene: Scene, geometry: FingerMesh) -> "FiniteFinger":
@@ -249,6 +255,10 @@ class FiniteFinger(Finger[FinitePatches]):
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
+
+
+def _not_meshed(scene: Scene, why: Exception) -> SceneError:
+    return SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({why})")
 
 
 def settled_moduli(materials: Materials) -> list[Moduli]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array, Indices
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import Endings
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.element import Q2P1
@@ -135,9 +136,6 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
     scene = prediction.scene
     if scene.solve.kinematics == "small":
         return sketch.values(prediction.displacement[:, :, None])[:, :, 0]
-    # Imported here: a picture at small strain need not wait for the compiled loops to be loaded.
-    from solver.body.finite import FiniteBody, FinitePatches
-
     body = FiniteBody.of(prediction.mesh, finite_laws(scene.materials), checked=True)
     count = len(sketch.probes.element)
 

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Self, cast
+from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,10 +151,11 @@ class Nearby(ABC):
 
     scene: Scene
     here: EquilibriumState
+    finger: Finger[Any]
 
-    @abstractmethod
     def derivatives(self) -> Derivatives:
         """Return its derivatives, by the tangent at convergence."""
+        return of_slide(self.finger, self.scene, self.here)
 
     @abstractmethod
     def seds(self, scenes: Sequence[Scene]) -> Array:
@@ -164,7 +165,7 @@ class Nearby(ABC):
         how far there would be one is not looked for.
         """
 
-    def _reaches_out(self, there: EquilibriumState) -> bool:
+    def reaches_out(self, there: EquilibriumState) -> bool:
         """Return whether a state touches at an end of the skin where this one does not: skin beyond may touch too."""
         return bool((there.touching & ~self.here.touching)[[0, -1]].any())
 
@@ -209,16 +210,13 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
 class _SmallNearby(Nearby):
     finger: LinearFinger
 
-    def derivatives(self) -> Derivatives:
-        return of_slide(self.finger, self.scene, self.here)
-
     def seds(self, scenes: Sequence[Scene]) -> Array:
         out = np.full((len(scenes), 2), np.nan)
         held: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
             with suppress(ContactLost):
                 contact = _slide(self.finger, scene, self.here.state)
-                if not self._reaches_out(contact):
+                if not self.reaches_out(contact):
                     held[number] = contact
         if held:
             out[list(held)] = self.finger.seds(list(held.values()))
@@ -255,9 +253,6 @@ class _FiniteNearby(Nearby):
         start = EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0)
         return cls(scene, finger.newton.settle(start, load), finger)
 
-    def derivatives(self) -> Derivatives:
-        return of_slide(self.finger, self.scene, self.here)
-
     def seds(self, scenes: Sequence[Scene]) -> Array:
         found = [self._beside(scene) for scene in scenes]
         return np.array([(np.nan, np.nan) if shape is None else tuple(self.finger.seds([shape])[0]) for shape in found])
@@ -275,4 +270,4 @@ class _FiniteNearby(Nearby):
         beyond = there.load.mu > here.load.mu or there.load.depth > here.load.depth
         # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
         unproven = beyond and not sound(self.finger, there)
-        return None if self._reaches_out(there) or unproven or jumped_branch(self.finger, here, there) else there
+        return None if self.reaches_out(there) or unproven or jumped_branch(self.finger, here, there) else there

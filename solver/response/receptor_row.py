@@ -7,16 +7,16 @@ from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.linalg import LinAlgError
 
-from solver.accuracy.adaptivity import COARSE, WIDER
+from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, end, solution_on
 from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
 from solver.arrays import Array
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.receptor import LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
 from solver.continuation import small_states
 from solver.continuation.existence import sound
-from solver.continuation.finite_states import roughly
+from solver.continuation.finite_states import depends_on_way, roughly
 from solver.continuation.small_states import WIDE, direct
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
@@ -24,12 +24,11 @@ from solver.equilibrium.load_path import PARTS, Steps
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
-from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
 from solver.scene.scene import Scene
-from solver.scene.tables import Receptor, SceneError
+from solver.scene.tables import Receptor
 
 
 class Row(NamedTuple):
@@ -97,10 +96,6 @@ def _small(found: Prediction, sizing: Sizing) -> _Nested:
 
 def _finite(found: Prediction, sizing: Sizing) -> _Nested:
     """Do the same at finite strain, fewer steps on a coarse mesh."""
-    # Imported here: small strain need not wait for the compiled loops of finite strain to be loaded.
-    from solver.accuracy.adaptivity import Meshes, coarse_solution, end, solution_on
-    from solver.continuation.finite_states import depends_on_way
-
     scene, meshes = found.scene, Meshes()
     low = coarse_solution(scene, expected_depth(scene), sizing.fineness, never, meshes)
     top = solution_on(scene, sizing, low, never, meshes)
@@ -117,9 +112,6 @@ def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Patches:
     row = endings(found.geometry, elastic, receptor, arcs)
     if found.scene.solve.kinematics == "small":
         return LinearPatches(mesh, elastic, row)
-    # Imported here: small strain need not wait for the compiled loops of finite strain to be loaded.
-    from solver.body.finite import FiniteBody, FinitePatches
-
     return FinitePatches.of(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
 
 
@@ -129,18 +121,14 @@ FINENESS = 6.0  # elements to a tip radius, at small strain
 def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> Array:
     """Return every quantity (n, q, r) of settled slides at endings at arc positions [mm]; nan where there is none.
 
-    All scenes are of one finger and one kinematics. Raises SceneError where the finger cannot be meshed.
+    All scenes are of one finger and one kinematics. Raises as `LinearFinger.of`.
     """
     first = scenes[0]
     if first.solve.kinematics == "finite":
         return _rough_finite(scenes, np.asarray(arcs, np.float64))
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
     depth = max(expected_depth(scene) for scene in scenes)
-    try:
-        finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=WIDE))
-    except (MeshError, LinAlgError) as bad:
-        key, value = "finger.tip_radius", first.finger.tip_radius
-        raise SceneError(key, value, f"no mesh fits this finger ({bad})") from bad
+    finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=WIDE))
     states: dict[int, EquilibriumState] = {}
     for number, scene in enumerate(scenes):
         with suppress(SolveFailure):

@@ -10,11 +10,9 @@ from functools import partial
 from time import perf_counter
 
 import numpy as np
-from numpy.linalg import LinAlgError
 
 from solver._kernels import STICK
 from solver.accuracy.audits import (
-    MIXED,
     audits,
     course_audits,
     forces_missed,
@@ -40,13 +38,11 @@ from solver.equilibrium.finger import LinearFinger, forces_of
 from solver.equilibrium.load_path import Instant, Steps, times_on_way
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh.mesh import MeshError
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, report_part
 from solver.response.answer import Solved, history, prediction
 from solver.scene.scene import Scene
-from solver.scene.tables import SceneError
 
 ROUGH = 1e-10  # unbalanced part of the forces from which round-off is taken out of the displacements once more
 
@@ -94,7 +90,7 @@ class Fingers:
         """Return the finger, and what it took to make [s]. Raises SceneError, NotConverged."""
         if sizing not in self._made:
             begun = perf_counter()
-            finger = _meshed(self._scene, sizing)
+            finger = LinearFinger.of(self._scene, sizing)
             self._made[sizing] = finger, perf_counter() - begun
         return self._made[sizing]
 
@@ -156,15 +152,6 @@ def _on_mesh(
 def _of_all(progress: Progress | None, number: int, count: int) -> Progress | None:
     """Return `progress` for one of `count` scenes."""
     return None if progress is None else lambda part: progress((number + part) / count)
-
-
-def _meshed(scene: Scene, sizing: Sizing) -> LinearFinger:
-    try:
-        return LinearFinger.of(scene, sizing)
-    except MeshError as bad:
-        raise SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({bad})") from bad
-    except LinAlgError as bad:
-        raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
 
 
 def _in_steps(scene: Scene, mesh: LinearFinger) -> tuple[EquilibriumState, Steps | None]:

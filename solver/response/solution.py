@@ -3,25 +3,22 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import TYPE_CHECKING
 
+from solver._kernels import STEEP
+from solver.accuracy.adaptivity import Meshes
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
-from solver.contact import STEEP
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
-from solver.response import small_solution
+from solver.response import finite_solution, small_solution
+from solver.response.finite_solution import Pressed
 from solver.response.small_solution import Answer, Fingers, Watch
 from solver.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from solver.accuracy.adaptivity import Meshes
-    from solver.response.finite_solution import Pressed
 
 KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
@@ -287,15 +284,12 @@ class _Meshing:
     depth: float  # that they reach, or about [mm]
     progress: Progress | None
     fingers: Fingers  # at small strain
-    kept: "dict[Pressed, Meshes]" = field(default_factory=dict)  # at finite strain
+    kept: dict[Pressed, Meshes] = field(default_factory=dict)  # at finite strain
 
     def __call__(self, scenes: list[Scene], fineness: float, watch: Watch | None) -> list[Answer]:
         """Return the answers on meshes of that fineness."""
         if scenes[0].solve.kinematics == "finite":
-            # Imported here: small strain, the default, need not wait for the compiled loops to be loaded.
-            from solver.response.finite_solution import answers as finite_answers
-
-            return finite_answers(scenes, self.depth, fineness, self.progress, self.kept)
+            return finite_solution.answers(scenes, self.depth, fineness, self.progress, self.kept)
         return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 
