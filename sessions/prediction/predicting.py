@@ -1,13 +1,13 @@
 """The prediction of a session: all its scenes solved together on one mesh, so that differences are accurate."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from sessions.plan.plan import SessionPlan
 from sessions.prediction.options import PredictionOptions, template, with_own_finger
 from sessions.prediction.scenes import Prepared, opposite, prepared_cases
 from sessions.prediction.solving import Progress, quick
-from sessions.prediction.stored import SessionPrediction, TrialPrediction
+from sessions.prediction.stored import ERROR_NOT_KNOWN, SessionPrediction, TrialPrediction, known_error
 from sessions.strokes import Analysis
 from solver import Finger, Prediction, Scene, SolveFailure, solve_many
 from solver.equilibrium.expected_depth import matching_depths
@@ -52,11 +52,8 @@ def predict(
     solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
     scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
     # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
-    matches = asked.kinematics == "small"
-    forces = [_force_per_mm(prepared[n]) if matches else None for n in solved]
-    wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
-    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
-    depths = [None if force is None else next(matched) for force in forces]
+    small = asked.kinematics == "small"
+    depths = _depths(scenes, [_force_per_mm(prepared[n]) if small else None for n in solved])
     ways: dict[int, Way] = {}
     found: dict[int, Prediction | SolveFailure] = {}
 
@@ -95,6 +92,13 @@ def _unseen(_number: int, _row: TrialPrediction, _way: Way | None) -> None:
     """Tell nobody."""
 
 
+def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[float | None]:
+    """Return for each scene the depth at which it bears its force [N/mm], or None where it has none."""
+    wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
+    matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
+    return [None if force is None else next(matched) for force in forces]
+
+
 def _force_per_mm(prepared: Prepared) -> float | None:
     measured = prepared.row.measured_normal
     return None if measured is None or prepared.scene is None else measured / prepared.scene.finger.width
@@ -122,21 +126,25 @@ def _filled(
     if isinstance(back, SolveFailure):
         reasons["opposite_sed"] = str(back)
     else:
-        row = replace(row, opposite_sed=back.sed_ending, opposite_error=back.error_estimate, opposite=back)
+        row = replace(
+            row, opposite_sed=back.sed_ending, opposite_error=known_error(back, back.error_estimate), opposite=back
+        )
     row = replace(row, matching_depth=depth)
     if isinstance(found, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))
         return replace(row, reasons=reasons)
+    if found.nested is None:
+        reasons["error_estimate"] = ERROR_NOT_KNOWN
     return replace(
         row,
         sed=found.sed_ending,
-        error_estimate=found.error_estimate,
+        error_estimate=known_error(found, found.error_estimate),
         normal_per_mm=found.normal_force,
         tangential_per_mm=found.tangential_force,
         normal_force=found.normal_force * scene.finger.width,
         tangential_force=found.tangential_force * scene.finger.width,
-        normal_force_error=found.normal_force_error,
-        tangential_force_error=found.tangential_force_error,
+        normal_force_error=known_error(found, found.normal_force_error),
+        tangential_force_error=known_error(found, found.tangential_force_error),
         wall_s=found.wall_s,
         prediction=found,
         reasons=reasons,

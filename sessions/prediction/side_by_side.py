@@ -20,6 +20,7 @@ from sessions.prediction import (
     traction_reached,
 )
 from sessions.prediction.sed_interval import SedInterval
+from sessions.prediction.stored import known_error
 from sessions.prediction.uncertainty import Drawn, draws_of, intervals_of
 from sessions.prediction.variants import Alternative, Variant, variants
 from sessions.strokes import Analysis
@@ -122,13 +123,13 @@ def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, 
         tau_max,
         found.indentation,
         found.sed_ending,
-        found.error_estimate,
+        known_error(found, found.error_estimate),
         found.normal_force * width,
         found.tangential_force * width,
         traction=traction_reached(found),
-        normal_force_error=found.normal_force_error,
-        tangential_force_error=found.tangential_force_error,
-        indentation_error=found.indentation_error,
+        normal_force_error=known_error(found, found.normal_force_error),
+        tangential_force_error=known_error(found, found.tangential_force_error),
+        indentation_error=known_error(found, found.indentation_error),
         doubt=doubt_of(found),
     )
 

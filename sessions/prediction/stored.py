@@ -22,6 +22,14 @@ _NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the s
 _TOLD_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
 
 
+ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
+
+
+def known_error(found: Prediction, error: float | None) -> float | None:
+    """Return a relative error of `found` [-], or None where its nested mesh has no such state to compare with."""
+    return None if found.nested is None else error
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialPrediction:
     """What the model says of one trial, or of one stroke of a recording without trials.

@@ -9,7 +9,7 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
-from solver import Finger, Friction, Loading, Scene, SceneError, solve
+from solver import Finger, Friction, Loading, Scene, SceneError, solve, solve_many
 from solver.response.fields import Sketch, most_squeezed, stills, way_until
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
@@ -224,3 +224,15 @@ def test_the_subjects_own_finger_and_angle_are_predicted_unless_another_finger_i
     assert scene.finger == replace(Finger(), tip_radius=6.5, contact_angle=40.0, width=17.0)
     other = Scene(friction=Friction(0.0), loading=Loading(1.0), finger=Finger(width=12.0))
     assert with_own_finger(PredictionOptions(scene=other), own).scene == other
+
+
+def test_where_the_nested_mesh_has_no_such_state_the_error_is_not_known_and_its_reason_says_so(tables, monkeypatch):
+    def bounded_by_nothing(scenes, *rest, **options):
+        return [replace(answer, nested=None) for answer in solve_many(scenes, *rest, **options)]
+
+    monkeypatch.setattr("sessions.prediction.predicting.solve_many", bounded_by_nothing)
+    row = predict(beginning(tables, 1), PLAN, PredictionOptions(course="steady")).trials[0]
+    assert row.sed is not None
+    errors = (row.error_estimate, row.opposite_error, row.normal_force_error, row.tangential_force_error)
+    assert errors == (None,) * 4
+    assert "not known" in row.reasons["error_estimate"]
