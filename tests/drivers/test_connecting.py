@@ -3,6 +3,7 @@
 import os
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from hostile_devices import HOSTILE, STUCK, net_ft
@@ -28,46 +29,80 @@ def connect(uri, opened):
     return ""
 
 
+def at_once(work, names):
+    """Return by its name what `work` returns for each, all run beside each other."""
+    with ThreadPoolExecutor(len(names)) as pool:
+        return dict(zip(names, pool.map(work, names), strict=True))
+
+
 def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
     assert {name.partition(",")[0] for name in HOSTILE} == {driver.name for driver in DRIVERS} - BY_LIBRARY
 
 
-@pytest.mark.parametrize("name", HOSTILE)
-def test_connecting_ends_within_5_s_in_one_sentence_whatever_arrives(name, tmp_path):
+@pytest.fixture(scope="module")
+def attempts(tmp_path_factory):
+    """Of each hostile device what connecting said and how long it took [s]; all at once, for they mostly wait."""
     threads = set(threading.enumerate())
-    device, opened = HOSTILE[name](tmp_path), []
-    try:
-        began = time.monotonic()
-        sentence = connect(device.uri, opened)
-        took = time.monotonic() - began
-    finally:
-        for transducer in opened:
-            transducer.close()
-        device.close()
+
+    def attempt(name):
+        device, opened = HOSTILE[name](tmp_path_factory.mktemp("device")), []
+        try:
+            began = time.monotonic()
+            sentence = connect(device.uri, opened)
+            took = time.monotonic() - began
+        finally:
+            for transducer in opened:
+                transducer.close()
+            device.close()
+        return device.uri, sentence, took
+
+    return at_once(attempt, HOSTILE), set(threading.enumerate()) - threads
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_connecting_ends_within_5_s_in_one_sentence_whatever_arrives(name, attempts):
+    uri, sentence, took = attempts[0][name]
     assert took < CONNECTS_WITHIN
-    assert device.uri.partition("?")[0].split("://")[0] in sentence or "http" in sentence or "tty" in sentence
+    assert uri.partition("?")[0].split("://")[0] in sentence or "http" in sentence or "tty" in sentence
     assert "\n" not in sentence
-    assert set(threading.enumerate()) <= threads
 
 
-@pytest.mark.parametrize("name", [name for name in HOSTILE if "drips" not in name and "any baud" not in name])
-def test_a_stop_ends_connecting_within_1_s_whatever_arrives(name, tmp_path):
-    device, opened, sentences = HOSTILE[name](tmp_path), [], []
-    connecting = threading.Thread(target=lambda: sentences.append(connect(device.uri, opened)))
-    try:
-        connecting.start()
-        while connecting.is_alive() and not opened:
-            time.sleep(0.01)
-        time.sleep(0.3)
-        began = time.monotonic()
-        for transducer in opened:
-            transducer.stop()
-        took = time.monotonic() - began
-        connecting.join(CONNECTS_WITHIN)
-    finally:
-        device.close()
+def test_connecting_leaves_no_thread_behind(attempts):
+    assert not attempts[1]
+
+
+PATIENT = [name for name in HOSTILE if "drips" not in name and "any baud" not in name]
+
+
+@pytest.fixture(scope="module")
+def stops(tmp_path_factory):
+    """Of each hostile device how long a stop took [s], and whether connecting ended with it; all at once."""
+
+    def stop(name):
+        device, opened = HOSTILE[name](tmp_path_factory.mktemp("device")), []
+        connecting = threading.Thread(target=lambda: connect(device.uri, opened))
+        try:
+            connecting.start()
+            while connecting.is_alive() and not opened:
+                time.sleep(0.01)
+            time.sleep(0.3)
+            began = time.monotonic()
+            for transducer in opened:
+                transducer.stop()
+            took = time.monotonic() - began
+            connecting.join(CONNECTS_WITHIN)
+        finally:
+            device.close()
+        return took, not connecting.is_alive()
+
+    return at_once(stop, PATIENT)
+
+
+@pytest.mark.parametrize("name", PATIENT)
+def test_a_stop_ends_connecting_within_1_s_whatever_arrives(name, stops):
+    took, ended = stops[name]
     assert took < STOPS_WITHIN
-    assert not connecting.is_alive()
+    assert ended
 
 
 def test_setting_a_bias_ends_within_5_s_on_a_command_port_that_drips():
