@@ -242,7 +242,7 @@ class AnalystWindow(QMainWindow):
         self.way.show_links(lineage(state))
         for column in (self.trials, self.stroke, self.model):
             column.show_state(state)
-        self._place_columns()
+        QTimer.singleShot(0, self, self._place_columns)  # once the layouts inside of the columns have followed
 
     def _named(self) -> tuple[tuple[str, QWidget], ...]:
         return (tr("Trials"), self.trials), (tr("Stroke"), self.stroke), (tr("Model"), self.model)
@@ -263,11 +263,11 @@ class AnalystWindow(QMainWindow):
     def _place_columns(self) -> None:
         least = [column.minimumSizeHint().width() + 2 * GRID for _, column in self._named()]
         narrow = self.width() < sum(width + 4 * GRID for width in least)
+        for scrolled, width in zip(self._scrolled, least, strict=True):
+            scrolled.setMinimumWidth(0 if narrow else width)
         if narrow == self._narrow:
             return
         self._narrow = narrow
-        for scrolled, width in zip(self._scrolled, least, strict=True):
-            scrolled.setMinimumWidth(0 if narrow else width)
         self._pages.setVisible(narrow)
         self._beside.setVisible(not narrow)
         for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):
