@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
@@ -110,7 +110,25 @@ def button(text: str, name: str, does: Callable[[], object], role: str = "") -> 
 
 
 class _Choice(QComboBox):
-    """A list that the wheel passes over: turned to scroll the page, it would choose another entry unseen."""
+    """A list that the wheel passes over: turned to scroll the page, it would choose another entry unseen.
+
+    On Linux Qt gives what is chosen for the name of such a list. Its own name is that of a label beside it, which
+    nobody sees: screen readers read the label, then what is chosen.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Name it to screen readers on every system."""
+        super().__init__()
+        self.setAccessibleName(name)
+        self._label = QLabel(name)
+        self._label.setBuddy(self)
+        self._label.hide()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Keep the label beside it."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.ParentChange:
+            self._label.setParent(self.parentWidget())
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
         """Leave the wheel to the page."""
@@ -118,13 +136,8 @@ class _Choice(QComboBox):
 
 
 def choice(name: str) -> QComboBox:
-    """Return a list to choose from that says `name` to screen readers, and takes the room it is given.
-
-    On Linux Qt gives what is chosen for the name of such a list, and `name` is read as its description.
-    """
-    made = _Choice()
-    made.setAccessibleName(name)
-    made.setAccessibleDescription(name)
+    """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
+    made = _Choice(name)
     made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
@@ -203,7 +216,8 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
 def field(layout: QVBoxLayout, words: str, widget: QWidget, *beside: QWidget) -> None:
     """Put words over the field that they ask for, and what stands beside it."""
     caption = label(words, "quiet", wrap=True)
-    caption.setBuddy(widget)
+    if not isinstance(widget, _Choice):  # it has a label of its own
+        caption.setBuddy(widget)
     layout.addWidget(caption)
     row = QHBoxLayout()
     row.addWidget(widget, 1)

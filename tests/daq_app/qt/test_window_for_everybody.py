@@ -321,12 +321,15 @@ def test_no_name_for_screen_readers_hides_the_value_that_a_label_shows(driver):
     assert driver.window.bench._fields["rate"].accessibleName().startswith("rate ")
 
 
-def test_every_drop_down_says_what_is_chosen_from(driver):
+def test_every_drop_down_is_read_aloud_with_one_label_and_what_is_chosen(driver):
     lists = driver.window.findChildren(QComboBox)
     assert len(lists) >= 6
     for shown in lists:
         said = QAccessible.queryAccessibleInterface(shown)
-        assert said.text(QAccessible.Text.Description) == shown.accessibleName() != ""
+        related = said.relations()
+        labels = [of.text(QAccessible.Text.Name) for of, how in related if how & QAccessible.RelationFlag.Label]
+        assert labels == [shown.accessibleName()]
+        assert labels[0].strip()
         assert said.text(QAccessible.Text.Value) == shown.currentText()
 
 
