@@ -5,7 +5,7 @@ from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
 from daq_app.analyst.frame import Finger, Frame
 from daq_app.analyst.shown import condition, sed_with_errors
 from daq_app.analyst.state import AnalystState, chosen
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
 PHASES = {
@@ -104,7 +104,7 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
     count = len(film.film.instants)
     return tr(
         "Step {at} of {count}, {time:.3f} s · {phase} · {depth:.2f} mm deep, {slid:.2f} mm slid · "
-        "SED {sed:.3f} kPa · {contact}",
+        "SED {sed:.3f} kPa{errors} · {contact}",
         at=at + 1,
         count=count,
         time=now.time,
@@ -112,6 +112,7 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
         depth=now.depth,
         slid=abs(now.travel),
         sed=1000.0 * now.sed,
+        errors=errors_words(None),  # a course is not solved again for each of its steps
         contact=_contact_words(frame),
     )
 

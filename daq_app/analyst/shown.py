@@ -5,11 +5,10 @@ from dataclasses import dataclass
 
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import errors_words, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.responses import shown_response
-from sessions.report.wording import with_error
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +79,20 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
 
 
 def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[str, str]]:
-    """Return the chosen quantity with its error from the mesh; nothing where it is the SED, which always stands."""
+    """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
     shown = shown_response(state.response)
     found = shown.of(said)
     if shown.name == SED.name or not found:
         return []
-    value, error = (shown.factor * number for number in (*found, 0.0)[:2])
-    told = with_error(value, error, shown.places) + ("" if shown.unit == "1" else f" {shown.unit}")
-    return [(tr("{response}, averaged over the ending", response=tr(shown.label)), told)]
+    value, *error = found
+    mesh = error[0] / abs(value) if error and value else None
+    told = shown.told(shown.factor * value) + errors_words(mesh)
+    name = tr(
+        "{response} {condition}, averaged over the ending",
+        response=tr(shown.label),
+        condition=condition(state.report, said),
+    )
+    return [(name, told)]
 
 
 def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
@@ -95,13 +100,8 @@ def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
     assert said.sed is not None  # a trial without an answer has a reason in its place
     facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]
     most = max(facts, key=lambda fact: max(map(float, PLAIN.findall(fact.value)), default=0.0), default=None)
-    mesh = said.error_estimate
-    return tr(
-        "{sed:.3f} kPa{mesh}; model: {effect}",
-        sed=1000.0 * said.sed,
-        mesh=tr("; mesh: no estimate") if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh),
-        effect=tr("no estimate") if most is None else f"{most.name} {most.value}",
-    )
+    effect = "" if most is None else f"{most.name} {most.value}"
+    return f"{1000.0 * said.sed:.3f} kPa{errors_words(said.error_estimate, effect)}"
 
 
 def condition(report: Report | None, said: PredictionFinding) -> str:

@@ -276,6 +276,8 @@ class AnalystWindow(QMainWindow):
             else:
                 self._row.addWidget(part, stretch)
                 part.show()
+        if narrow and self.state.compared is not None:  # what has just come stays in sight
+            self._pages.setCurrentIndex(2)
 
     def _placed(self) -> QWidget:
         foot = QHBoxLayout()

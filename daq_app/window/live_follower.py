@@ -20,7 +20,7 @@ from sessions.strokes import FrictionParameters
 from sessions.strokes.settings import RatioSettings
 from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
 from solver.arrays import Array, Indices
-from solver.prediction import ROW
+from solver.prediction import ROW, Prediction
 from solver.response.fields import fields_of
 from solver.response.stepper import LivePicture, Stepper, stepper
 
@@ -195,8 +195,15 @@ def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, s
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
     return Settled(
         asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture,
-        found.indentation, kinematics,
+        found.indentation, kinematics, effect=_greatest_effect(found),
     )  # fmt: skip
+
+
+def _greatest_effect(found: Prediction) -> str:
+    """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
+    known = {name: one["estimate"] for name, one in found.model["left_out"].items() if one["estimate"] is not None}
+    name = max(known, key=lambda one: known[one], default="")
+    return name and f"{name} {100 * known[name]:.2g} % of the SED"
 
 
 def _unsettled(

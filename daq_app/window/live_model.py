@@ -99,6 +99,7 @@ class Settled:
     depth: float | None  # [mm]
     kinematics: Kinematics
     reason: str = ""
+    effect: str = ""  # of what the model leaves out, the greatest; empty without an estimate
 
     @property
     def difference(self) -> float | None:

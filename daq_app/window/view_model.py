@@ -7,7 +7,7 @@ import numpy as np
 
 from daq_app.window.live_model import STEP, Provisional, Settled
 from daq_app.window.live_trace import Columns, LiveTrace
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import errors_words, tr, tr_noop
 
 GAP = 0.1  # predictions further apart have a gap between them [s]
 CHANNELS = ("SED", "SED instead")  # the latter at small strain, where finite strain is asked for and out of reach
@@ -37,8 +37,9 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
             tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics])), "none"
         )
     told = tr(
-        "PROVISIONAL  SED {kpa} at the measured force, {depth:.1f} mm deep · ",
+        "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
         kpa=_kpa(float(said.sed[-1])),
+        errors=errors_words(None),
         depth=said.depth,
     )
     if said.instead[-1]:
@@ -64,14 +65,13 @@ def _of_settled(settled: Settled) -> str:
         return tr(
             "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
         )
-    error = "" if settled.error is None else f" ± {100 * settled.error:.2g} %"
     by = settled.difference
     if by is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
     return tr(
-        "Full solve  SED {kpa}{error} at the measured force, {how}{shown}",
+        "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",
         kpa=_kpa(settled.sed),
-        error=error,
+        errors=errors_words(settled.error, settled.effect),
         how=how,
         shown=shown,
     )

@@ -24,7 +24,7 @@ from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.raw import RawReadings
 from daq_app.analyst.seen import finger_words
-from daq_app.analyst.shown import numbers, points
+from daq_app.analyst.shown import condition, numbers, points
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.field_bar import ALL_TRIALS, FIXED
@@ -130,11 +130,13 @@ def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_amo
     )
     row = next(at for at, line in enumerate(listed) if line.stroke is not None and line.stroke.number in pressures)
     window.take(m.Choose(row))
-    shown = f"{abs(1e3 * pressures[listed[row].stroke.number]):.4f}"
-    assert dict(numbers(window.state))["pressure, averaged over the ending"] == f"−{shown} ± 0.0002 kPa"
+    shown = f"{abs(1e3 * pressures[listed[row].stroke.number]):.3f}"
+    name = f"pressure {condition(report, listed[row].prediction)}, averaged over the ending"
+    assert dict(numbers(window.state))[name].startswith(f"−{shown} kPa ± ")
+    assert dict(numbers(window.state))[name].endswith(" % by the mesh; model: no estimate")
     responses.setCurrentIndex(0)
     responses.activated.emit(0)
-    assert "pressure, averaged over the ending" not in dict(numbers(window.state))
+    assert name not in dict(numbers(window.state))
 
 
 def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_model_was_given(window):
@@ -290,6 +292,7 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     window.take(m.Filmed(key, film()))
     player, canvas = window.model.player, window.model.finger
     assert "Step 4 of 4" in canvas.accessibleName()
+    assert "kPa; mesh: no estimate; model: no estimate" in canvas.accessibleName()
     for _ in range(3):
         QTest.keyClick(player, Qt.Key.Key_Left)
     assert "pressing down" in canvas.accessibleName()
@@ -392,10 +395,10 @@ def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_po
     QTest.mouseMove(canvas.viewport(), at)
     application.processEvents()
     words = window.model.probe.accessibleName()
-    assert words.startswith("SED 3 kPa · x 0.2")
+    assert words.startswith("SED 3 kPa; mesh: no estimate; model: no estimate · x 0.2")
     assert words.endswith("dermis")
     QTest.keyClick(window.model.player, Qt.Key.Key_Left)  # another state under the pointer at rest
-    assert window.model.probe.accessibleName().startswith("SED 2 kPa · x 0.2")
+    assert window.model.probe.accessibleName().startswith("SED 2 kPa; mesh: no estimate; model: no estimate · x 0.2")
     QTest.mouseMove(canvas.viewport(), pixel(0.9, 0.9))
     application.processEvents()
     assert window.model.probe.accessibleName().endswith("no tissue")
@@ -539,6 +542,7 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
 
 def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
     window.take(m.Filmed(chosen(window.state).key, film()))
+    application.processEvents()  # the columns have found their widths
     ranges, show = set(), window.model._moved
     window.model._moved = lambda at: (show(at), ranges.add(window.model.finger._look.range))
     window.model.write_film(tmp_path / "film.gif")
@@ -633,7 +637,10 @@ def test_the_pointer_over_one_finger_reads_both(application, window):
     QTest.mouseMove(first.viewport(), inside)
     application.processEvents()
     said = window.model.probe.accessibleName().split("  |  ")
-    assert [words.split(" · ")[0] for words in said] == ["SED 2 kPa", "SED 3 kPa"]
+    assert [words.split(" · ")[0] for words in said] == [
+        "SED 2 kPa; mesh: no estimate; model: no estimate",
+        "SED 3 kPa; mesh: no estimate; model: no estimate",
+    ]
 
 
 def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):

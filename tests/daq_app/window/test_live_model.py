@@ -127,7 +127,9 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
     words = model_words(said, settled, "").words
     assert f"{1000 * settled.sed:.2f} kPa" in words
     assert "at the measured force, small strain" in words
-    assert "at the measured force" in model_words(said, None, "").words
+    assert f"± {100 * settled.error:.2g} % by the mesh; model: " in words
+    provisional = model_words(said, None, "").words
+    assert "mesh: no estimate; model: no estimate · at the measured force" in provisional
     assert f"{1000 * settled.provisional:.2f} kPa" in words
 
 
