@@ -1,12 +1,11 @@
 """Intervals of a stroke: the same from the same seed, wide for the reasons they name, and true as often as they say."""
 
-import importlib.util
 from collections import defaultdict
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+import test_planted_truth as planted_truth
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.event_uncertainty import onset_draws
@@ -14,13 +13,6 @@ from sessions.strokes.stroke import StrokeCurve
 from simulators.bench import BenchSettings
 from simulators.stroke import Course
 from simulators.subject import SimulatedSubject
-
-PLANTED = Path(__file__).parents[1] / "end_to_end" / "test_planted_truth.py"
-_spec = importlib.util.spec_from_file_location("planted_truth", PLANTED)
-assert _spec is not None
-assert _spec.loader is not None
-planted_truth = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(planted_truth)
 
 NUMBERS = ("mu_dynamic", "mu_max", "tau_max", "speed")
 FORCES = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")

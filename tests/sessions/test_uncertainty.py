@@ -1,12 +1,11 @@
 """The uncertainty of friction carried to the SED, against solving the draws themselves."""
 
-import importlib.util
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import test_planted_truth as planted_truth
 
 from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import PredictionOptions, predict, scene_along, settled, uncertainty, with_loads
@@ -18,12 +17,6 @@ from solver.response.nearby import By
 
 # Of a levelled face and a calibration without cross-talk, so that the friction's interval is narrow.
 LEVEL = BootstrapSettings(tilt_error=(0.0, 0.0), cross_talk=0.0)
-PLANTED = Path(__file__).parents[1] / "end_to_end" / "test_planted_truth.py"
-_spec = importlib.util.spec_from_file_location("planted_truth", PLANTED)
-assert _spec is not None
-assert _spec.loader is not None
-planted_truth = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(planted_truth)
 
 
 @pytest.fixture(scope="module")
