@@ -1,5 +1,6 @@
 """Small recordings for tests, and an independent reader of the live file: sqlite3 and struct alone."""
 
+import shutil
 import sqlite3
 import struct
 from contextlib import closing
@@ -33,6 +34,20 @@ def readings(first, count, received_ns=0):
     i = np.arange(first, first + count)
     raw = np.column_stack([i * (axis + 1) for axis in range(6)]).astype(float)
     return ReadingBlock(i, i * 35 + 2**33, i % 3, i / 200.0, np.full(count, received_ns, np.int64), raw)
+
+
+def crashed(folder, commits):
+    """The files of a recording whose writer never closed: commits of 100 readings each, in the log alone."""
+    live = folder.with_name("live")
+    writer = begun(live)
+    for i in range(commits):
+        writer.readings(readings(100 * i, 100, received_ns=i))
+        writer.commit()
+    folder.mkdir()
+    for name in ("session.sqlite", "session.sqlite-wal"):
+        shutil.copy(live / name, folder)
+    writer.close()
+    return folder
 
 
 def ended(folder, *, blocks=3, **options):

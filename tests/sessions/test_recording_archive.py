@@ -11,7 +11,7 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from recordings import PLAN, begun, change, ended, readings
+from recordings import PLAN, begun, change, crashed, ended, readings
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
@@ -347,15 +347,7 @@ def test_a_manifest_that_cannot_be_read_is_named(sealed):
 
 
 def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its_loss_stays_named(tmp_path):
-    writer = begun(tmp_path / "live")
-    for i in range(3):
-        writer.readings(readings(100 * i, 100))
-        writer.commit()
-    folder = tmp_path / "crashed"
-    folder.mkdir()
-    for name in ("session.sqlite", "session.sqlite-wal"):
-        shutil.copy(tmp_path / "live" / name, folder)
-    writer.close()
+    folder = crashed(tmp_path / "crashed", commits=3)
     log = folder / "session.sqlite-wal"
     log.write_bytes(log.read_bytes()[:-100])
     seal(folder)

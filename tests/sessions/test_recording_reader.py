@@ -9,6 +9,7 @@ from dataclasses import replace
 from io import BytesIO
 
 import pytest
+import recordings
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from recordings import PLAN, begun, change, ended, readings, rows
@@ -29,17 +30,7 @@ def hashes(folder):
 
 @pytest.fixture
 def crashed(tmp_path):
-    """The files of a recording whose writer never closed: 5 commits of 100 readings, in the log alone."""
-    writer = begun(tmp_path / "live")
-    for i in range(5):
-        writer.readings(readings(100 * i, 100, received_ns=i))
-        writer.commit()
-    folder = tmp_path / "crashed"
-    folder.mkdir()
-    for name in ("session.sqlite", "session.sqlite-wal"):
-        shutil.copy(tmp_path / "live" / name, folder)
-    writer.close()
-    return folder
+    return recordings.crashed(tmp_path / "crashed", commits=5)
 
 
 UNENDED = "the session has no end: it was cut short, or is still running"
