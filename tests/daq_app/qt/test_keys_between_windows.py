@@ -106,15 +106,20 @@ def test_while_a_note_is_typed_every_key_is_the_notes_and_none_an_answer(driver)
     assert window.subject.line.answered
 
 
+def begin_scoring(driver):
+    """Begin a visit without forces, and go on to the first answer."""
+    begin(driver)
+    QTest.keyClick(driver.window, SPACE)
+    driver.phase("ready")
+    QTest.keyClick(driver.window, SPACE)
+    driver.phase("scoring")
+
+
 def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0_is_no_refusal(driver):
     window = driver.window
     window.page.protocol.setCurrentText("magnitude-estimation")
     window.page.scores_only.setChecked(True)
-    begin(driver)
-    QTest.keyClick(window, SPACE)
-    driver.phase("ready")
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    begin_scoring(driver)
     window.setFocus()
     QTest.keyClicks(window, "20")
     assert driver.session.phase == "scoring"
@@ -127,11 +132,7 @@ def test_a_number_that_reaches_the_experimenters_window_is_typed_whole_and_its_0
 def test_the_key_that_gave_the_answer_pressed_twice_does_not_go_on_with_the_course(driver, monkeypatch):
     window = driver.window
     window.page.scores_only.setChecked(True)
-    begin(driver)
-    QTest.keyClick(window, SPACE)
-    driver.phase("ready")
-    QTest.keyClick(window, SPACE)
-    driver.phase("scoring")
+    begin_scoring(driver)
     interval = QApplication.doubleClickInterval()
     QApplication.setDoubleClickInterval(60_000)  # however slow this machine is
     try:
