@@ -56,8 +56,10 @@ def errors_words(mesh: float | None, effect: str = "") -> str:
     """Return what stands behind a number of the model: its relative error from the mesh, and from what is left out.
 
     >>> errors_words(0.0036, "viscosity 4 % of the SED"), errors_words(None)
-    (' ± 0.36 % by the mesh; model: viscosity 4 % of the SED', '; mesh: no estimate; model: no estimate')
+    (' ± 0.36 % by the mesh; model: viscosity 4 % of the SED', '; mesh, model: no estimate')
     """
+    if mesh is None and not effect:
+        return tr("; mesh, model: no estimate")
     return tr(
         "{mesh}; model: {effect}",
         mesh=tr("; mesh: no estimate") if mesh is None else tr(" ± {share:.2g} % by the mesh", share=100 * mesh),

@@ -73,8 +73,8 @@ class FingerView(Painted):
         box = QRectF(4, 0, self.width() - 8, self.height() * WORDS)
         needed = painter.boundingRect(box, flags, self._words.words).height()
         painter.drawText(box, flags, self._words.words)
-        # Two lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
-        top = min(max(needed, 2.0 * painter.fontMetrics().height()), box.height()) + 4
+        # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
+        top = min(max(needed, 3.0 * painter.fontMetrics().height()), box.height()) + 4
         painter.setFont(font(SMALL, self._scale))
         room = self.height() - top
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)

@@ -292,7 +292,7 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     window.take(m.Filmed(key, film()))
     player, canvas = window.model.player, window.model.finger
     assert "Step 4 of 4" in canvas.accessibleName()
-    assert "kPa; mesh: no estimate; model: no estimate" in canvas.accessibleName()
+    assert "kPa; mesh, model: no estimate" in canvas.accessibleName()
     for _ in range(3):
         QTest.keyClick(player, Qt.Key.Key_Left)
     assert "pressing down" in canvas.accessibleName()
@@ -395,10 +395,10 @@ def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_po
     QTest.mouseMove(canvas.viewport(), at)
     application.processEvents()
     words = window.model.probe.accessibleName()
-    assert words.startswith("SED 3 kPa; mesh: no estimate; model: no estimate · x 0.2")
+    assert words.startswith("SED 3 kPa; mesh, model: no estimate · x 0.2")
     assert words.endswith("dermis")
     QTest.keyClick(window.model.player, Qt.Key.Key_Left)  # another state under the pointer at rest
-    assert window.model.probe.accessibleName().startswith("SED 2 kPa; mesh: no estimate; model: no estimate · x 0.2")
+    assert window.model.probe.accessibleName().startswith("SED 2 kPa; mesh, model: no estimate · x 0.2")
     QTest.mouseMove(canvas.viewport(), pixel(0.9, 0.9))
     application.processEvents()
     assert window.model.probe.accessibleName().endswith("no tissue")
@@ -638,8 +638,8 @@ def test_the_pointer_over_one_finger_reads_both(application, window):
     application.processEvents()
     said = window.model.probe.accessibleName().split("  |  ")
     assert [words.split(" · ")[0] for words in said] == [
-        "SED 2 kPa; mesh: no estimate; model: no estimate",
-        "SED 3 kPa; mesh: no estimate; model: no estimate",
+        "SED 2 kPa; mesh, model: no estimate",
+        "SED 3 kPa; mesh, model: no estimate",
     ]
 
 

@@ -129,7 +129,7 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
     assert "at the measured force, small strain" in words
     assert f"± {100 * settled.error:.2g} % by the mesh; model: " in words
     provisional = model_words(said, None, "").words
-    assert "mesh: no estimate; model: no estimate · at the measured force" in provisional
+    assert "mesh, model: no estimate · at the measured force" in provisional
     assert f"{1000 * settled.provisional:.2f} kPa" in words
 
 
