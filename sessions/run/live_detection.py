@@ -4,9 +4,6 @@ Readings are never altered. The rule of a take: it begins with an unloaded stret
 before any contact, and ends no earlier than `after_lift` seconds after the last lift.
 """
 
-from collections.abc import Callable
-from typing import Protocol
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,18 +12,10 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.run.steps import ContactOnset, FingerLifted, Settled, Zeroed
 from sessions.strokes.forces import normal_force
-from sessions.strokes.onset import ContactEvent, DetectorSettings, Onset, is_quiet
+from sessions.strokes.onset import ContactDetector, DetectorSettings, Onset, is_quiet
 
 Array = NDArray[np.float64]
 Noticed = Zeroed | ContactOnset | FingerLifted | Settled
-
-
-class Detector(Protocol):
-    """What tells touch and lift; `sessions.strokes.onset.ContactDetector` is one."""
-
-    def feed(self, time: Array, normal_force: Array) -> tuple[ContactEvent, ...]:
-        """Take readings, time (n,) [s] and normal force (n,) [N, not zeroed], and return what they tell."""
-        ...
 
 
 class TakeWatch:
@@ -38,10 +27,9 @@ class TakeWatch:
         frame: Frame,
         zero_duration: float,
         detection: DetectorSettings,
-        make_detector: Callable[[DetectorSettings], Detector],
         after_lift: float = 0.5,
     ) -> None:
-        """Begin to measure the zero over `zero_duration` seconds; what `make_detector` makes watches from then on.
+        """Begin to measure the zero over `zero_duration` seconds; a contact detector watches from then on.
 
         The finger stays off when nothing touched for `after_lift` seconds.
         """
@@ -49,8 +37,7 @@ class TakeWatch:
         self._frame = frame
         self._duration = zero_duration
         self._detection = detection
-        self._make_detector = make_detector
-        self._detector: Detector | None = None
+        self._detector: ContactDetector | None = None
         self._stretch = ReadingBlock.empty()
         self._after_lift = after_lift
         self._lifted: float | None = None  # when the finger left [s, device time]; None while it touches, or stayed off
@@ -66,7 +53,7 @@ class TakeWatch:
         zero = self._zero()
         if zero is None:
             return ()
-        self._detector = self._make_detector(self._detection)
+        self._detector = ContactDetector(self._detection)
         # The detector learns the noise from the same stretch; nothing touched during it.
         self._detector.feed(self._stretch.time, self._normal_force(self._stretch))
         return (zero,)
@@ -91,7 +78,7 @@ class TakeWatch:
             noise=float(normal.std(ddof=1)),
         )
 
-    def _touches(self, detector: Detector, block: ReadingBlock) -> tuple[Noticed, ...]:
+    def _touches(self, detector: ContactDetector, block: ReadingBlock) -> tuple[Noticed, ...]:
         notices: list[Noticed] = []
         for event in detector.feed(block.time, self._normal_force(block)):
             if isinstance(event, Onset):

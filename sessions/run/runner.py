@@ -12,12 +12,12 @@ from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.run.event_log import data_of, kind_of, line_of
 from sessions.run.interruptions import Interruptions, interruptions
-from sessions.run.live_detection import Detector, TakeWatch
+from sessions.run.live_detection import TakeWatch
 from sessions.run.machine import advance, start, trial_in_hand
 from sessions.run.resuming import Resumption, Seam
 from sessions.run.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
 from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell, UndoRedo
-from sessions.strokes.onset import ContactDetector, DetectorSettings
+from sessions.strokes.onset import DetectorSettings
 
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"
@@ -94,7 +94,6 @@ def run_session(
     transducer: Transducer | None,
     clock: Clock,
     *,
-    detector: Callable[[DetectorSettings], Detector] = ContactDetector,
     settings: RunnerSettings | None = None,
     resumed: Resumed | None = None,
     stop: Callable[[], Ending | None] = lambda: None,
@@ -110,7 +109,7 @@ def run_session(
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
     with interruptions() as interrupted:
-        run = _Run(plan, writer, operator, transducer, clock, detector, settings or RunnerSettings(), progress)
+        run = _Run(plan, writer, operator, transducer, clock, settings or RunnerSettings(), progress)
         if resumed is not None:
             run.go_on(resumed)
         return run.to_the_end(interrupted, stop)
@@ -125,7 +124,6 @@ class _Run:
     operator: Operator
     transducer: Transducer | None
     clock: Clock
-    detector: Callable[[DetectorSettings], Detector]
     settings: RunnerSettings
     progress: Callable[[Status], None]
 
@@ -268,7 +266,6 @@ class _Run:
             self.plan.frame,
             settings.zero_duration,
             settings.detection,
-            self.detector,
             settings.after_lift,
         )
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)

@@ -75,12 +75,11 @@ def plan(
     `forces` is False for a visit that only scores. `phases`, where given, replace the protocol's. Raises
     SettingsError where `subject` is no code or another value is out of range.
     """
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
-        raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
     own, visit_setting = body or Body(), setting or VisitSetting()
     planned_phases = protocol.phases if phases is None else phases
     try:
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
+        _check_subject(subject)
         check_seed("seed", seed)
         check_phases(protocol, planned_phases)
         check_body(own, protocol)
@@ -93,14 +92,11 @@ def plan(
     outlines = block_order(protocol, seed if place is None else place.slot)
     labels = protocol.labels if place is None else place.labels
     blocks = _Blocks(protocol, outlines, seed, row, design_seed, own, labels)
-    rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {rows}"
-    if protocol.order.blocks == "counterbalanced":
-        rule += f"; blocks counterbalanced, {outlines[0].name} first"
     plan = SessionPlan(
         protocol=protocol.name,
         subject=subject,
         seed=seed,
-        order_rule=rule,
+        order_rule=_order_rule(protocol, row, outlines[0]),
         blocks=tuple(blocks.of(planned_phases)),
         forces=forces,
         frame=visit_setting.frame or protocol.face.frame,
@@ -121,6 +117,17 @@ def plan(
     if plan.key_sha256 is not None:
         plan = blinded(plan)
     return plan if area is None else replace(plan, contact_area=area, contact_area_origin="set")
+
+
+def _order_rule(protocol: Protocol, row: int | None, first: BlockOutline) -> str:
+    """Return in words how the order of a session came about: by which row of a design, with which block `first`."""
+    rule = protocol.order.rule if row is None else f"{protocol.order.rule}, row {row} of {design_rows(protocol)}"
+    return rule if protocol.order.blocks != "counterbalanced" else f"{rule}; blocks counterbalanced, {first.name} first"
+
+
+def _check_subject(subject: str) -> None:
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
+        raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
 
 
 def design_rows(protocol: Protocol) -> int | None:
