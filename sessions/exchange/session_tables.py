@@ -29,7 +29,6 @@ from sessions.strokes.bootstrap import NUMBERS
 
 Cell = str | int | float | None
 
-_SUFFIXES = {"mm/s": "mm_per_s", "N/mm": "N_per_mm", "N mm": "Nmm", "mm2": "mm2"}
 _NESTED = ("solver", "alternatives", "interval", "opposite_interval")
 _PAIRS = {
     "steady": ("start", "stop"),
@@ -47,6 +46,15 @@ _PAIRS = {
 EACH_EVENT = "a row for each thing that happened, in order"
 
 
+def heading(name: str, unit: str) -> str:
+    """Return a column's name with its unit at the end, in letters that any program takes.
+
+    >>> heading("speed", "mm/s"), heading("torque", "N mm"), heading("mu", "")
+    ('speed_mm_per_s', 'torque_Nmm', 'mu')
+    """
+    return f"{name}_{unit.replace('/', '_per_').replace(' ', '')}" if unit else name
+
+
 @dataclass(frozen=True, slots=True)
 class Column:
     """One column; None in it is a number that honesty does not allow, or a thing that is not there."""
@@ -58,12 +66,8 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """The name with the unit at its end.
-
-        >>> Column("speed", "mm/s", "", ()).heading
-        'speed_mm_per_s'
-        """
-        return f"{self.name}_{_SUFFIXES.get(self.unit, self.unit)}" if self.unit else self.name
+        """The name with the unit at its end."""
+        return heading(self.name, self.unit)
 
     @property
     def kind(self) -> type[str] | type[float] | type[int]:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from sessions.exchange.csv_text import write_rows
+from sessions.exchange.session_tables import heading
 from sessions.prediction import QUANTITIES, SED
 from sessions.statistics.multiverse import Path
 from sessions.statistics.pooling.exclusions import decided
@@ -13,7 +14,6 @@ from sessions.statistics.rivals import Rival
 
 SIMULATED = "SIMULATED"
 TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
-_SUFFIXES = {"mm/s": "mm_per_s"}
 # What each column of the table of trials means, with its unit: all fields of a trial's row but its paths.
 _MEANING: Mapping[str, tuple[str, str]] = {
     "trial": ("", "number of the trial in its session, from 1"),
@@ -71,8 +71,7 @@ _OWN: Mapping[str, str] = {
 
 
 def _heading(name: str) -> str:
-    unit = {**_MEANING, **_RESPONSES}[name][0]
-    return f"{name}_{_SUFFIXES.get(unit, unit)}" if unit else name
+    return heading(name, {**_MEANING, **_RESPONSES}[name][0])
 
 
 def columns_csv(study: StudyFindings) -> str:
