@@ -31,6 +31,7 @@ Truth = dict[str, float]
 RATE = 200.0  # [Hz]
 ACCURACY = 0.01  # standard deviation of gains and of cross-talk [-]
 LEAN = 1.0  # standard deviation of the face's lean about each axis [degrees]
+PUSH = 0.01  # standard deviation of a press's own push sideways, by N [-]
 FINE = 20000  # instants at which the planted greatest force is sought, and the planted mean formed
 HEIGHT = BenchSettings().height
 CALIBRATION = Calibration("FT0001", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array(RATED), "the bench's own")
@@ -49,6 +50,8 @@ class Trouble:
     law: float = 0.0  # mu follows N by this power [-]
     cross_talk: float | None = None  # each force errs by exactly so much of each other, either sign; None: drawn [-]
     tilt: tuple[float, float] | None = None  # [degrees]; None: drawn
+    presses: int = 0  # before the strokes, from which the lean is told
+    level: bool = False  # mu's truth is the level that it wanders about, not its mean over this very stroke
     slips: bool = False  # T/N climbs and drops again and again while the finger slides
 
 
@@ -59,8 +62,10 @@ SETS = {
     "mains hum": Trouble(hum=0.02),
     "1/f noise": Trouble(flicker=0.01),
     "wandering mu": Trouble(wander=0.03),
+    "wandering mu, its level": Trouble(wander=0.03, level=True),
     "cross-talk 1 %": Trouble(cross_talk=0.01),
     "tilt 1 + 1 degrees": Trouble(tilt=(1.0, 1.0)),
+    "tilt 1 + 1 degrees, 3 presses": Trouble(tilt=(1.0, 1.0), presses=3),
     "stick-slip": Trouble(slips=True),
     "mu falls with N": Trouble(law=-1.0 / 3.0),
 }
@@ -83,6 +88,7 @@ class Visit:
         self._errors[3:, 3:] += np.diag(ACCURACY * draw.standard_normal(3))
         tilt = trouble.tilt or tuple((LEAN * draw.standard_normal(2)).tolist())
         self._turn = _turned(tilt)
+        self._hand = np.random.default_rng([seed, 78])
         self._phases = draw.uniform(0.0, 2.0 * np.pi, 8)
         self._slips_each = draw.uniform(5.0, 15.0)  # [Hz]
         self._drop = draw.uniform(0.1, 0.3)  # of mu in each slip [-]
@@ -91,17 +97,19 @@ class Visit:
         """Return the analysis of the ten strokes, and what was planted in each."""
         parts: list[tuple[Trial, ReadingBlock]] = []
         truths: list[Truth] = []
-        begin = 0.5
-        for number, surface in enumerate(paper_surfaces().values(), 1):
+        surfaces = paper_surfaces()
+        for number in range(self._trouble.presses):
+            surface = next(iter(surfaces.values()))
+            time = np.arange(np.ceil(2.5 * number * RATE), 2.5 * (number + 1) * RATE) / RATE
+            trial = Trial(len(surfaces) + 1 + number, "b", Stimulus("slipperiness", surface.index, "P"), 1, 1)
+            parts.append((trial, _block(time, self._felt(time, self._press(time - time[0])))))
+        begin = 2.5 * self._trouble.presses + 0.5
+        for number, surface in enumerate(surfaces.values(), 1):
             self._bench.mount(surface)
             planted = self._bench.begin_stroke(self._subject.stroke(surface), begin)
-            position = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE).astype(np.int64)
-            time = position / RATE
-            counts = np.rint(self._felt(time, planted) / np.diag(CALIBRATION.matrix))
-            healthy = np.zeros(len(time), np.int64)
-            block = ReadingBlock(position, position, healthy, time, np.rint(time * 1e9).astype(np.int64), counts)
+            time = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE) / RATE
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
-            parts.append((trial, block))
+            parts.append((trial, _block(time, self._felt(time, self._exerted(time, planted)))))
             truths.append(self._truth(planted))
             begin = planted.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
@@ -112,7 +120,7 @@ class Visit:
         steady = np.linspace(*planted.steady, FINE)
         whole = np.linspace(planted.touch, planted.end, FINE)
         tangential = np.hypot(*self._exerted(whole, planted)[:, :2].T)
-        mu = planted.mu * float(self._factor(steady, planted).mean())
+        mu = planted.mu * (1.0 if self._trouble.level else float(self._factor(steady, planted).mean()))
         return {"mu_dynamic": mu, "tau_max": float(tangential.max()) / CONTACT_AREA, "speed": planted.speed}
 
     def _factor(self, time: Array, planted: PlantedStroke) -> Array:
@@ -141,9 +149,14 @@ class Visit:
         torques = np.column_stack([-HEIGHT * more[:, 1], HEIGHT * more[:, 0], x * more[:, 1] - y * more[:, 0]])
         return plain + np.hstack([more, np.zeros((len(time), 1)), torques])
 
-    def _felt(self, time: Array, planted: PlantedStroke) -> Array:
-        """Return the wrench (n, 6) [N, N mm] that the transducer tells."""
-        true = self._exerted(time, planted)
+    def _press(self, time: Array) -> Array:
+        """Return the true wrench (n, 6) of a press of 2 N for 1.5 s, by a hand that pushes sideways a little itself."""
+        normal = 2.0 * np.clip(np.minimum(time - 0.5, 2.1 - time) / 0.1, 0.0, 1.0)
+        x, y = PUSH * self._hand.standard_normal((2, 1)) * normal
+        return np.column_stack([x, y, -normal, -HEIGHT * y, HEIGHT * x, np.zeros_like(time)])
+
+    def _felt(self, time: Array, true: Array) -> Array:
+        """Return the wrench (n, 6) [N, N mm] that the transducer tells of a true one in the face's frame."""
         turned = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
         felt = turned @ self._errors.T + self._bench.wrench(time) - self._bench.exerted(time)
         if self._trouble.hum:
@@ -151,6 +164,13 @@ class Visit:
         if self._trouble.flicker:
             felt[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
         return felt
+
+
+def _block(time: Array, wrench: Array) -> ReadingBlock:
+    """Return readings of a wrench (n, 6) [N, N mm] in counts."""
+    position = np.rint(time * RATE).astype(np.int64)
+    counts = np.rint(wrench / np.diag(CALIBRATION.matrix))
+    return ReadingBlock(position, position, np.zeros_like(position), time, np.rint(time * 1e9).astype(np.int64), counts)
 
 
 def _turned(lean: Sequence[float]) -> Array:

@@ -6,8 +6,8 @@ such a stroke has. One is preferred where it has the greatest Akaike weight, and
 Twins of the planted quantity go with it over all strokes with r of at least 0.99 in size. T is left out: with one area
 it is the bound itself.
 
-Run from the repository's root: python -m benchmarks.rival_recovery [STUDIES [SEED]]; 200 of each planted quantity by
-default. Prints a table for the documentation.
+Run from the repository's root: python -m benchmarks.rival_recovery [STUDIES [SEED [DESIGN ...]]]; 200 of each planted
+quantity by default. Prints a table for the documentation.
 """
 
 import sys
@@ -43,8 +43,9 @@ class Design:
     name: str
     people: int
     mu: tuple[float, ...]  # of each surface
-    force: tuple[float, ...]  # usual normal force on each [N]
-    speed: tuple[float, ...]  # [mm/s]
+    force: tuple[float, ...]  # usual normal force in each trial of a person, surface by surface within depths [N]
+    speed: tuple[float, ...]  # likewise [mm/s]
+    depths: tuple[float, ...] = (2.0,)  # each surface is stroked at each of them [mm]
 
 
 PAPER = Design(
@@ -62,19 +63,33 @@ WIDE = Design(
     (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2),
     (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5),
 )
+# The same surfaces at three depths: depth moves the parts of the strain by other shares than friction does.
+CROSSED = Design(
+    "24 people, 8 surfaces at 3 depths",
+    24,
+    tuple(np.linspace(0.1, 0.7, 8).round(3).tolist()),
+    tuple(np.repeat((1.6, 2.8, 4.2), 8).tolist()),
+    WIDE.speed * 2,
+    (1.25, 1.75, 2.25),
+)
+DESIGNS = (PAPER, WIDE, CROSSED)
 POOL = 60  # people whose strokes the model is asked of; each study draws its own from them
 
 
 def strokes(design: Design, draw: np.random.Generator) -> Mapping[str, Array]:
-    """Return every quantity of strokes of the pool (people, surfaces)."""
-    shape = (POOL, len(design.mu))
+    """Return every quantity of strokes of the pool (people, surfaces within depths)."""
+    shape = (POOL, len(design.mu) * len(design.depths))
     moist = PERSON * draw.standard_normal((POOL, 1)) + STROKE * draw.standard_normal(shape)
-    mu = np.array(design.mu) * np.exp(moist)
+    mu = np.tile(design.mu, len(design.depths)) * np.exp(moist)
     normal = np.array(design.force) * np.exp(PRESS * draw.standard_normal(shape))
     tau = mu * normal / AREA
     base = scene(STICKINESS[0])
     settled = replace(base.solve, course="steady")
-    scenes = [replace(base, friction=Friction(m, t), solve=settled) for m, t in zip(mu.flat, tau.flat, strict=True)]
+    pressed = [replace(base.loading, indentation=d) for d in np.tile(np.repeat(design.depths, len(design.mu)), POOL)]
+    scenes = [
+        replace(base, friction=Friction(m, t), loading=loading, solve=settled)
+        for m, t, loading in zip(mu.flat, tau.flat, pressed, strict=True)
+    ]
     responses = rough_responses(scenes)[:, :, 0].reshape(*shape, len(MODEL))
     speed = np.array(design.speed) * np.exp(STROKE * draw.standard_normal(shape))
     own = {"mu": mu, "tau_max": tau, "N": normal, "speed": speed}
@@ -91,7 +106,8 @@ def study_weights(
     felt: Array = pool[planted][np.isfinite(pool[planted])]
     level, noise = draw.standard_normal((design.people, 1)), draw.standard_normal(usable.shape)
     scores: Array = 50.0 + RISE * (values[planted] - felt.mean()) / felt.std() + LEVEL * level + NOISE * noise
-    people, surfaces = np.nonzero(usable)
+    people, trials = np.nonzero(usable)
+    surfaces = trials % len(design.mu)
     found = {
         name: crossed_deviance(list(map(str, people)), surfaces.tolist(), scores[usable].tolist(), x[usable].tolist())
         for name, x in values.items()
@@ -130,7 +146,10 @@ def main() -> None:
     head = "study | planted | twins | preferred | it or a twin | a wrong one of the model | decided | decided wrongly"
     print(f"| {head} | wrong most often |")
     print("| --- " * (head.count("|") + 2) + "|")
-    for number, design in enumerate((PAPER, WIDE)):
+    only = sys.argv[3:]
+    for number, design in enumerate(DESIGNS):
+        if only and str(number) not in only:
+            continue
         pool = strokes(design, np.random.default_rng([seed, number]))
         for planted in PLANTED:
             draw = np.random.default_rng([seed, number, PLANTED.index(planted)])

@@ -29,7 +29,7 @@ from sessions.report.contents import (
 from sessions.report.experiments import experiments, quantities, with_psychometric
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
-from sessions.statistics.multiverse import Seds
+from sessions.statistics.multiverse import Values
 from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
 from sessions.strokes import Analysis
 
@@ -62,7 +62,7 @@ class Further:
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
     firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
     response: str = SED.name  # the quantity at the ending that is held against scores
-    paths: Mapping[int, Seds] | None = None  # trial -> SED along many paths of the analysis
+    paths: Mapping[int, Values] | None = None  # trial -> SED along many paths of the analysis
 
 
 def findings(

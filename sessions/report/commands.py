@@ -9,7 +9,7 @@ from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_
 from sessions.prediction.afferent import AfferentSettings, usual_settings
 from sessions.recording.reader import Recording
 from sessions.report.contents import TextFile
-from sessions.statistics.multiverse import PATHS, Seds
+from sessions.statistics.multiverse import PATHS, Values
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.contact_area import PLANNED_AT, AreaLaw
 from sessions.toml_file import toml_text
@@ -20,7 +20,7 @@ def session_commands(
     analysis: Analysis,
     prediction: SessionPrediction | None = None,
     afferent: AfferentSettings | None = None,
-    paths: Mapping[int, Seds] | None = None,
+    paths: Mapping[int, Values] | None = None,
     scores: Sequence[str] = (),
     response: str = SED.name,
 ) -> tuple[str, ...]:
@@ -40,7 +40,7 @@ def session_commands(
         lines.append(["predict", name, *words])
     if paths is not None:
         small = sum(path.kinematics == "small" for path in PATHS)
-        finite = any(len(seds) > small for seds in paths.values())
+        finite = any(len(values) > small for values in paths.values())
         report += ["--paths", "finite"] if finite else ["--paths"]
     if response != SED.name:
         report += ["--quantity", response]

@@ -10,7 +10,7 @@ from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import BY_NAME, SED
 from sessions.recording.reader import Recording
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
-from sessions.statistics.multiverse import PathTrial, Seds, path_findings
+from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.rivals import FIELDS, GIVEN, MODEL, NAMES, RESPONSES, rivals_of_means
 from sessions.statistics.scales.constant_stimuli import comparison, function_of
 from sessions.statistics.scales.psychometric import Psychometric
@@ -68,13 +68,13 @@ def experiments(
     plan: SessionPlan,
     tables: Sequence[ScoreTable],
     numbers: Quantities,
-    paths: Mapping[int, Seds] | None = None,
+    paths: Mapping[int, Values] | None = None,
     law: AreaLaw = FIXED,
     response: str = SED.name,
 ) -> tuple[Experiment, ...]:
     """Return one experiment a block; `numbers` are the `quantities` of its surfaces.
 
-    `response` names the quantity of the model that is held against scores and rivals. `paths` holds the SED of each
+    `response` names the quantity of the model that is held against scores and rivals. `paths` holds that of each
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
     number was told.
     """
@@ -91,7 +91,7 @@ def _experiment(
     means: Sequence[MeanScore],
     tables: Sequence[ScoreTable],
     numbers: Quantities,
-    paths: Mapping[int, Seds],
+    paths: Mapping[int, Values],
     law: AreaLaw,
     response: str,
 ) -> Experiment:

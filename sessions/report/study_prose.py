@@ -65,8 +65,7 @@ def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:
     if r.people is not None:
         low, high = r.people
         interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
-    # Paths hold the SED alone.
-    otherwise = _otherwise(one if study.response == SED.name else replace(one, paths=()), other)
+    otherwise = _otherwise(one, other)
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
         f"r = {correlation(r.r)}, {interval}; {otherwise}."
@@ -90,9 +89,9 @@ def _otherwise(one: DescriptorFindings, other: str) -> str:
         return f"at {other} strain, which was not tried here, the sign may be another"
     trials = plural(tried.trials, "trial")
     if tried.within is None or tried.low is None or tried.high is None:
-        return f"at {other} strain {trials} of {len(one.points)} had an SED, too few for a correlation"
+        return f"at {other} strain {trials} of {len(one.points)} had a prediction, too few for a correlation"
     interval = f"{correlation(tried.low)} to {correlation(tried.high)}"
-    return f"at {other} strain r = {correlation(tried.within)} ({interval}) of the {trials} that have an SED there"
+    return f"at {other} strain r = {correlation(tried.within)} ({interval}) of the {trials} that have one there"
 
 
 def who(study: StudyFindings) -> list[Fact]:

@@ -15,9 +15,13 @@ from typing import Literal
 import numpy as np
 
 from sessions.prediction import (
+    QUANTITIES,
+    SED,
     Friction,
+    Nearby,
     Prediction,
     Progress,
+    Quantity,
     Scene,
     SessionPrediction,
     scenes_of,
@@ -33,8 +37,9 @@ from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
 from sessions.strokes.friction import Rule
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
 
+Pair = tuple[float, float]
 Kinematics = Literal["small", "finite"]
-Seds = tuple[float | None, ...]  # along each of `PATHS`, or only those at small strain [MPa]
+Values = tuple[float | None, ...]  # of one quantity along each of `PATHS`, or only those at small strain
 
 # Of each choice the usual one comes first.
 FILTERS: Mapping[str, float] = {"20 Hz": 20.0, "none": math.inf}
@@ -79,7 +84,7 @@ TOLD: Mapping[str, str] = {
     "window": "steady window",
     "mu": "µ of the model",
     "area": "contact area",
-    "receptor": "SED at the receptor",
+    "receptor": "response at the receptor",
     "kinematics": "strain of the model",
 }
 
@@ -101,8 +106,9 @@ def trial_paths(
     progress: Progress | None = None,
     *,
     finite: bool = False,
-) -> Mapping[int, Seds]:
-    """Return the settled SED of each trial along each of `PATHS`; None where a path gives none.
+    quantity: Quantity = SED,
+) -> Mapping[int, Values]:
+    """Return a settled quantity of each trial along each of `PATHS`; None where a path gives none.
 
     `prediction` is that of the session: what it found is where its paths begin, on its mesh. Without `finite` only
     paths at small strain, which come first. Direction and speed are those of the usual path: neither is a matter of
@@ -119,11 +125,10 @@ def trial_paths(
             kind = replace(asked, kinematics=path.kinematics)
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
-    found = _solved(
-        tuple(wanted), [row.prediction for row in prediction.trials if row.prediction is not None], progress
-    )
+    known = [row.prediction for row in prediction.trials if row.prediction is not None]
+    found = _solved(tuple(wanted), known, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
-    return {trial: tuple(_sed(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
+    return {trial: tuple(_value(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
 
 
 def _without_receptor(path: Path) -> tuple[str, ...]:
@@ -160,15 +165,15 @@ def _varied(
     return replace(analysis, friction=tuple(friction))
 
 
-def _sed(found: Mapping[Scene, tuple[float, float] | None], scene: Scene | None, path: Path) -> float | None:
-    answer = None if scene is None else found[scene]
+def _value(found: Mapping[Scene, Pair | None], scene: Scene | None, path: Path) -> float | None:
+    answer = None if scene is None else found.get(scene)
     return None if answer is None else answer[RECEPTORS.index(path.receptor)]
 
 
 def _solved(
-    scenes: Sequence[Scene], known: Sequence[Prediction], progress: Progress | None
-) -> Mapping[Scene, tuple[float, float] | None]:
-    """Return SED over the ending and at its middle [MPa] of each scene, None where it has no settled state.
+    scenes: Sequence[Scene], known: Sequence[Prediction], quantity: Quantity, progress: Progress | None
+) -> Mapping[Scene, Pair | None]:
+    """Return a quantity over the ending and at its middle of each scene, None where it has no settled state.
 
     Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
     friction, which is solved; where that fails they are solved themselves.
@@ -181,15 +186,22 @@ def _solved(
     new = [kind for kind in first if kind not in held]
     answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
     held |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
-    found: dict[Scene, tuple[float, float] | None] = {}
+    found: dict[Scene, Pair | None] = {}
     for kind, slide in zip(held, slides(list(held.values()), _part(progress, 0.5, 0.7)), strict=True):
-        if slide is not None:
-            beside = zip(alike[kind], slide.seds(alike[kind]).tolist(), strict=True)
-            found |= {scene: (ending, point) for scene, (ending, point) in beside if not np.isnan(ending)}
+        found |= _near(slide, alike[kind], quantity)
     rest = [scene for scene in scenes if scene not in found]
-    for scene, answer in zip(rest, settled(rest, _part(progress, 0.7, 1.0)), strict=True):
-        found[scene] = None if answer is None else (answer.sed_ending, answer.sed_point)
+    answers = [answer for answer in settled(rest, _part(progress, 0.7, 0.9)) if answer is not None]
+    for answer, slide in zip(answers, slides(answers, _part(progress, 0.9, 1.0)), strict=True):
+        found |= _near(slide, [answer.scene], quantity)
     return found
+
+
+def _near(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> Mapping[Scene, Pair]:
+    """Return a quantity over the ending and at its middle of those scenes that a slide leads to."""
+    if slide is None:
+        return {}
+    pairs = slide.responses(scenes)[:, QUANTITIES.index(quantity)].tolist()
+    return {scene: (ending, point) for scene, (ending, point) in zip(scenes, pairs, strict=True) if ending == ending}
 
 
 def _kind(scene: Scene) -> Scene:
@@ -207,14 +219,14 @@ def _part(progress: Progress | None, low: float, high: float) -> Progress | None
 
 @dataclass(frozen=True, slots=True)
 class PathFinding:
-    """How predicted SED and scores go together along one path. None where too few numbers are left."""
+    """How a predicted quantity and scores go together along one path. None where too few numbers are left."""
 
     path: Path
     usual: bool
-    surfaces: int  # with an SED on this path
+    surfaces: int  # with a prediction on this path
     trials: int
-    r: float | None  # Pearson's, of the mean SED of each surface against its mean score
-    within: float | None  # repeated-measures correlation of each subject's own scores and SEDs
+    r: float | None  # Pearson's, of the mean prediction of each surface against its mean score
+    within: float | None  # repeated-measures correlation of each subject's own scores and predictions
     low: float | None  # 95 % interval of `within`, for other people on the same surfaces
     high: float | None
 
@@ -227,7 +239,7 @@ class PathTrial:
     index: int
     score: float | None
     rule: str  # which mu is the usual one
-    seds: Seds
+    values: Values
 
 
 def path_findings(
@@ -241,10 +253,10 @@ def path_findings(
 
     Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
     """
-    held = [trial for trial in trials if trial.seds]
+    held = [trial for trial in trials if trial.values]
     if not held:
         return ()
-    rule, gone = held[0].rule, min(len(trial.seds) for trial in held)
+    rule, gone = held[0].rule, min(len(trial.values) for trial in held)
     return tuple(
         _finding(n, path, held, usual=path.usual(rule, kinematics, law), within=within)
         for n, path in enumerate(PATHS[:gone])
@@ -252,10 +264,10 @@ def path_findings(
 
 
 def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
-    held = [(trial, sed) for trial in trials if (sed := trial.seds[number]) is not None]
-    points = [(trial, sed, trial.score) for trial, sed in held if trial.score is not None]
-    pairs = [(trial.subject, sed, score) for trial, sed, score in points]
-    seds = surface_means([(trial.subject, trial.index, sed) for trial, sed, _ in points]) or {}
+    held = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
+    points = [(trial, value, trial.score) for trial, value in held if trial.score is not None]
+    pairs = [(trial.subject, value, score) for trial, value, score in points]
+    values = surface_means([(trial.subject, trial.index, value) for trial, value, _ in points]) or {}
     scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
     inner = repeated_correlation(*zip(*pairs, strict=True)) if within and pairs else None
     low, high = (None, None) if inner is None or inner.people is None else inner.people
@@ -264,7 +276,7 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
         usual=usual,
         surfaces=len({trial.index for trial, _ in held}),
         trials=len(held),
-        r=pearson(list(seds.values()), list(scores.values())),
+        r=pearson(list(values.values()), list(scores.values())),
         within=None if inner is None else inner.r,
         low=low,
         high=high,

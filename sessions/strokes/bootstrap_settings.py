@@ -23,6 +23,7 @@ class BootstrapSettings:
     tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is not levelled [degrees]
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
     tilt_origin: str = "assumed: too few presses tell it"
+    tilt_from_presses: bool = False  # then the lean holds the cross-talk from N into the drag, too
     confidence: float = 0.95
     fewest_blocks: int = 4  # from which a spread is estimated
     fewest_quiet: int = 10  # readings before the onset from which noise is estimated ...
@@ -58,7 +59,9 @@ class BootstrapSettings:
             return replace(bootstrap, tilt_error=(prior, prior))
         rest = (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
         origin = f"by {len(tilt.presses)} presses"
-        return replace(bootstrap, tilt=rest, tilt_error=tilt.error(settings.confidence), tilt_origin=origin)
+        return replace(
+            bootstrap, tilt=rest, tilt_error=tilt.error(settings.confidence), tilt_origin=origin, tilt_from_presses=True
+        )
 
     @property
     def kind(self) -> str:

@@ -88,8 +88,12 @@ class Finger(ABC, Generic[Placed]):
 
     def seds(self, states: Sequence[EquilibriumState]) -> Array:
         """Return the SED of the reference ending and in its middle (c, 2) [MPa] of several states."""
+        return self.ending_and_middle(states)[:, 0]
+
+    def ending_and_middle(self, states: Sequence[EquilibriumState]) -> Array:
+        """Return every quantity at the reference ending and in its middle (c, q, 2) of several states."""
         displacement = self.recovered(states, self.ending, self.point)
-        return np.stack([patch.average(displacement)[0] for patch in (self.ending, self.point)], axis=1)
+        return np.stack([patch.responses(displacement)[:, 0].T for patch in (self.ending, self.point)], axis=2)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
         """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""

@@ -157,9 +157,13 @@ class Nearby(ABC):
         """Return its derivatives, by the tangent at convergence."""
         return of_slide(self.finger, self.scene, self.here)
 
-    @abstractmethod
     def seds(self, scenes: Sequence[Scene]) -> Array:
-        """Return the SED (n, 2) [MPa] of scenes that differ from its own in friction, depth or force alone.
+        """Return the SED (n, 2) [MPa] of scenes, as `responses` does."""
+        return self.responses(scenes)[:, 0]
+
+    @abstractmethod
+    def responses(self, scenes: Sequence[Scene]) -> Array:
+        """Return every quantity (n, q, 2) of scenes that differ from its own in friction, depth or force alone.
 
         First that averaged over the ending, then that in its middle. nan where no settled slide is found near this one;
         how far there would be one is not looked for.
@@ -219,7 +223,7 @@ class _SmallNearby(Nearby):
                 if not self.reaches_out(contact):
                     held[number] = contact
         if held:
-            out[list(held)] = self.finger.seds(list(held.values()))
+            out[list(held)] = self.finger.ending_and_middle(list(held.values()))
         return out
 
 

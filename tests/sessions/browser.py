@@ -19,7 +19,12 @@ FLAGS = (
     "--disable-sync",
     "--disable-features=NetworkTimeServiceQuerying,OptimizationHints,MediaRouter",
 )
-OWN = {"update.googleapis.com", "accounts.google.com", "clients2.google.com"}  # what the browser asks for itself
+OWN = {
+    "update.googleapis.com",
+    "accounts.google.com",
+    "clients2.google.com",
+    "www.google.com",
+}  # what the browser asks for itself
 PAPER = 680  # width of A4 between the page's margins [CSS px]
 PAPER_HEIGHT = 1001  # likewise [CSS px]
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from report_session import record
 
-from sessions.prediction import PredictionOptions, predict, scenes_of, settled
+from sessions.prediction import BY_NAME, PredictionOptions, predict, scenes_of, settled
 from sessions.recording import Recording
 from sessions.statistics.multiverse import (
     PATHS,
@@ -86,6 +86,14 @@ def test_each_window_has_the_sed_of_the_mean_over_that_window(recording, analysi
     for window, answer in zip(WINDOWS, alone, strict=True):
         (n,) = [n for n, path in enumerate(SMALL) if path == replace(SMALL[0], window=window)]
         assert along[trial][n] == pytest.approx(answer.sed_ending, rel=1e-9)
+
+
+def test_paths_of_another_quantity_come_to_what_the_model_predicts_of_it(recording, predicted):
+    quantity = BY_NAME["shear_along_skin"]
+    sheared = trial_paths(recording, predicted, quantity=quantity)
+    for row in predicted.trials:
+        (usual,) = [n for n, path in enumerate(SMALL) if path.usual(row.mu_rule, "small")]
+        assert sheared[row.trial][usual] == pytest.approx(row.responses[quantity.name].value, rel=1e-9)
 
 
 def test_finite_strain_is_left_out_unless_it_is_asked_for(along):

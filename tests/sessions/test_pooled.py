@@ -253,7 +253,7 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     ]
     tried = summary(pooled(turned))[1]
     assert f"at finite strain r = −{plain.descriptors[0].repeated.r:.2f}" in tried
-    assert "of the 20 trials that have an SED there" in tried
+    assert "of the 20 trials that have one there" in tried
 
 
 def test_a_study_of_one_subject_says_why_tables_are_missing():

@@ -9,6 +9,7 @@ from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, ti
 
 from sessions.recording import Recording
 from sessions.strokes.analysis import analyse, analyse_blocks
+from sessions.strokes.systematic import SystematicDraws
 from sessions.strokes.tilt import tilt_of
 
 T = times(12.0)
@@ -112,3 +113,11 @@ def test_a_recording_without_presses_names_the_lean_it_assumes_and_is_not_flawed
     found = analyse(Recording.open(kept))
     assert [flaw.grade for flaw in found.flaws if flaw.name == "tilt_assumed"] == ["note"]
     assert "1°" in found.to_dict()["interval"]
+
+
+def test_cross_talk_that_presses_show_is_not_drawn_a_second_time():
+    """A press shows lean and cross-talk from N together: with an exact lean, nothing of the two is left in the drag."""
+    draws = SystematicDraws(4000, 3, (0.01, 0.01), (1.0, 1.0), (0.0, 0.0), from_presses=True)
+    of_normal, of_drag = draws.shares(np.array([1.0, 0.0]))
+    assert of_normal == pytest.approx(np.radians(1.0), abs=1e-12)
+    assert of_drag.std() == pytest.approx(0.01 * np.sqrt(2.0), rel=0.05)  # its own cross-talk, and the lean's

@@ -13,7 +13,7 @@ from daq_app.cli.options import add_paths, add_quantity, add_visit
 from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
-from sessions.prediction import PredictionOptions, SessionPrediction
+from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
@@ -112,5 +112,5 @@ def _further(
     if options.paths is not None and recording.plan.forces:
         finite = options.paths == "finite"
         progress = console.reporter("many paths of the analysis", until=0.9)
-        paths = trial_paths(recording, prediction, progress, finite=finite)
+        paths = trial_paths(recording, prediction, progress, finite=finite, quantity=BY_NAME[options.quantity])
     return Further(firing, afferent_facts(afferent or AfferentSettings(), reference), afferent, options.quantity, paths)

@@ -110,7 +110,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
         raise RecordingError(f"{folder} holds no session: give the folder that holds a folder for each of them")
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
-    asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options))
+    along = options.quantity if options.paths != "none" else SED.name
+    asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
     exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
     shelf = Shelf(out / "results", asked)
     done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)

@@ -12,9 +12,9 @@ from sessions.report.wording import correlation
 from sessions.statistics.multiverse import CHOICES, TOLD, PathFinding, by_choice, correlations
 
 CAPTION = (
-    "The correlation of predicted SED with scores along every path of the analysis. Above: how many paths come to "
-    "which correlation; the dashed line is the usual path, which every other number here went. Below: what each choice "
-    "does, all other choices varied: line from the least to the greatest, upright mark at the median; a filled "
+    "Correlation of the predicted response with scores along every path of the analysis. Above: how many paths come "
+    "to which correlation; the dashed line is the usual path, which every other number here went. Below: what each "
+    "choice does, all other choices varied: line from the least to the greatest, upright mark at the median; a filled "
     "diamond stands beside the usual choice. Medians that lie apart say that a choice matters."
 )
 _BINS = 24

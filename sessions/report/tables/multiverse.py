@@ -16,12 +16,13 @@ def paths_table(named: Iterable[Named]) -> Table | None:
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
     caption = (
-        "The correlation of predicted SED with scores as a distribution over paths of the analysis: every choice below "
-        "crossed with every other at small strain; finite strain, where it was tried, with the other choices as usual. "
+        "The correlation of the predicted response with scores as a distribution over paths of the analysis: every "
+        "choice below crossed with every other at small strain; finite strain, where it was tried, with the other "
+        "choices as usual. "
         "Contact is solved at every friction that was met, from the trial's own prediction on and on its mesh. All of "
         "them are reasonable and none is a sample of others: quartiles describe, and are no intervals. Different r: "
         "how many are left where those that agree within "
-        f"{SAME:g} count once. A path of which fewer than three surfaces have an SED gives no r."
+        f"{SAME:g} count once. A path of which fewer than three surfaces have a prediction gives no r."
     )
     return table("table-paths", caption, columns, groups)
 

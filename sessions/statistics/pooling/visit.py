@@ -7,7 +7,7 @@ from typing import Any, Literal
 import msgspec
 
 from sessions.plan.plan import Block
-from sessions.prediction import SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
+from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
 from sessions.prediction.model_facts import model_facts
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.uncertainty import with_intervals
@@ -17,7 +17,7 @@ from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
 from sessions.recording.unblinding import revealed
-from sessions.statistics.multiverse import Seds, trial_paths
+from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
 from sessions.strokes.contact_area import FIXED, AreaLaw
@@ -38,6 +38,7 @@ class VisitOptions:
         "none"  # many paths too, and at which strain; see `sessions.statistics.multiverse`
     )
     gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
+    quantity: str = SED.name  # that the paths hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,7 @@ class TrialRow:
     matching_depth: float | None = None  # [mm]
     flaws: tuple[str, ...] = ()
     why: str = ""
-    paths: Seds = ()  # SED along each of `sessions.statistics.multiverse.PATHS` [MPa], where they were asked for
+    paths: Values = ()  # a quantity along each of `sessions.statistics.multiverse.PATHS`, where they were asked for
 
     def response(self, quantity: str) -> float | None:
         """Return the model's quantity of that name [MPa or -]; None where it predicts nothing."""
@@ -132,9 +133,9 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
     prediction = None
     if known.plan.forces:
         prediction = with_intervals(analysis, predict(analysis, known.plan, options.prediction), both_ways=False)
-    along: Mapping[int, Seds] = {}
+    along: Mapping[int, Values] = {}
     if options.paths != "none" and prediction is not None:
-        along = trial_paths(known, prediction, finite=options.paths == "finite")
+        along = trial_paths(known, prediction, finite=options.paths == "finite", quantity=BY_NAME[options.quantity])
     records = {record.trial.number: record for record in known.trials}
     rows = tuple(
         replace(_row(block, place, records[trial.number], analysis, prediction), paths=along.get(trial.number, ()))
