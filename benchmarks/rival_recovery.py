@@ -49,7 +49,7 @@ class Design:
 
 
 PAPER = Design(
-    "10 people, the 5 sticky surfaces",
+    "10 × 5",
     10,
     tuple(one.mu for one in STICKINESS),
     tuple(1e-2 * one.printed_bound * AREA / one.mu for one in STICKINESS),
@@ -57,7 +57,7 @@ PAPER = Design(
 )
 # Forces in an order of their own, so that the bound does not follow friction.
 WIDE = Design(
-    "20 people, 12 surfaces, force apart from friction",
+    "20 × 12",
     20,
     tuple(np.linspace(0.2, 0.7, 12).round(3).tolist()),
     (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2),
@@ -65,7 +65,7 @@ WIDE = Design(
 )
 # The same surfaces at three depths: depth moves the parts of the strain by other shares than friction does.
 CROSSED = Design(
-    "24 people, 8 surfaces at 3 depths",
+    "24 × 8 × 3",
     24,
     tuple(np.linspace(0.1, 0.7, 8).round(3).tolist()),
     tuple(np.repeat((1.6, 2.8, 4.2), 8).tolist()),

@@ -214,8 +214,8 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
 class _SmallNearby(Nearby):
     finger: LinearFinger
 
-    def seds(self, scenes: Sequence[Scene]) -> Array:
-        out = np.full((len(scenes), 2), np.nan)
+    def responses(self, scenes: Sequence[Scene]) -> Array:
+        out = np.full((len(scenes), len(NAMES), 2), np.nan)
         held: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
             with suppress(ContactLost):
@@ -257,9 +257,13 @@ class _FiniteNearby(Nearby):
         start = EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0)
         return cls(scene, finger.newton.settle(start, load), finger)
 
-    def seds(self, scenes: Sequence[Scene]) -> Array:
-        found = [self._beside(scene) for scene in scenes]
-        return np.array([(np.nan, np.nan) if shape is None else tuple(self.finger.seds([shape])[0]) for shape in found])
+    def responses(self, scenes: Sequence[Scene]) -> Array:
+        out = np.full((len(scenes), len(NAMES), 2), np.nan)
+        for number, scene in enumerate(scenes):
+            there = self._beside(scene)
+            if there is not None:
+                out[number] = self.finger.ending_and_middle([there])[0]
+        return out
 
     def _beside(self, scene: Scene) -> EquilibriumState | None:
         newton, here = self.finger.newton, self.here

@@ -155,6 +155,10 @@ def _power(options: argparse.Namespace, console: Console) -> int:
         "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
         f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
     )
+    console.say(
+        "To tell which quantity scores follow, stroke the same surfaces at three depths: at one depth the "
+        "strain-energy density goes with its own parts."
+    )
     return DONE
 
 
