@@ -12,11 +12,10 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import tr
 
 GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
 AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose stroke has begun
-HIDDEN = tr_noop("Forces are not shown in this protocol.")
 
 
 class Middle(QWidget):
@@ -59,7 +58,7 @@ class Middle(QWidget):
     def show_view(self, course: CourseView | None) -> None:
         """Show the session in hand, or that there is none."""
         self.strip.setVisible(course is not None)
-        self.live.show_forces(course is None or course.forces_shown)
+        self.live.show_forces(course is None or not course.no_forces)
         if course is None:
             self._show_stroke(tr("No stroke yet."), "", "")
             self.redo.setEnabled(False)
@@ -67,8 +66,9 @@ class Middle(QWidget):
             self.leave()
             return
         self.live.map.show_direction(course.direction)
-        words = course.stroke.words if course.forces_shown else tr(HIDDEN)
-        self._show_stroke(words, course.stroke.details, GRADES.get(course.stroke.grade, ""))
+        self._show_stroke(
+            course.no_forces or course.stroke.words, course.stroke.details, GRADES.get(course.stroke.grade, "")
+        )
         self.redo.setEnabled(course.redo.enabled)
         self.redo.setText(f"{course.redo.label}  {tr(course.redo.key)}")
         self.undo.setText(f"{course.undo.label}  {tr(course.undo.key)}")

@@ -10,7 +10,7 @@ from daq_app.window.messages import Message, NewSession
 from daq_app.window.stroke_quality import Quality
 from daq_app.window.view_trials import Tile, tiles
 from daq_app.wording import tr, tr_noop
-from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
 
 WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
@@ -66,7 +66,7 @@ class CourseView:
     note: Button
     no_answer: Button
     end: Button
-    forces_shown: bool  # False where the protocol keeps them from the experimenter
+    no_forces: str  # why none are shown; empty where they are
 
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
@@ -92,8 +92,14 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
         no_answer=_no_answer_button(session),
         end=_end(over=over),
-        forces_shown="forces" in session.plan.shown.experimenter,
+        no_forces=_no_forces(session.plan),
     )
+
+
+def _no_forces(plan: SessionPlan) -> str:
+    if not plan.forces:
+        return tr("No forces are recorded: this visit is of scores only.")
+    return "" if "forces" in plan.shown.experimenter else tr("Forces are not shown in this protocol.")
 
 
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:

@@ -12,6 +12,7 @@ from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.messages import NewSession
 from daq_app.window.stroke_quality import StrokePicture
 from daq_app.window.view_trials import Inspection, Tile
 from sessions.run import steps
@@ -199,3 +200,17 @@ def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(dri
     assert not mirror.picture.isVisible()
     QTest.keyClick(window, Qt.Key.Key_V)
     assert mirror.picture.isVisible()
+
+
+def test_a_visit_of_scores_only_has_no_force_plots_that_stay_empty(driver):
+    window = driver.window
+    window.page.scores_only.setChecked(True)
+    begin(driver, "P31")
+    assert not any(plot.isVisible() for plot in window.live.plots)
+    assert not window.live.bar.values["N"].isVisible()
+    assert window.middle.stroke.text() == "No forces are recorded: this visit is of scores only."
+    window.bridge.send(steps.Abort("enough"))
+    driver.until(lambda: driver.session.sealing == "sealed", "the end")
+    window.bridge.send(NewSession())
+    driver.until(lambda: driver.session is None, "the next session")
+    assert any(plot.isVisible() for plot in window.live.plots)
