@@ -63,6 +63,18 @@ def ask(driver):
     driver.until(asked, "a question")
 
 
+BOXES = """[...document.querySelectorAll('#title, #line, #ends span, #next')].map(one => {
+  const range = document.createRange(), words = one.id == 'line' ? one : (range.selectNodeContents(one), range);
+  const box = (one.id == 'next' ? one : words).getBoundingClientRect();
+  return [box.x, box.y, box.width, box.height];
+})"""  # of what the subject sees [px]
+
+
+def meet(one, other):
+    """Say whether two boxes lie over each other."""
+    return all(one[k] < other[k] + other[k + 2] and other[k] < one[k] + one[k + 2] for k in (0, 1))
+
+
 def shown_words(window):
     return " ".join(one.text() for one in window.notice.findChildren(QLabel))
 
@@ -102,6 +114,17 @@ def test_a_subject_answers_on_the_tablet_also_while_the_network_is_away(desk):
     assert not window.subject.isVisible()
     browser.touch("line", 0.2, 0.4, 0.7)
     browser.until("!document.getElementById('next').hidden")
+    for size in ((1024, 700), (768, 1024), (512, 350)):  # the last is the first at a zoom of 200 %
+        browser.call(
+            "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=0, mobile=False
+        )
+        browser.until(f"innerWidth == {size[0]}")
+        browser.value("draw()")
+        boxes = browser.value(BOXES)
+        assert len(boxes) == 5
+        assert all(x >= 0 and x + wide <= size[0] and y >= 0 and y + high <= size[1] for x, y, wide, high in boxes)
+        assert not any(meet(one, other) for at, one in enumerate(boxes) for other in boxes[at + 1 :])
+    browser.call("Emulation.clearDeviceMetricsOverride")
     browser.click("next")
     assert answered(driver, 1) == "score 70"
     browser.until("pending.length == 0", "the acknowledgement")
