@@ -16,7 +16,8 @@ What is not named here is private and may change. What needs the compiled loops 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from solver.failures import Cancelled, ContactLost, NoSteadyState, NotConverged, SolveFailure
+from solver.failures import ContactLost, NoSteadyState, NotConverged, SolveFailure
+from solver.progress import Cancelled
 from solver.scene.scene import Scene
 from solver.scene.tables import (
     Finger,

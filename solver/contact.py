@@ -32,9 +32,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
-from solver.mesh.mesher import FingerMesh, with_middles
 
 STATE_NAMES = {OPEN: "open", STICK: "stick", SLIP: "slip", SHEAR_LIMITED: "cap"}
 
@@ -122,11 +121,6 @@ def width(arcs: Array, x: Array, force: Array, touching: NDArray[np.bool_]) -> f
     low = (x[first] + x[max(first - 1, 0)]) / 2.0
     high = (x[last] + x[min(last + 1, len(x) - 1)]) / 2.0
     return float(high - low)
-
-
-def arcs_of(geometry: FingerMesh) -> Array:
-    """Return the arc positions (k,) of the nodes that may touch [mm]."""
-    return with_middles(geometry.arcs)[np.searchsorted(geometry.whole, geometry.mesh.skin)]
 
 
 def last_edge(arcs: Array, force: Array, touching: NDArray[np.bool_]) -> float | None:

@@ -96,7 +96,3 @@ def followed_to(depth: float, travel: float, reason: object) -> NotConverged:
         f"the course was followed to {there}{slip}, and in the smallest steps no further: {reason}; ask for less "
         "friction, drag or depth."
     )
-
-
-class Cancelled(Exception):
-    """The caller asked to stop."""

@@ -12,8 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import multifrontal
 from solver._kernels.arguments import Factors, SymbolicFactorization
+from solver._kernels.compiling import bind_arguments
 from solver.arrays import Array, Indices, Narrow
 from solver.mesh.mesh import Mesh, distinct
 
@@ -229,9 +230,9 @@ class Elimination:
         values, waiting = np.empty(plan.factors), np.empty(plan.waiting)
         self.felt = self.carried[plan.size - skin :]
         self.factors = factors_of(plan, values)
-        self._eliminate = kernels.bind_arguments(kernels.eliminate, plan, values, waiting, self.stiffness)
-        self._condense = kernels.bind_arguments(kernels.condense, self.factors)
-        self._back_substitute = kernels.bind_arguments(kernels.back_substitute, self.factors)
+        self._eliminate = bind_arguments(multifrontal.eliminate, plan, values, waiting, self.stiffness)
+        self._condense = bind_arguments(multifrontal.condense, self.factors)
+        self._back_substitute = bind_arguments(multifrontal.back_substitute, self.factors)
 
     def factorise(self, tangent: Array) -> bool:
         """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""

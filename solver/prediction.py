@@ -163,6 +163,6 @@ def drag(scene: Scene, along: float) -> float:
 
     0 where nothing rubs and where a drag of none is given, that force being round-off then; never -0.
     """
-    if scene.friction.mu == 0.0 or scene.friction.cap == 0.0 or scene.tangential_force == 0.0:
+    if scene.friction.frictionless or scene.tangential_force == 0.0:
         return 0.0
     return abs(along) if scene.loading.direction == 0 else 0.0 - scene.loading.direction * along

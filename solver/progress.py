@@ -9,7 +9,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-from solver.failures import Cancelled
+
+class Cancelled(Exception):
+    """The caller asked to stop."""
+
 
 Listener = Callable[[str, float], None]  # called with what is being done, and the part of it done, 0 to 1
 Progress = Callable[[float], bool]  # called with the part done, 0 to 1; returns False to stop the work

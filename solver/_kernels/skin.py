@@ -1,16 +1,14 @@
-"""The skin that may touch: lengths and contact rows of its k nodes, and the solution of their system."""
+"""The deformed skin as a line: what each node of it stands for, how far it is squeezed, whether it crosses itself."""
 
 import numpy as np
 
-from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
-from solver.arrays import Array, Indices, Narrow
+from solver._kernels.arguments import Skin
+from solver._kernels.compiling import OPEN, compiled
+from solver.arrays import Array, Flags, Indices, Narrow
 
 # how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
-_LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
+LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
-COLUMNS = 4  # of the right-hand side
-ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
 STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
 
 
@@ -24,7 +22,7 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
     for i in range(at.shape[0]):
         if at[i] == 1:
             for n in range(3):
-                row = _LENGTHS[n]
+                row = LENGTHS[n]
                 out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
 
 
@@ -39,7 +37,7 @@ def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
         if at[i] == 1:
             for n in range(3):
                 if rubs(state, i, i - 1 + n, mu):
-                    row = _LENGTHS[n]
+                    row = LENGTHS[n]
                     out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
 
 
@@ -63,175 +61,71 @@ def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
     return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
 
 
-@compiled
-def assemble_contact_system(
-    body: CondensedArrays,
-    skin: Skin,
-    states: ContactStates,
-    load: LoadArguments,
-    position: SkinPosition,
-    system: ContactSystem,
-) -> int:
-    """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
+SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 
-    `length` is that of `bounded_length`. The columns of `right` are the step to equilibrium, and its derivatives
-    with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
-    conditions prescribe displacements; what is unknown is listed in `free` (f,).
+
+@compiled
+def pinched(
+    nodes: Array, u: Array, outline: Indices, loose: Flags, state: Narrow, first: int
+) -> tuple[float, int, float, float]:
+    """Return how far the skin is squeezed where its elements are `loose` (a,), as in `SkinCompression`.
+
+    `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order, of which
+    those from number `first` on may touch, as `state` (k,) says.
     """
-    f = prescribe(skin, states.state, position, system)
-    spot = np.empty(system.steps.shape[0], np.int64)
-    spot[:] = -1
-    for r in range(f):
-        spot[system.free[r]] = r
-    square = system.matrix[: f * f].reshape(f, f)
-    for r in range(f):
-        i: int = system.free[r] // 2
-        if states.state[i] == SLIP:
-            slide_row(r, states.sense[i], load.mu, body, system.free, square[r], system.right[r])
-            drag = states.sense[i] * load.mu
-        else:
-            free_row(r, body, system.free, square[r], system.right[r])
-            drag = 0.0
-        add_prescribed(system.free[r], drag, body.stiffness, skin.held, states.state, system.steps, system.right[r])
-        if states.state[i] == SHEAR_LIMITED:
-            add_bound(i, states.sense[i] * load.tau, load.mu, skin.middle, states.state, spot, system, square[r])
-    return f
-
-
-@compiled
-def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: ContactSystem) -> int:
-    """Fill the `steps` that states of contact prescribe, and list the `free` unknowns; return how many those are."""
-    free, steps, held = system.free, system.steps, skin.held
-    steps[:, :] = 0.0
-    f = 0
-    for i in range(state.shape[0]):
-        x, y = 2 * i, 2 * i + 1
-        if held[i] & HELD_X == 0:
-            if state[i] == STICK:
-                steps[x, 0], steps[x, 3] = position.anchor[i] - position.x[i], 1.0
-            else:
-                free[f] = x
-                f += 1
-        if held[i] & HELD_Y == 0:
-            if state[i] == OPEN:
-                free[f] = y
-                f += 1
-            else:
-                steps[y, 0], steps[y, 1] = -position.above[i], 1.0
-    return f
-
-
-@compiled
-def free_row(r: int, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
-    """Write down row r: the force on an unknown of the skin is none."""
-    row = free[r]
-    mine = body.stiffness[row]
-    for c in range(square.shape[0]):
-        square[c] = mine[free[c]]
-    right[0], right[1], right[2], right[3] = -body.force[row], 0.0, 0.0, 0.0
-
-
-@compiled
-def slide_row(r: int, sense: int, mu: float, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
-    """Write down row r: the drag on a node that slips, its sense that of friction, is mu times the push on it."""
-    row, force = free[r], body.force
-    drag = sense * mu
-    mine, other = body.stiffness[row], body.stiffness[row + 1]
-    for c in range(square.shape[0]):
-        square[c] = mine[free[c]] - drag * other[free[c]]
-    right[0], right[1], right[2], right[3] = drag * force[row + 1] - force[row], 0.0, sense * force[row + 1], 0.0
-
-
-@compiled
-def add_prescribed(
-    row: int, drag: float, stiffness: Array, held: Narrow, state: Narrow, steps: Array, right: Array
-) -> None:
-    """Take from the `right` (4,) of a row, less `drag` times the next one, what prescribed steps contribute."""
-    mine, other = stiffness[row], stiffness[min(row + 1, stiffness.shape[0] - 1)]
-    for j in range(state.shape[0]):
-        if state[j] == OPEN or held[j] & HELD_Y != 0:
+    least, place, lowest, kink = np.inf, 0, np.inf, 0.0
+    before_x, before_y = np.nan, np.nan  # tangent at the end of the element before
+    for j in range(loose.shape[0]):
+        if not loose[j]:
+            before_x, before_y = np.nan, np.nan
             continue
-        y = 2 * j + 1
-        value = mine[y] - drag * other[y]
-        right[0] -= value * steps[y, 0]
-        right[1] -= value
-        if state[j] == STICK and held[j] & HELD_X == 0:
-            value = mine[y - 1] - drag * other[y - 1]
-            right[0] -= value * steps[y - 1, 0]
-            right[3] -= value
+        a, b, c = outline[2 * j], outline[2 * j + 1], outline[2 * j + 2]
+        px, py = nodes[b, 0] - nodes[a, 0], nodes[b, 1] - nodes[a, 1]
+        qx, qy = nodes[c, 0] - nodes[b, 0], nodes[c, 1] - nodes[b, 1]
+        dx, dy = px + u[b, 0] - u[a, 0], py + u[b, 1] - u[a, 1]
+        ex, ey = qx + u[c, 0] - u[b, 0], qy + u[c, 1] - u[b, 1]
+        one = np.sqrt((dx * dx + dy * dy) / (px * px + py * py))
+        other = np.sqrt((ex * ex + ey * ey) / (qx * qx + qy * qy))
+        if min(one, other) < least:
+            least, place = min(one, other), j
+        size = np.hypot(3.0 * px - qx, 3.0 * py - qy)
+        x, y = (3.0 * dx - ex) / size, (3.0 * dy - ey) / size
+        node = 2 * j - first
+        touches = 0 <= node < state.shape[0] and state[node] != OPEN
+        if min(np.hypot(x, y), np.hypot(before_x, before_y)) < SQUEEZED and not touches:
+            kink = max(kink, np.hypot(x - before_x, y - before_y))
+        size = np.hypot(3.0 * qx - px, 3.0 * qy - py)
+        before_x, before_y = (3.0 * ex - dx) / size, (3.0 * ey - dy) / size
+        lowest = min(lowest, np.hypot(x, y), np.hypot(before_x, before_y))
+    return least, place, min(lowest, least), kink
 
 
 @compiled
-def add_bound(
-    i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
-) -> None:
-    """Add to node i's row, `square` (f,), the bound's `drag` [MPa] on the length of skin that the node stands for.
+def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
+    """Return whether the deformed line meets itself other than at the nodes that join its pieces."""
+    count = outline.shape[0]
+    x, y = np.empty(count), np.empty(count)
+    for i in range(count):
+        x[i], y[i] = nodes[outline[i], 0] + u[outline[i], 0], nodes[outline[i], 1] + u[outline[i], 1]
+    for i in range(count - 3):
+        dx, dy = x[i + 1] - x[i], y[i + 1] - y[i]
+        before = dx * (y[i + 2] - y[i]) - dy * (x[i + 2] - x[i])
+        for j in range(i + 2, count - 1):
+            side = dx * (y[j + 1] - y[i]) - dy * (x[j + 1] - x[i])
+            if before * side < 0.0:  # the ends of piece j lie on both sides of the line of piece i
+                ex, ey = x[j + 1] - x[j], y[j + 1] - y[j]
+                one = ex * (y[i] - y[j]) - ey * (x[i] - x[j])
+                other = ex * (y[i + 1] - y[j]) - ey * (x[i + 1] - x[j])
+                if one * other < 0.0 and _overlap(x, i, j) and _overlap(y, i, j):
+                    return True
+            before = side
+    return False
 
-    `spot` (2 k,) is where an unknown of the skin stands in the system, -1 where its step is prescribed.
+
+@compiled
+def _overlap(at: Array, i: int, j: int) -> bool:
+    """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
+
+    Pieces of a straight line do not; rounding alone decides on which sides of each other they lie.
     """
-    r, steps = spot[2 * i], system.steps
-    right = system.right[r]
-    right[0] += drag * system.length[i]
-    for edge in range(max(i - 1, 0), min(i + 2, state.shape[0])):
-        if middle[edge] != 1 or not rubs(state, edge, i, mu):
-            continue
-        for n in range(3):
-            x = 2 * (edge - 1 + n)
-            slope = drag * _LENGTHS[i - edge + 1, n]
-            if spot[x] >= 0:
-                square[spot[x]] -= slope
-            else:
-                right[0] += slope * steps[x, 0]
-                right[3] += slope * steps[x, 3]
-
-
-@compiled
-def solve(matrix: Array, right: Array, size: int) -> bool:
-    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
-
-    No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
-    """
-    a = matrix[: size * size].reshape(size, size)
-    over = np.empty(size)  # one over the pivots
-    least = 0.0
-    for r in range(size):
-        least = max(least, ZERO * abs(a[r, r]))
-    for r in range(size):
-        eliminate_row(r, a, right, over)
-        if abs(a[r, r]) <= least:
-            return False
-        over[r] = 1.0 / a[r, r]
-    for r in range(size - 1, -1, -1):
-        for c in range(r + 1, size):
-            for s in range(COLUMNS):
-                right[r, s] -= a[r, c] * right[c, s]
-        for s in range(COLUMNS):
-            right[r, s] *= over[r]
-    return True
-
-
-@compiled
-def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
-    """Take from row r of a system the rows before it, four at a time, whose pivots are one over `over` (r,)."""
-    row = a[r]
-    p = 0
-    while p + 4 <= r:
-        s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
-        f0 = row[p] * over[p]
-        f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
-        f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
-        f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
-        target = row[p + 4 :]
-        s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
-        for c in range(target.shape[0]):
-            target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
-        for s in range(COLUMNS):
-            right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
-        p += 4
-    while p < r:
-        factor = row[p] * over[p]
-        for c in range(p + 1, row.shape[0]):
-            row[c] -= factor * a[p, c]
-        for s in range(COLUMNS):
-            right[r, s] -= factor * right[p, s]
-        p += 1
+    return max(at[i], at[i + 1]) >= min(at[j], at[j + 1]) and max(at[j], at[j + 1]) >= min(at[i], at[i + 1])

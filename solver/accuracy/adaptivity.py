@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.accuracy.error_estimate import edge_changes, nested_numbers
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
 from solver.equilibrium.finger import FiniteFinger, forces_of, sliding_load
-from solver.equilibrium.load_path import Steps, march
+from solver.equilibrium.load_path import march
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import skin as skin_loops
+from solver._kernels.compiling import SHEAR_LIMITED
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import FrictionLaw
@@ -52,7 +53,7 @@ def audits(
     push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
     length = np.empty(len(state.state))
     x = np.ascontiguousarray(state.place(condensed)[:, 0])
-    kernels.bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
+    skin_loops.bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
     # Open skin may hang over, its length along the surface negative: no limit of it is meant.
     limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
     return {
@@ -104,7 +105,7 @@ def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displ
     At small strain a slide that wedges itself in has a state under any bound, however high.
     """
     farthest, length = float(np.abs(displacement).max()), float(np.ptp(finger.geometry.mesh.nodes, axis=0).max())
-    if farthest > length and (state.state == kernels.SHEAR_LIMITED).any():
+    if farthest > length and (state.state == SHEAR_LIMITED).any():
         raise NoSteadyState(
             f"This slide would displace skin by {farthest:.3g} mm, farther than the finger is long ({length:.3g} mm): "
             "ask for less friction or depth, or a lower tau_max."

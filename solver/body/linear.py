@@ -11,9 +11,9 @@ from typing import Literal
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver import _kernels as kernels
-from solver._kernels import HELD_X, HELD_Y, hooke
+from solver._kernels import hooke, multifrontal
 from solver._kernels.arguments import RecoveryArrays
+from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import Array, Indices, Narrow
 from solver.body.stiffness import Elastic, Probes, condensed_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
@@ -45,7 +45,7 @@ class LinearElimination:
             memory = _memory(256 * count + plan.waiting)
             outer, waiting = memory[: 256 * count].reshape(count, 16, 16), memory[256 * count :]
             self.elastic, self._recovery_matrix = condensed_elements(mesh, materials, outer)
-            regular = kernels.eliminate(outer, plan, values, waiting, self.stiffness)
+            regular = multifrontal.eliminate(outer, plan, values, waiting, self.stiffness)
         self._factors = factors_of(plan, values)
         if not regular or not hooke.definite(self._factors):
             raise LinAlgError("the stiffness inside the body is not positive definite")
@@ -62,7 +62,7 @@ class LinearElimination:
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
         np.add.at(force, plan.unknown[free], passed[free])
-        kernels.condense(force, self._factors)
+        multifrontal.condense(force, self._factors)
         return force, own
 
     def skin_load(self, carried: Carried) -> Array:

@@ -23,8 +23,8 @@ from solver.arrays import Array
 from solver.constitutive.hyperelastic import Law, stress, tangent
 from solver.contact import SkinCompression
 from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
-from solver.failures import Cancelled, NotConverged
-from solver.progress import report_progress
+from solver.failures import NotConverged
+from solver.progress import Cancelled, report_progress
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 

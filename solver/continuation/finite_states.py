@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import skin as skin_loops
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import Law
 from solver.contact import SkinCompression
@@ -279,12 +279,12 @@ class _OwnBody:
     def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         mesh, every = self.body.mesh, np.ones(len(shape.state) // 2, bool)
-        return SkinCompression(*kernels.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
+        return SkinCompression(*skin_loops.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
 
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         mesh = self.body.mesh
-        return kernels.crosses(mesh.nodes, shape.u, mesh.skin)
+        return skin_loops.crosses(mesh.nodes, shape.u, mesh.skin)
 
     def spoilt(self, shape: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""

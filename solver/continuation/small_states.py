@@ -14,7 +14,7 @@ from math import log2, sqrt
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import STICK
+from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.equilibrium.expected_depth import DEEPEST, within_reach

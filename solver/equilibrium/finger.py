@@ -11,16 +11,16 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver import _kernels as kernels
+from solver._kernels import skin as skin_loops
 from solver.arrays import Array, Indices
 from solver.body.condensed import Body
-from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
-from solver.body.receptor import Endings, LinearPatches, Patches, endings, middle
+from solver.body.receptor import Endings, FinitePatches, LinearPatches, Patches, endings, middle
 from solver.body.stiffness import Centred
 from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
 from solver.constitutive.linear import Moduli, Prony
-from solver.contact import SkinCompression, arcs_of, width
+from solver.contact import SkinCompression, width
 from solver.equilibrium.mesh_transfer import MeshTransfer, Places
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.failures import MIXED, NotConverged
@@ -131,7 +131,7 @@ class Finger(ABC, Generic[Placed]):
     @cached_property
     def arcs(self) -> Array:
         """Arc positions (k,) of the nodes that may touch [mm]."""
-        return arcs_of(self.geometry)
+        return self.geometry.skin_arcs
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,7 +248,7 @@ class FiniteFinger(Finger[FinitePatches]):
         """Return how far the skin is squeezed, and whether it has a crease."""
         geometry, first = self.geometry, self._first
         return SkinCompression(
-            *kernels.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first)
+            *skin_loops.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first)
         )
 
     @cached_property
@@ -258,7 +258,7 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return kernels.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
+        return skin_loops.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
 
 def _not_meshed(scene: Scene, why: Exception) -> SceneError:

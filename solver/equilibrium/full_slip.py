@@ -7,7 +7,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels import OPEN, SHEAR_LIMITED, SLIP
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.load_stepping import StepControl, advance
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
 from solver.failures import ContactLost, NotConverged

@@ -12,13 +12,13 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver._kernels import STICK
+from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.validation import check_loads
 from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
-from solver.failures import Cancelled, ContactLost, NotConverged, followed_to
-from solver.progress import report_progress
+from solver.failures import ContactLost, NotConverged, followed_to
+from solver.progress import Cancelled, report_progress
 from solver.tolerances import UNMET
 
 

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import skin as skin_loops
+from solver._kernels.compiling import SLIP, STICK
 from solver.arrays import Array, Flags, Indices
 from solver.body.finite import VALUES, FiniteBody
-from solver.contact import arcs_of
 from solver.element import Q2P1
 from solver.equilibrium.newton import EquilibriumState
 from solver.mesh.mesher import FingerMesh, with_middles
@@ -33,9 +33,9 @@ class Places:
     def of(finger: FingerMesh, body: FiniteBody) -> "Places":
         """Return the places of a mesh."""
         arcs, heights = with_middles(finger.arcs), _heights(finger)
-        skin = arcs_of(finger)
+        skin = finger.skin_arcs
         lengths = np.empty(len(skin))
-        kernels.tributary(skin, body.middle, lengths)
+        skin_loops.tributary(skin, body.middle, lengths)
         points = VALUES @ finger.mesh.nodes[finger.mesh.elements]
         return Places(body, arcs, heights, _inner(arcs[::2]), _inner(heights[::2]), points, skin, lengths)
 
@@ -74,7 +74,7 @@ class MeshTransfer:
     def touched(self, shape: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
         """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
         state, sense = shape.state[self.nearest], shape.sense[self.nearest]
-        state[state == kernels.STICK] = kernels.SLIP
+        state[state == STICK] = SLIP
         return EquilibriumState(u, pressure, state, sense, self.forces @ shape.reaction, shape.load, shape.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import _kernels as kernels
-from solver._kernels import OPEN, SLIP, STICK, bind_arguments
+from solver._kernels import active_set
 from solver._kernels.active_set import DEPTH_GIVEN, DRAG_GIVEN, PUSH_GIVEN, SINGULAR, UNSETTLED
 from solver._kernels.arguments import (
     CondensedArrays,
@@ -24,6 +23,7 @@ from solver._kernels.arguments import (
     Skin,
     SkinPosition,
 )
+from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
 from solver.arrays import Array
 from solver.body.condensed import CondensedBody
 from solver.body.validation import finite
@@ -179,8 +179,8 @@ class Newton:
         self.skin_x = condensed.place(self._rest)[:, 0].copy()
         zero = np.zeros(skin, np.int32)
         self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
-        self._active_set = bind_arguments(kernels.solve_active_set, self.system)
-        self._meet = bind_arguments(kernels.meet, self.skin, self.system.length)
+        self._active_set = bind_arguments(active_set.solve_active_set, self.system)
+        self._meet = bind_arguments(active_set.meet, self.skin, self.system.length)
 
     def linearise(
         self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, given: Given | None = None

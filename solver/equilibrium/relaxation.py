@@ -20,11 +20,11 @@ from typing import Protocol
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import overstress as overstress_loops
 from solver.arrays import Array, Indices
-from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
+from solver.body.finite import CondensedFinite, FiniteBody
 from solver.body.linear import CondensedLinear, LinearBody
-from solver.body.receptor import Endings, patch_means
+from solver.body.receptor import Endings, FinitePatches, patch_means
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
 from solver.constitutive import overstress
@@ -212,7 +212,7 @@ class CondensedRelaxing(CondensedFinite):
         return least
 
     def _add(self, u: Array, *, anew: bool) -> None:
-        kernels.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
+        overstress_loops.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
 
     def excess(self, u: Array) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""

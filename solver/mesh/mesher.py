@@ -159,6 +159,11 @@ class FingerMesh:
     whole: Indices  # (2 a + 1,) nodes of all the skin, those that may touch and those that may not
     loose: NDArray[np.bool_]  # (a,) elements along the skin that are not near where it is held
 
+    @property
+    def skin_arcs(self) -> Array:
+        """Arc positions (k,) of the nodes that may touch [mm]."""
+        return with_middles(self.arcs)[np.searchsorted(self.whole, self.mesh.skin)]
+
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
     """Return the mesh of `finger`, its bone left out and its bone's surface held, or the core of a meshed bone.

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver import _kernels as kernels
+from solver._kernels import skin as skin_loops
 from solver.accuracy.audits import rounding
-from solver.accuracy.error_estimate import errors, responses, row_errors
+from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
 from solver.equilibrium.finger import Finger
-from solver.equilibrium.load_path import Instant, Steps
+from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.scene.scene import Scene
@@ -88,7 +88,7 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     """Return the skin that may touch in a state of contact."""
     condensed, touching = finger.newton.condensed, state.touching
     place, length = state.place(condensed), np.empty(len(state.state))
-    kernels.tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
+    skin_loops.tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
     length = np.where(touching, length + condensed.fixed_length, 1.0)
     return Skin(
         x=place[:, 0],

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.finite import FiniteBody, FinitePatches
-from solver.body.receptor import Endings
+from solver.body.finite import FiniteBody
+from solver.body.receptor import Endings, FinitePatches
 from solver.body.stiffness import Elastic, Probes, local_coordinates
 from solver.element import Q2P1
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli

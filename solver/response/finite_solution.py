@@ -12,16 +12,17 @@ import numpy as np
 
 from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine, steps_asked
 from solver.accuracy.audits import audits, course_audits, forces_missed, refuse_unsound, unbalanced
+from solver.accuracy.error_estimate import times_on_way
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import course
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.load_path import RelaxingWay, Way, march, times_on_way
+from solver.equilibrium.load_path import RelaxingWay, Way, march
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
-from solver.failures import Cancelled, NotConverged, SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.prediction import Prediction
-from solver.progress import Progress, report_progress
+from solver.progress import Cancelled, Progress, report_progress
 from solver.response.answer import Solved, history, prediction
 from solver.scene.scene import Scene
 

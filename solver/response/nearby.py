@@ -14,9 +14,10 @@ from typing import Any, NamedTuple, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from solver import _kernels as kernels
-from solver._kernels import SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import contact_system
+from solver._kernels import skin as skin_loops
 from solver._kernels.arguments import ContactStates, SkinPosition
+from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
@@ -93,8 +94,8 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
     system = newton.system
-    kernels.bounded_length(x, newton.skin, state.state, load.mu, system.length)
-    count = kernels.assemble_contact_system(
+    skin_loops.bounded_length(x, newton.skin, state.state, load.mu, system.length)
+    count = contact_system.assemble_contact_system(
         newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_arguments(load),
         position, system,
     )  # fmt: skip
@@ -249,7 +250,7 @@ class _FiniteNearby(Nearby):
         finger, scene, skin = FiniteFinger.on(found.scene, found.geometry), found.scene, found.skin
         body, sense = finger.body, -scene.loading.direction
         length = np.empty(len(skin.x))
-        kernels.tributary(skin.x, body.middle, length)
+        skin_loops.tributary(skin.x, body.middle, length)
         load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
         state = states(skin).astype(np.int32)
         reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]

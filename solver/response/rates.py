@@ -1,7 +1,7 @@
 """How fast the quantities at the ending change in the parts of a course: press, break-away and slide; with errors.
 
 For its errors the course is marched again on the nested mesh, and on the answer's own in parts of its load steps
-(`solver.accuracy.error_estimate`, `solver.equilibrium.load_path`). What edges of contact add is left out where tissues
+(`solver.accuracy.error_estimate`). What edges of contact add is left out where tissues
 relax, since what is left of their past holds with no edge moved.
 """
 
@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, edge_changes
 from solver.arrays import Array
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_path import PARTS, RelaxingWay, march
+from solver.equilibrium.load_path import RelaxingWay, march
 from solver.equilibrium.newton import EquilibriumState, Given
 from solver.failures import SolveFailure
 from solver.mesh.mesher import finger_mesh

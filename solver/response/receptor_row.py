@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, end, solution_on
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, edge_changes
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, Steps, edge_changes
 from solver.arrays import Array
-from solver.body.finite import FiniteBody, FinitePatches
-from solver.body.receptor import LinearPatches, Patches, endings
+from solver.body.finite import FiniteBody
+from solver.body.receptor import FinitePatches, LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
 from solver.continuation import small_states
 from solver.continuation.existence import sound
@@ -20,7 +20,6 @@ from solver.continuation.finite_states import depends_on_way, roughly
 from solver.continuation.small_states import WIDE, direct
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
-from solver.equilibrium.load_path import PARTS, Steps
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure

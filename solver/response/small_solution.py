@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver._kernels import STICK
+from solver._kernels.compiling import STICK
 from solver.accuracy.audits import (
     audits,
     course_audits,
@@ -21,7 +21,7 @@ from solver.accuracy.audits import (
     refuse_unsound,
     unbalanced,
 )
-from solver.accuracy.error_estimate import edge_changes, nested_numbers
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, times_on_way
 from solver.arrays import Array
 from solver.continuation.small_states import (
     WIDE,
@@ -35,7 +35,7 @@ from solver.continuation.small_states import (
     refined,
 )
 from solver.equilibrium.finger import LinearFinger, forces_of
-from solver.equilibrium.load_path import Instant, Steps, times_on_way
+from solver.equilibrium.load_path import Instant
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing

@@ -211,6 +211,11 @@ class Friction:
         """The traction bound [MPa], infinite where there is none."""
         return math.inf if self.tau_max is None else self.tau_max
 
+    @property
+    def frictionless(self) -> bool:
+        """Whether no tangential force is possible."""
+        return self.mu == 0.0 or self.cap == 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class Loading:

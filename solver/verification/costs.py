@@ -28,8 +28,9 @@ PARTS = {
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "accuracy.adaptivity": "iteration",
     "_kernels.elements": "assembly", "_kernels.elements.energies": "receptor", "_kernels.hooke": "assembly",
-    "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation", "_kernels.iterating": "iteration",
-    "_kernels.active_set": "contact", "_kernels.skin": "contact", "_kernels.outline": "proof of existence",
+    "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
+    "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "contact",
+    "_kernels.skin.pinched": "proof of existence", "_kernels.skin.crosses": "proof of existence",
 }  # fmt: skip
 WHOLE = {"on_nested": "error estimate", "with_held": "evidence"}  # all that these do, on whatever mesh
 OTHER = "the rest"

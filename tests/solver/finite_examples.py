@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
-from solver.body.finite import FiniteBody, FinitePatches
-from solver.body.receptor import endings
+from solver.body.finite import FiniteBody
+from solver.body.receptor import FinitePatches, endings
 from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver._kernels import SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
 from solver.constitutive.linear import Hooke

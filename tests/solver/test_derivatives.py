@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve
-from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.body.finite import FiniteBody, FinitePatches
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
-from solver.body.receptor import Endings
+from solver.body.receptor import Endings, FinitePatches
 from solver.body.stiffness import Elastic, Probes
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from solver import _kernels as kernels
+from solver._kernels import active_set
 from solver._kernels.arguments import ContactStates, LoadArguments
 from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
@@ -235,7 +235,7 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         expected = oracle.restated(state, sense, reaction, above, slip, length, law, direction)
         found, turned = state.copy(), sense.copy()
         states, load = ContactStates(found, turned, reaction), LoadArguments(0.0, law.mu, law.tau_max, direction)
-        changed = kernels.update_contact_states(states, above, slip, length, load)
+        changed = active_set.update_contact_states(states, above, slip, length, load)
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import _kernels as kernels
-from solver._kernels import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels import contact_system
+from solver._kernels import elements as element_loops
+from solver._kernels import skin as skin_loops
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
@@ -28,7 +30,7 @@ def distorted(law, seed=1):
 
 def assembled(body, u, pressure):
     condensed = CondensedFinite(body)
-    least = kernels.assemble(u, pressure, body.elements, condensed.system)
+    least = element_loops.assemble(u, pressure, body.elements, condensed.system)
     return condensed, least
 
 
@@ -53,7 +55,7 @@ def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(
     condensed, _ = assembled(body, u, newton_pressure(body, u))
     _, tangent = oracle.forces_and_tangents(body, u, newton_pressure(body, u))
     other = distorted(law, seed=5)[1]
-    least = kernels.forces(other, body.elements, condensed.system)
+    least = element_loops.forces(other, body.elements, condensed.system)
     force, _ = oracle.forces_and_tangents(body, other, newton_pressure(body, other))
     centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
     expected, free = np.zeros(body.size), body.unknown.reshape(-1, 16) >= 0
@@ -124,15 +126,15 @@ def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
     for size in range(1, 12):
         matrix, right = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
         solution = right.copy()
-        assert kernels.solve(np.r_[matrix.ravel(), 7.0], solution, size)
+        assert contact_system.solve(np.r_[matrix.ravel(), 7.0], solution, size)
         np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
-    assert not kernels.solve(np.zeros(4), np.ones((2, 4)), 2)
+    assert not contact_system.solve(np.zeros(4), np.ones((2, 4)), 2)
 
 
 def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
     x = np.cumsum(np.random.default_rng(0).uniform(0.1, 0.3, 9))
     length = np.empty(9)
-    kernels.tributary(x, (np.arange(9) % 2).astype(np.int32), length)
+    skin_loops.tributary(x, (np.arange(9) % 2).astype(np.int32), length)
     np.testing.assert_allclose(length, oracle.tributary(x), rtol=1e-13)
     assert length.sum() == pytest.approx(x[-1] - x[0])
 
@@ -212,11 +214,11 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         before, after = nodes[outline], (nodes + u)[outline]
         first, state = 5, touching[5:18].astype(np.int32)
         touching[:5] = touching[18:] = False  # skin that may not touch
-        assert kernels.pinched(nodes, u, outline, loose, state, first) == pytest.approx(
+        assert skin_loops.pinched(nodes, u, outline, loose, state, first) == pytest.approx(
             pinched(before, after, loose, touching), rel=1e-12
         )
-        assert kernels.crosses(nodes, u, outline) == crosses_itself(after)
-        seen.add(kernels.crosses(nodes, u, outline))
+        assert skin_loops.crosses(nodes, u, outline) == crosses_itself(after)
+        seen.add(skin_loops.crosses(nodes, u, outline))
     assert seen == {True, False}
 
 
@@ -229,7 +231,7 @@ def test_a_straight_line_does_not_cross_itself_whatever_its_rounding(angle, piec
     nodes = away + np.stack([way * np.cos(angle), way * np.sin(angle)], axis=1)
     u = noise * np.random.default_rng(len(pieces)).normal(size=nodes.shape)
     assert not crosses_itself(nodes + u)
-    assert not kernels.crosses(nodes, u, np.arange(len(nodes)))
+    assert not skin_loops.crosses(nodes, u, np.arange(len(nodes)))
 
 
 @pytest.mark.slow
@@ -245,13 +247,13 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
     )
     before = (
         "import numpy as np\n"
-        "from solver import _kernels as kernels\n"
+        "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
         "from solver._kernels.arguments import ContactStates, LoadArguments\n"
         "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
-        "kernels.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
-        "kernels.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
+        "skin_loops.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
+        "contact_system.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
         "states = ContactStates(states, states.copy(), np.zeros((3, 2)))\n"
-        "kernels.update_contact_states(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1))\n"
+        "active_set.update_contact_states(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1))\n"
     )
     first, then = (
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout

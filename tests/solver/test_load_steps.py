@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve
+from solver.accuracy.error_estimate import PARTS, Steps
 from solver.continuation.small_states import end
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_path import PARTS, Steps
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
 from solver.quantities import NAMES

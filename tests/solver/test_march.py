@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver._kernels import SLIP, STICK
+from solver._kernels.compiling import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march, press_and_slide

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.error_estimate import estimated
+from solver.accuracy.error_estimate import PARTS, estimated
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Elastic
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled, slide_under
-from solver.equilibrium.load_path import PARTS
 from solver.equilibrium.load_stepping import march
 from solver.equilibrium.newton import Given, LoadState, Newton
 from solver.mesh.mesh import HalvedMesh, block, quality

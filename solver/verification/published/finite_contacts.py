@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from solver._kernels import STICK
+from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver._kernels.outline import SQUEEZED
+from solver._kernels.skin import SQUEEZED
 from solver.arrays import Array, Flags
 from solver.contact import SkinCompression
 

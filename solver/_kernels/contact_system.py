@@ -1,0 +1,268 @@
+"""The linear system of contact on the skin: for its steps, or for its forces where the compliance is known."""
+
+import numpy as np
+
+from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.skin import LENGTHS, rubs
+from solver.arrays import Array, Indices, Narrow
+
+COLUMNS = 4  # of the right-hand side
+ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
+
+
+@compiled
+def assemble_contact_system(
+    body: CondensedArrays,
+    skin: Skin,
+    states: ContactStates,
+    load: LoadArguments,
+    position: SkinPosition,
+    system: ContactSystem,
+) -> int:
+    """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
+
+    `length` is that of `bounded_length`. The columns of `right` are the step to equilibrium, and its derivatives
+    with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
+    conditions prescribe displacements; what is unknown is listed in `free` (f,).
+    """
+    f = prescribe(skin, states.state, position, system)
+    spot = np.empty(system.steps.shape[0], np.int64)
+    spot[:] = -1
+    for r in range(f):
+        spot[system.free[r]] = r
+    square = system.matrix[: f * f].reshape(f, f)
+    for r in range(f):
+        i: int = system.free[r] // 2
+        if states.state[i] == SLIP:
+            slide_row(r, states.sense[i], load.mu, body, system.free, square[r], system.right[r])
+            drag = states.sense[i] * load.mu
+        else:
+            free_row(r, body, system.free, square[r], system.right[r])
+            drag = 0.0
+        add_prescribed(system.free[r], drag, body.stiffness, skin.held, states.state, system.steps, system.right[r])
+        if states.state[i] == SHEAR_LIMITED:
+            add_bound(i, states.sense[i] * load.tau, load.mu, skin.middle, states.state, spot, system, square[r])
+    return f
+
+
+@compiled
+def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: ContactSystem) -> int:
+    """Fill the `steps` that states of contact prescribe, and list the `free` unknowns; return how many those are."""
+    free, steps, held = system.free, system.steps, skin.held
+    steps[:, :] = 0.0
+    f = 0
+    for i in range(state.shape[0]):
+        x, y = 2 * i, 2 * i + 1
+        if held[i] & HELD_X == 0:
+            if state[i] == STICK:
+                steps[x, 0], steps[x, 3] = position.anchor[i] - position.x[i], 1.0
+            else:
+                free[f] = x
+                f += 1
+        if held[i] & HELD_Y == 0:
+            if state[i] == OPEN:
+                free[f] = y
+                f += 1
+            else:
+                steps[y, 0], steps[y, 1] = -position.above[i], 1.0
+    return f
+
+
+@compiled
+def free_row(r: int, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
+    """Write down row r: the force on an unknown of the skin is none."""
+    row = free[r]
+    mine = body.stiffness[row]
+    for c in range(square.shape[0]):
+        square[c] = mine[free[c]]
+    right[0], right[1], right[2], right[3] = -body.force[row], 0.0, 0.0, 0.0
+
+
+@compiled
+def slide_row(r: int, sense: int, mu: float, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
+    """Write down row r: the drag on a node that slips, its sense that of friction, is mu times the push on it."""
+    row, force = free[r], body.force
+    drag = sense * mu
+    mine, other = body.stiffness[row], body.stiffness[row + 1]
+    for c in range(square.shape[0]):
+        square[c] = mine[free[c]] - drag * other[free[c]]
+    right[0], right[1], right[2], right[3] = drag * force[row + 1] - force[row], 0.0, sense * force[row + 1], 0.0
+
+
+@compiled
+def add_prescribed(
+    row: int, drag: float, stiffness: Array, held: Narrow, state: Narrow, steps: Array, right: Array
+) -> None:
+    """Take from the `right` (4,) of a row, less `drag` times the next one, what prescribed steps contribute."""
+    mine, other = stiffness[row], stiffness[min(row + 1, stiffness.shape[0] - 1)]
+    for j in range(state.shape[0]):
+        if state[j] == OPEN or held[j] & HELD_Y != 0:
+            continue
+        y = 2 * j + 1
+        value = mine[y] - drag * other[y]
+        right[0] -= value * steps[y, 0]
+        right[1] -= value
+        if state[j] == STICK and held[j] & HELD_X == 0:
+            value = mine[y - 1] - drag * other[y - 1]
+            right[0] -= value * steps[y - 1, 0]
+            right[3] -= value
+
+
+@compiled
+def add_bound(
+    i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
+) -> None:
+    """Add to node i's row, `square` (f,), the bound's `drag` [MPa] on the length of skin that the node stands for.
+
+    `spot` (2 k,) is where an unknown of the skin stands in the system, -1 where its step is prescribed.
+    """
+    r, steps = spot[2 * i], system.steps
+    right = system.right[r]
+    right[0] += drag * system.length[i]
+    for edge in range(max(i - 1, 0), min(i + 2, state.shape[0])):
+        if middle[edge] != 1 or not rubs(state, edge, i, mu):
+            continue
+        for n in range(3):
+            x = 2 * (edge - 1 + n)
+            slope = drag * LENGTHS[i - edge + 1, n]
+            if spot[x] >= 0:
+                square[spot[x]] -= slope
+            else:
+                right[0] += slope * steps[x, 0]
+                right[3] += slope * steps[x, 3]
+
+
+@compiled
+def solve(matrix: Array, right: Array, size: int) -> bool:
+    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
+
+    No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
+    """
+    a = matrix[: size * size].reshape(size, size)
+    over = np.empty(size)  # one over the pivots
+    least = 0.0
+    for r in range(size):
+        least = max(least, ZERO * abs(a[r, r]))
+    for r in range(size):
+        eliminate_row(r, a, right, over)
+        if abs(a[r, r]) <= least:
+            return False
+        over[r] = 1.0 / a[r, r]
+    for r in range(size - 1, -1, -1):
+        for c in range(r + 1, size):
+            for s in range(COLUMNS):
+                right[r, s] -= a[r, c] * right[c, s]
+        for s in range(COLUMNS):
+            right[r, s] *= over[r]
+    return True
+
+
+@compiled
+def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
+    """Take from row r of a system the rows before it, four at a time, whose pivots are one over `over` (r,)."""
+    row = a[r]
+    p = 0
+    while p + 4 <= r:
+        s0, s1, s2, s3 = a[p], a[p + 1], a[p + 2], a[p + 3]
+        f0 = row[p] * over[p]
+        f1 = (row[p + 1] - f0 * s0[p + 1]) * over[p + 1]
+        f2 = (row[p + 2] - f0 * s0[p + 2] - f1 * s1[p + 2]) * over[p + 2]
+        f3 = (row[p + 3] - f0 * s0[p + 3] - f1 * s1[p + 3] - f2 * s2[p + 3]) * over[p + 3]
+        target = row[p + 4 :]
+        s0, s1, s2, s3 = s0[p + 4 :], s1[p + 4 :], s2[p + 4 :], s3[p + 4 :]
+        for c in range(target.shape[0]):
+            target[c] -= f0 * s0[c] + f1 * s1[c] + f2 * s2[c] + f3 * s3[c]
+        for s in range(COLUMNS):
+            right[r, s] -= f0 * right[p, s] + f1 * right[p + 1, s] + f2 * right[p + 2, s] + f3 * right[p + 3, s]
+        p += 4
+    while p < r:
+        factor = row[p] * over[p]
+        for c in range(p + 1, row.shape[0]):
+            row[c] -= factor * a[p, c]
+        for s in range(COLUMNS):
+            right[r, s] -= factor * right[p, s]
+        p += 1
+
+
+@compiled
+def assemble_force_system(
+    body: CondensedArrays,
+    skin: Skin,
+    states: ContactStates,
+    load: LoadArguments,
+    position: SkinPosition,
+    untouched: Array,
+    system: ContactSystem,
+    forces: Array,
+) -> int:
+    """Write down the skin's system of contact for its forces: return its size f, and fill its `matrix` and `right`.
+
+    That is what `assemble_contact_system` writes down for steps, where the compliance is known. Unknown are the push on
+    what touches, the drag on what sticks, and the parts of the body's m motions, listed in `free` (f,). `untouched`
+    (2 k,) is the step without contact. `forces` (2 k + m, 4) is filled where they are known; no column is by mu.
+    """
+    known = list_forces(skin.held, states, load.tau, system, forces)
+    f = known + body.motions.shape[1]
+    square, right = system.matrix[: f * f].reshape(f, f), system.right
+    right[:f] = 0.0
+    for r in range(known):
+        row = system.free[r]
+        i = row // 2
+        mine = body.compliance[row]
+        with_drag(mine, system.free[:known], states.state, states.sense, load.mu, square[r])
+        right[r, 0] = -untouched[row] - (position.above[i] if row % 2 == 1 else position.x[i] - position.anchor[i])
+        right[r, 1 if row % 2 == 1 else 3] = 1.0
+        for j in range(states.state.shape[0]):
+            if states.state[j] == SHEAR_LIMITED:
+                right[r, 0] -= mine[2 * j] * forces[2 * j, 0]
+    balance_motions(known, body, states, load.mu, system, square, forces)
+    return f
+
+
+@compiled
+def list_forces(held: Narrow, states: ContactStates, tau: float, system: ContactSystem, forces: Array) -> int:
+    """List the unknown forces in `free`, fill those `forces` that are known; return how many are unknown."""
+    state, sense, _ = states
+    forces[:, :] = 0.0
+    f = 0
+    for i in range(state.shape[0]):
+        if state[i] != OPEN:
+            system.free[f] = 2 * i + 1
+            f += 1
+        if state[i] == SHEAR_LIMITED:
+            forces[2 * i, 0] = sense[i] * tau * system.length[i]
+    for i in range(state.shape[0]):
+        if state[i] == STICK and held[i] & HELD_X == 0:
+            system.free[f] = 2 * i
+            f += 1
+    return f
+
+
+@compiled
+def with_drag(numbers: Array, free: Narrow, state: Narrow, sense: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` with those of `numbers` (2 k,) that are `free`, plus what drag adds to the push of what slips."""
+    for c in range(free.shape[0]):
+        unknown = free[c]
+        value = numbers[unknown]
+        if unknown % 2 == 1 and state[unknown // 2] == SLIP:
+            value += sense[unknown // 2] * mu * numbers[unknown - 1]
+        out[c] = value
+
+
+@compiled
+def balance_motions(
+    known: int, body: CondensedArrays, states: ContactStates, mu: float, system: ContactSystem, square: Array,
+    forces: Array,
+) -> None:  # fmt: skip
+    """Write down the last rows and columns: along motions of the whole body forces balance, and steps are free."""
+    motions = body.motions
+    for m in range(motions.shape[1]):
+        along = motions[:, m].copy()
+        system.free[known + m] = motions.shape[0] + m
+        for i in range(motions.shape[0]):
+            system.right[known + m, 0] += along[i] * (body.force[i] - forces[i, 0])
+        for c in range(known):
+            square[c, known + m] = along[system.free[c]]
+        with_drag(along, system.free[:known], states.state, states.sense, mu, square[known + m])
+        square[known + m, known:] = 0.0
