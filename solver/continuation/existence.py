@@ -26,12 +26,23 @@ from solver.scene.tables import Finger, Materials, Receptor
 
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
-SMOOTH = 0.66  # stretch down to which a rough mesh has the states of the fine one
-SOUND = 0.65  # least stretch of the skin from which others may be sought: neo-Hookean surfaces fold at 0.54
-PLAIN = 0.71  # and that needs no proof: just below limits meshes not made for the fold have up to 0.70
-ASTRAY = 0.5  # between where the skin folds and where it was thought to, from which another mesh is made [mm]
-STARTS = (0.3, 0.1, 0.03, 0.01)  # of the depth asked for, at which its branch may begin
-NEARLY = 0.02  # stretch above the one that folds, from which a limit is near: about two hundredths of the friction
+
+
+@dataclass(frozen=True, slots=True)
+class ProofControl:
+    """Which states need a proof, and what counts as one; stretches of the skin, parts of friction."""
+
+    smooth: float = 0.66  # stretch down to which a rough mesh has the states of the fine one
+    sound: float = 0.65  # least stretch of the skin from which others may be sought: neo-Hookean surfaces fold at 0.54
+    plain: float = 0.71  # and that needs no proof: just below limits other meshes have up to 0.70
+    astray: float = 0.5  # between where skin folds and where it was thought to, from which a mesh is made anew [mm]
+    starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the depth asked for, at which its branch may begin
+    nearly: float = 0.02  # stretch above the one that folds, from which a limit is near: some 2 % of the friction
+    far: float = 0.9  # of the friction asked for, below which a limit is beyond doubt
+    alike: float = 0.1  # relative difference of SED and forces within which a state is that of another mesh
+
+
+PROOF = ProofControl()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +59,7 @@ class Reach:
     @property
     def near(self) -> bool:
         """Whether the last state lies near a limit."""
-        return self.least < self.folds + NEARLY
+        return self.least < self.folds + PROOF.nearly
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +90,7 @@ def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: F
     return _reach(_asked(scene, load, BY_DEPTH, load.depth, stop))
 
 
-def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = SOUND) -> bool:
+def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = PROOF.sound) -> bool:
     """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
     compression = finger.skin_compression(shape)
     return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(shape)
@@ -101,10 +112,10 @@ def _reach(asked: _Question) -> Reach:
     sizing = Sizing(FINENESS, asked.load.depth, margin=MARGIN)
     rough = FiniteFinger.of(asked.scene, sizing)
     branch = _followed(rough, _start(rough, asked), asked, folds)
-    if not branch.limited and sound(rough, branch.last, PLAIN):
+    if not branch.limited and sound(rough, branch.last, PROOF.plain):
         return _told(rough, branch, folds)
     fine, branch, place = _finely(rough, branch.states, asked, folds)
-    if abs(_squeezed(fine, branch.last) - place) > ASTRAY:
+    if abs(_squeezed(fine, branch.last) - place) > PROOF.astray:
         fine, branch, _ = _finely(fine, branch.states, asked, folds)
     return _told(fine, branch, folds)
 
@@ -143,7 +154,7 @@ def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
     """Return the state at which the branch begins. Raises NotConverged."""
     if asked.by == BY_FRICTION:
         return settled(finger.newton, asked.load, None, BRANCH.tolerance, asked.stop)
-    for part in STARTS:
+    for part in PROOF.starts:
         try:
             start = settled(
                 finger.newton, asked.load._replace(depth=part * asked.target), None, BRANCH.tolerance, asked.stop
@@ -153,8 +164,8 @@ def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
         if sound(finger, start):
             return start
     raise NotConverged(
-        f"no sliding state was found at mu = {asked.load.mu:.3g} even at {STARTS[-1] * asked.target:.3g} mm: ask for "
-        "less friction"
+        f"no sliding state was found at mu = {asked.load.mu:.3g} even at {PROOF.starts[-1] * asked.target:.3g} mm: "
+        "ask for less friction"
     )
 
 
@@ -166,7 +177,7 @@ def _begun(
     Raises NotConverged.
     """
     for state in reversed(states):
-        if rough.skin_compression(state).lowest < SMOOTH:
+        if rough.skin_compression(state).lowest < PROOF.smooth:
             continue
         try:
             shape = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance, asked.stop)
@@ -177,9 +188,7 @@ def _begun(
     return _start(fine, asked)
 
 
-FAR = 0.9  # of the friction asked for, below which a limit is beyond doubt
 APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]
-ALIKE = 0.1  # relative difference of SED and forces within which a state is that of another mesh
 
 
 def steady(
@@ -197,7 +206,7 @@ def steady(
     """
     found: list[EquilibriumState] = []
     for shape in _tried(finger.newton, load, tolerance, start, stop):
-        if sound(finger, shape, PLAIN):
+        if sound(finger, shape, PROOF.plain):
             return shape
         found.append(shape)
     proof = _reach_towards(finger.scene, load, stop)
@@ -227,7 +236,7 @@ def steady(
 
 def stands(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]) -> bool:
     """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
-    if sound(finger, shape, PLAIN):
+    if sound(finger, shape, PROOF.plain):
         return True
     if not sound(finger, shape):
         return False
@@ -251,7 +260,7 @@ def refuse_far_beyond(scene: Scene, load: LoadState, stop: Callable[[], bool]) -
         return
     with suppress(NotConverged):
         proof = _reach_towards(scene, load, stop)
-        if proof.limited and not proof.lost and proof.value < FAR * load.mu:
+        if proof.limited and not proof.lost and proof.value < PROOF.far * load.mu:
             raise _refused(scene, load, proof, stop)
 
 
@@ -276,7 +285,7 @@ def _tried(
 
 def doubts(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
     """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
-    if shape.load.sense == 0 or sound(finger, shape, PLAIN):
+    if shape.load.sense == 0 or sound(finger, shape, PROOF.plain):
         return ()
     proof = of_friction(finger.scene, shape.load, shape.load.mu, stop)
     if not proof.near:
@@ -350,7 +359,7 @@ def _proven(finger: FiniteFinger, shape: EquilibriumState, proof: Reach) -> bool
     """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
     if folded(finger, shape):
         return False
-    return bool(np.all(np.abs(finger.numbers([shape])[0] - proof.numbers) <= ALIKE * np.abs(proof.numbers)))
+    return bool(np.all(np.abs(finger.numbers([shape])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
 
 
 def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float, stop: Callable[[], bool]) -> EquilibriumState:

@@ -23,12 +23,20 @@ from solver.progress import report_progress
 from solver.scene.scene import Scene
 from solver.tolerances import ALL_SLIPS, FORCE_MET
 
-FEW = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
-LEADING = 1e-3  # tolerance of states that only lead to others [mm]
-BEYOND = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
-SEARCHES = 20  # steps of a search for the depth at which a force is met
-FURTHEST = 0.25  # of the depth, by which it may change in one
-CRUSHED = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
+
+@dataclass(frozen=True, slots=True)
+class ForceSearch:
+    """How a state nearby, or the depth at which a force is met, is looked for."""
+
+    few: int = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
+    leading: float = 1e-3  # tolerance of states that only lead to others [mm]
+    beyond: float = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
+    searches: int = 20  # steps of a search for the depth at which a force is met
+    furthest: float = 0.25  # of the depth, by which it may change in one
+    crushed: float = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
+
+
+FORCE_SEARCH = ForceSearch()
 
 
 def settled(
@@ -60,11 +68,11 @@ def nearby(
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            shape = newton.settle(start, sliding_load(scene), limit=FEW)
+            shape = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.few)
         else:
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
-            found = balanced(newton, near, Given(force, None), limit=FEW)
-            shape = newton.settle(found, found.load, limit=FEW)
+            found = balanced(newton, near, Given(force, None), limit=FORCE_SEARCH.few)
+            shape = newton.settle(found, found.load, limit=FORCE_SEARCH.few)
         return shape if stands(finger, shape, stop) else None
     except NotConverged:
         return None
@@ -85,7 +93,7 @@ def roughly(
     load = sliding_load(scene)
     for begin in dict.fromkeys((near, None)):
         try:
-            return sliding.settled(finger.newton, load, begin, LEADING, stop)
+            return sliding.settled(finger.newton, load, begin, FORCE_SEARCH.leading, stop)
         except NotConverged:
             if begin is None:
                 raise
@@ -155,7 +163,7 @@ def _sliding_under(
     if capped:
         with suppress(NotConverged):
             *_, bare = _grown(newton, load._replace(mu=0.0), force, stop)
-            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), LEADING, stop)
+            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading, stop)
             found = _at_force(newton, begin, force, stop)
             return steady(finger, found.load, start=found, stop=stop)
     shape: EquilibriumState | None = None
@@ -180,7 +188,7 @@ def _grown(newton: Newton, load: LoadState, force: float, stop: Callable[[], boo
 def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
     shape, depth = start, start.load.depth
-    for _ in range(SEARCHES):
+    for _ in range(FORCE_SEARCH.searches):
         shape = sliding.settled(newton, shape.load._replace(depth=depth), shape, stop=stop)
         if abs(shape.force[1] / force - 1.0) < FORCE_MET:
             return shape
@@ -189,7 +197,9 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Calla
         stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:
             break
-        depth += float(np.clip((force - shape.force[1]) / stiffness, -FURTHEST * depth, FURTHEST * depth))
+        depth += float(
+            np.clip((force - shape.force[1]) / stiffness, -FORCE_SEARCH.furthest * depth, FORCE_SEARCH.furthest * depth)
+        )
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
@@ -199,7 +209,7 @@ def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: C
     How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
-    proof = of_depth(finger.scene, shape.load._replace(depth=BEYOND * shape.load.depth), stop)
+    proof = of_depth(finger.scene, shape.load._replace(depth=FORCE_SEARCH.beyond * shape.load.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
         shape = _risen_to(finger, shape, proof, force, stop)
     found = _at_force(finger.newton, shape, force, stop)
@@ -288,4 +298,4 @@ class _OwnBody:
 
     def spoilt(self, shape: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        return bool(shape.touching[[0, -1]].any()) or self.body.smallest_det(shape.u) < CRUSHED
+        return bool(shape.touching[[0, -1]].any()) or self.body.smallest_det(shape.u) < FORCE_SEARCH.crushed

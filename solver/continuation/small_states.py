@@ -8,7 +8,7 @@ as the coefficient grows.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import log2, sqrt
 
 import numpy as np
@@ -31,11 +31,21 @@ from solver.tolerances import ALL_SLIPS
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
-FINER = 1.6  # times as fine is the mesh on which a limit of depth is looked at once more
-BEYOND = 2.0  # times the largest depth met as a force grew, up to which the largest is looked for
-PATIENCE = 15  # corrections of states that a small step may take
-LEAST = 1e-3  # part of a depth or force below which no limit of it is looked for
-CLOSE = 0.005  # relative step of mu below which a limit is taken as found
+
+
+@dataclass(frozen=True, slots=True)
+class LimitSearch:
+    """How a limit of friction, depth or force is looked for."""
+
+    finer: float = 1.6  # times as fine is the mesh on which a limit of depth is looked at once more
+    beyond: float = 2.0  # times the largest depth met as a force grew, up to which the largest is looked for
+    patience: int = 15  # corrections of states that a small step may take
+    least: float = 1e-3  # part of a depth or force below which no limit of it is looked for
+    close: float = 0.005  # relative step of mu below which a limit is taken as found
+    nudge: float = 1e-4  # of a given force, to see whether the finger gives way
+
+
+LIMIT_SEARCH = LimitSearch()
 
 
 def continue_branch(
@@ -51,10 +61,10 @@ def continue_branch(
         state = full_slip(newton, load._replace(mu=0.0)) if first is None else first
     except ContactLost:
         return None, 0.0
-    while reached < load.mu and step > CLOSE * max(reached, min(0.01, load.mu)):
+    while reached < load.mu and step > LIMIT_SEARCH.close * max(reached, min(0.01, load.mu)):
         aim = min(reached + step, load.mu)
         try:
-            found = slide_beside(newton, load._replace(mu=aim), state.state, force, PATIENCE)
+            found = slide_beside(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
         except ContactLost:
             step /= 2.0
             continue
@@ -103,7 +113,7 @@ def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
     found = _strongest(bodies, scene, scene.normal_force, load)
     if found is None:
         return None, None
-    return found[0], _deepest(bodies, load, BEYOND * found[1], found[1])
+    return found[0], _deepest(bodies, load, LIMIT_SEARCH.beyond * found[1], found[1])
 
 
 def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = None) -> float | None:
@@ -115,13 +125,13 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
     def slides(depth: float) -> bool:
         return continue_branch(bodies.at(depth), load._replace(depth=depth))[0] is not None
 
-    least = LEAST * high
+    least = LIMIT_SEARCH.least * high
     while low is None:
         if high < least:
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     found = _largest(slides, low, high)
-    finer = bodies.made_for(found, FINER * FINENESS)
+    finer = bodies.made_for(found, LIMIT_SEARCH.finer * FINENESS)
     ends = [continue_branch(finer, load._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
     return found if ends == [False, True] else None
 
@@ -148,10 +158,10 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
             return found is not None
         return False
 
-    if not slides(LEAST * force):
+    if not slides(LIMIT_SEARCH.least * force):
         return None
-    most = _largest(slides, LEAST * force, force)
-    finer = bodies.made_for(rubless(most), FINER * FINENESS)
+    most = _largest(slides, LIMIT_SEARCH.least * force, force)
+    finer = bodies.made_for(rubless(most), LIMIT_SEARCH.finer * FINENESS)
     ends = [reached(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
@@ -162,9 +172,6 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
         middle = sqrt(low * high)
         low, high = (middle, high) if exists(middle) else (low, middle)
     return sqrt(low * high)
-
-
-NUDGE = 1e-4  # of a given force, to see whether the finger gives way
 
 
 def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
@@ -219,7 +226,7 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
     if force is None or scene.loading.direction == 0 or (state.state == STICK).any():
         return False
     try:
-        beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + NUDGE) * force)
+        beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
     except ContactLost:
         return False
     return beside.load.depth < state.load.depth

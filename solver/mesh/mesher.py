@@ -116,22 +116,36 @@ class Outline:
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
 CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]
-# Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain
-ANYWHERE = 0.5  # along the skin that may touch
-AWAY = (1.0, 1.9)  # growth outside the contact, palmar and dorsal: skin behind a contact is squeezed, and may fold
-TALL = 1.7  # across the skin at the surface, by that along it
-BULK = 1.5  # across the tissue, at most
-AT_BONE, FROM_BONE = 0.45, 6.0  # across at the bone, where fat is sheared most; growth from there, by tip radius
-ENDING, FROM_ENDING = 0.7, 3.0  # the same for the ending
-POINT = (0.02, 0.1)  # endings smaller across or along the skin, by tip radius, are hardly more than points
-AT_POINT, FROM_POINT = 0.1, 0.5  # the element that has them in its middle; growth from there [-]
-GROWTH = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
-SHORT = 0.56  # half overlaps shorter than that, by tip radius, have smaller elements
 FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
-AROUND, FROM_FOLD = 4.0, 0.5  # so many of these elements to each side are as small; growth from there [-]
-THIN = 2.0 / 3.0  # across the skin there, by that along it
-APART = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
 FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
+
+
+@dataclass(frozen=True, slots=True)
+class ElementSizes:
+    """Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain."""
+
+    anywhere: float = 0.5  # along the skin that may touch
+    palmar_growth: float = 1.0  # outside the contact: skin behind a contact is squeezed, and may fold
+    dorsal_growth: float = 1.9  # likewise
+    tall: float = 1.7  # across the skin at the surface, by that along it
+    bulk: float = 1.5  # across the tissue, at most
+    at_bone: float = 0.45  # across at the bone, where fat is sheared most
+    from_bone: float = 6.0  # growth from there, by tip radius
+    ending: float = 0.7  # the same for the ending
+    from_ending: float = 3.0  # likewise
+    point_across: float = 0.02  # endings smaller across the skin, by tip radius, are hardly more than points
+    point_along: float = 0.1  # likewise along it
+    at_point: float = 0.1  # the element that has them in its middle
+    from_point: float = 0.5  # growth from there [-]
+    growth: float = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
+    short: float = 0.56  # half overlaps shorter than that, by tip radius, have smaller elements
+    around: float = 4.0  # so many of these elements to each side are as small
+    from_fold: float = 0.5  # growth from there [-]
+    thin: float = 2.0 / 3.0  # across the skin there, by that along it
+    apart: float = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
+
+
+SIZES = ElementSizes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +191,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     fine = _fine(outline, sizing)
     row = _Row.of(outline, fine, receptor, sizing)
     arcs = row.lines(row.gaps(), shift=sizing.shift)
-    lines, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else THIN * _fold(finger))
+    lines, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else SIZES.thin * _fold(finger))
     if sizing.halved:
         arcs, lines, fat = with_middles(arcs), with_middles(lines), with_middles(fat)
     every_arc = with_middles(arcs)
@@ -190,7 +204,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     layers = np.concatenate([np.full(len(fat) - 1, FAT), skin])
     below = len(fat) - 1
     if finger.bone == "meshed":
-        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (BULK * size))) * (2 if sizing.halved else 1)
+        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (SIZES.bulk * size))) * (2 if sizing.halved else 1)
         parts = np.linspace(CORE, 1.0, 2 * count + 1)[:-1]
         points = np.concatenate([outline.bone(every_arc[:, None], parts), points], axis=1)
         layers = np.concatenate([np.full(len(parts) // 2, BONE), layers])
@@ -216,7 +230,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
 
 def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
     """Return which elements (a,) between the lines at `arcs` lie apart from skin held between `start` and `stop`."""
-    apart = APART * finger.tip_radius
+    apart = SIZES.apart * finger.tip_radius
     return (arcs[1:] < start - apart) | (arcs[:-1] > stop + apart)
 
 
@@ -246,7 +260,8 @@ def _fine(outline: Outline, sizing: Sizing) -> float:
     """Return the size of the smallest elements along the skin [mm]."""
     low, high = _lower_than(outline, sizing.indentation)
     radius = outline.finger.tip_radius
-    return max(radius / sizing.fineness * ANYWHERE * min(1.0, (high - low) / 2.0 / (SHORT * radius)), FINEST * radius)
+    overlap = min(1.0, (high - low) / 2.0 / (SIZES.short * radius))
+    return max(radius / sizing.fineness * SIZES.anywhere * overlap, FINEST * radius)
 
 
 def _middles(lines: Array) -> Array:
@@ -291,14 +306,16 @@ class _Row:
             near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
         arc = distinct(arc)
-        asked = fine + scale * (AWAY[0] * np.maximum(low - arc, 0.0) + AWAY[1] * np.maximum(arc - high, 0.0))
+        asked = fine + scale * (
+            SIZES.palmar_growth * np.maximum(low - arc, 0.0) + SIZES.dorsal_growth * np.maximum(arc - high, 0.0)
+        )
         if sizing.fold is not None:
             least = _fold(outline.finger)
-            from_fold = np.maximum(np.abs(arc - sizing.fold) - AROUND * least, 0.0)
-            asked = np.minimum(asked, least + FROM_FOLD * from_fold)
+            from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.around * least, 0.0)
+            asked = np.minimum(asked, least + SIZES.from_fold * from_fold)
         near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
-        if receptor.ending[1] < POINT[1] * outline.finger.tip_radius:
-            near, far, largest = _around_point(arc, near, far, AT_POINT * outline.finger.tip_radius * scale)
+        if receptor.ending[1] < SIZES.point_along * outline.finger.tip_radius:
+            near, far, largest = _around_point(arc, near, far, SIZES.at_point * outline.finger.tip_radius * scale)
             asked = np.minimum(asked, largest)
         ends = [outline.palmar_cut, outline.palmar, near, far, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
@@ -338,14 +355,16 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     thick = finger.pulp_thickness() - skin
     depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
     depth = distinct(np.concatenate([depth, np.linspace(0.0, skin + thick, 1000)]))
-    of_bone = AT_BONE + FROM_BONE * (skin + thick - depth) / finger.tip_radius
-    of_ending = ENDING + FROM_ENDING * np.abs(depth - receptor.depth) / finger.tip_radius
-    asked = np.minimum(size * np.minimum(BULK, np.minimum(of_bone, of_ending)), TALL * (fine + GROWTH * depth))
-    asked = np.minimum(asked, thin + FROM_FOLD * depth)
+    of_bone = SIZES.at_bone + SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
+    of_ending = SIZES.ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
+    asked = np.minimum(
+        size * np.minimum(SIZES.bulk, np.minimum(of_bone, of_ending)), SIZES.tall * (fine + SIZES.growth * depth)
+    )
+    asked = np.minimum(asked, thin + SIZES.from_fold * depth)
     near, far = receptor.depth - receptor.ending[0] / 2.0, receptor.depth + receptor.ending[0] / 2.0
-    if receptor.ending[0] < POINT[0] * finger.tip_radius:
+    if receptor.ending[0] < SIZES.point_across * finger.tip_radius:
         top, bottom = (0.0, finger.epidermis) if receptor.depth < finger.epidermis else (finger.epidermis, skin)
-        above, below, largest = _around_point(depth, near, far, AT_POINT * size)
+        above, below, largest = _around_point(depth, near, far, SIZES.at_point * size)
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         asked = np.minimum(asked, largest)
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
@@ -366,7 +385,7 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
     from there.
     """
     middle, size = (near + far) / 2.0, max(far - near, size)
-    largest = size + FROM_POINT * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
+    largest = size + SIZES.from_point * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
     return middle - size / 2.0, middle + size / 2.0, largest
 
 

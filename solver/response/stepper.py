@@ -7,7 +7,7 @@ bordered system, usually in one iteration a reading. What one iteration leaves o
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -141,15 +141,25 @@ class SmallStepper(Stepper):
         return float(np.minimum(part * push, self.tau * self.newton.skin.fixed_length).sum())
 
 
-MET = 0.02  # part of the normal force by which a state may miss the forces and still be shown
-EASED = 0.7  # of the normal force at which the state was lost and led to in vain: from there it is sought again [-]
-STAIRS, LEADING = 12, 3  # that lead a finger from nothing to forces it bears already, and iterations on each
-ARRIVING, NEAR = 8, 0.01  # iterations on the last, as after a state that was not shown, until one is so small [mm]
-FOLDING = 0.65  # least stretch of the skin that is shown: it folds from 0.544 on, and a coarse mesh squeezes it less
-CREASING = 0.3  # largest kink that is shown: where skin folds behind the last node that touches, that mesh has this
-FAR, HURRIED = 0.15, 3  # displacement in one iteration from which on there is another [mm], and how many at most
-STIFF = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
-FURTHEST = 5.0  # displacement in one iteration beyond which the state is lost [mm]
+@dataclass(frozen=True, slots=True)
+class FollowControl:
+    """When a finger at finite strain is shown, hurried, led to a state anew, and given up."""
+
+    met: float = 0.02  # part of the normal force by which a state may miss the forces and still be shown
+    eased: float = 0.7  # of the normal force at which a state was lost for good: from there it is sought again
+    stairs: int = 12  # that lead a finger from nothing to forces it bears already
+    leading: int = 3  # iterations on each
+    arriving: int = 8  # iterations on the last, as after a state that was not shown
+    near: float = 0.01  # size of one after which no more are made [mm]
+    folding: float = 0.65  # least stretch of the skin that is shown: it folds from 0.544 on, less so on a coarse mesh
+    creasing: float = 0.3  # largest kink that is shown: a coarse mesh has this where skin folds behind the contact
+    far: float = 0.15  # displacement in one iteration from which on there is another [mm]
+    hurried: int = 3  # and how many at most
+    stiff: float = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
+    furthest: float = 5.0  # displacement in one iteration beyond which the state is lost [mm]
+
+
+CONTROL = FollowControl()
 
 
 class FiniteStepper(Stepper):
@@ -179,7 +189,7 @@ class FiniteStepper(Stepper):
         """
         if self._lost_at is None:
             return self._followed(normal, tangential)
-        if self._hopeless and normal >= EASED * self._lost_at:
+        if self._hopeless and normal >= CONTROL.eased * self._lost_at:
             return float("nan")
         return self._led(normal, tangential)
 
@@ -187,9 +197,9 @@ class FiniteStepper(Stepper):
         """Return what `step` does of a finger led from nothing to these forces."""
         self.forget()
         sed = float("nan")
-        for part in np.linspace(1.0 / STAIRS, 1.0, STAIRS).tolist():
+        for part in np.linspace(1.0 / CONTROL.stairs, 1.0, CONTROL.stairs).tolist():
             self._behind = part == 1.0
-            sed = self._followed(part * normal, part * tangential, LEADING)
+            sed = self._followed(part * normal, part * tangential, CONTROL.leading)
             if self.lost:
                 self._lost_at, self._hopeless = normal, True
                 break
@@ -206,28 +216,28 @@ class FiniteStepper(Stepper):
         shape = self._ready(normal, tangential)
         origin, before = shape.place(newton.condensed)[:, 0], shape.load.travel
         given, hurried = Given(normal, tangential), self._goes_far(normal)
-        far, turns = (NEAR, ARRIVING) if self._behind else (FAR, HURRIED)
+        far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.hurried)
         for number in range(1, max(iterations, turns) + 1):
             kept = hurried and number == 1
             done = corrected(newton, shape, given, origin, before, kept=kept)
-            if kept and (done is None or done[1] > FURTHEST):
+            if kept and (done is None or done[1] > CONTROL.furthest):
                 continue
-            if done is None or done[1] > FURTHEST or self.finger.runs_out(done[0]):
+            if done is None or done[1] > CONTROL.furthest or self.finger.runs_out(done[0]):
                 return self._lose(normal)
             shape = done[0]
             if number >= iterations and not kept and done[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(shape)
-        if compression.least < FOLDING:
+        if compression.least < CONTROL.folding:
             return self._lose(normal)
         self.state = shape
         x, y = shape.force
         behind = max(abs(y - normal), abs(x - tangential) if (shape.state == STICK).any() else 0.0)
-        self._behind = behind > MET * normal
+        self._behind = behind > CONTROL.met * normal
         if self._behind:
             return float("nan")
-        if compression.lowest < FOLDING or compression.kink > CREASING:
+        if compression.lowest < CONTROL.folding or compression.kink > CONTROL.creasing:
             return self._lose(normal)
         return self.finger.sed_ending(shape.u)
 
@@ -237,8 +247,8 @@ class FiniteStepper(Stepper):
         With it an iteration takes a third of the time, and only where the finger has come to is worth a new one.
         """
         missing = abs(normal - float(self.state.force[1]))
-        far = self.state.touching.any() and 0.0 < FAR * self._stiffness < missing
-        return bool(far) and self.newton.bulk < STIFF
+        far = self.state.touching.any() and 0.0 < CONTROL.far * self._stiffness < missing
+        return bool(far) and self.newton.bulk < CONTROL.stiff
 
     def _lose(self, normal: float) -> float:
         self.forget()
