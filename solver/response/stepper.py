@@ -151,8 +151,8 @@ class FollowControl:
     leading: int = 3  # iterations on each
     arriving: int = 8  # iterations on the last, as after a state that was not shown
     near: float = 0.01  # size of one after which no more are made [mm]
-    folding: float = 0.65  # least stretch of the skin that is shown: it folds from 0.544 on, less so on a coarse mesh
-    creasing: float = 0.3  # largest kink that is shown: a coarse mesh has this where skin folds behind the contact
+    least_stretch: float = 0.65  # of the skin that is shown: it folds from 0.544 on, less so on a coarse mesh
+    largest_kink: float = 0.3  # that is shown: a coarse mesh has this where skin folds behind the contact
     far: float = 0.15  # displacement in one iteration from which on there is another [mm]
     hurried: int = 3  # and how many at most
     stiff: float = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
@@ -229,7 +229,7 @@ class FiniteStepper(Stepper):
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         compression = self.finger.skin_compression(shape)
-        if compression.least < CONTROL.folding:
+        if compression.least < CONTROL.least_stretch:
             return self._lose(normal)
         self.state = shape
         x, y = shape.force
@@ -237,7 +237,7 @@ class FiniteStepper(Stepper):
         self._behind = behind > CONTROL.met * normal
         if self._behind:
             return float("nan")
-        if compression.lowest < CONTROL.folding or compression.kink > CONTROL.creasing:
+        if compression.lowest < CONTROL.least_stretch or compression.kink > CONTROL.largest_kink:
             return self._lose(normal)
         return self.finger.sed_ending(shape.u)
 
