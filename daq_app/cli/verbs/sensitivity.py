@@ -10,7 +10,7 @@ keeps that sign: single changes, a map over the receptor's place and the tip rad
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +122,7 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     shares = {name: sign_map.share(column) for name, column in zip(NAMES, kept.T, strict=True)}
     at = NAMES.index(quantity.name)
     indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
+    without_answer = int(np.isnan(kept[:, at]).sum())
     console.result(
         {
             "quantity": quantity.name,
@@ -133,16 +134,30 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             "samples": samples,
             "seed": options.seed,
             "fingers": len(random),
-            "without_answer": int(np.isnan(kept[:, at]).sum()),
+            "without_answer": without_answer,
             "shares": shares,
             "indices": {name: [one.to_dict() for one in found] for name, (found, _) in indices.items()},
         }
     )
     _print_changes(single, quantity, console)
     _print_map(radii, quantity, console)
+    _print_shares(shares, len(random), without_answer, console)
+    for found, _ in indices.values():
+        if found:
+            _print_thirds(found[0].name, points, kept[:, at], quantity, console)
+            break
+    for name, (found, count) in indices.items():
+        _print_indices(name, found, count, samples, quantity, console)
+    return DONE
+
+
+def _print_shares(
+    shares: Mapping[str, tuple[float, float, float] | None], fingers: int, without_answer: int, console: Console
+) -> None:
+    """Print how often fingers drawn at random keep both published signs of each quantity."""
     console.say(
-        f"\n{len(random)} fingers drawn at random from ranges that nobody measured (below), "
-        f"{int(np.isnan(kept[:, at]).sum())} of them without a settled state on three surfaces of each series. "
+        f"\n{fingers} fingers drawn at random from ranges that nobody measured (below), "
+        f"{without_answer} of them without a settled state on three surfaces of each series. "
         "Share of the others that keep both published signs:"
     )
     rows = [
@@ -151,13 +166,6 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
         if found is not None
     ]
     console.say(table(rows, head=["quantity", "share", "95 % interval"]))
-    for found, _ in indices.values():
-        if found:
-            _print_thirds(found[0].name, points, kept[:, at], quantity, console)
-            break
-    for name, (found, count) in indices.items():
-        _print_indices(name, found, count, samples, quantity, console)
-    return DONE
 
 
 def _print_changes(single: dict[str, Answer | str], quantity: Quantity, console: Console) -> None:
