@@ -19,12 +19,8 @@ FLAGS = (
     "--disable-sync",
     "--disable-features=NetworkTimeServiceQuerying,OptimizationHints,MediaRouter",
 )
-OWN = {
-    "update.googleapis.com",
-    "accounts.google.com",
-    "clients2.google.com",
-    "www.google.com",
-}  # what the browser asks for itself
+# A request of the page itself has an origin; what the browser asks for of its own accord has none.
+OF_THE_PAGE = re.compile(r'"initiator":"(?!not an origin)[^\n]*?"url":"([a-z]+://[^"]*)"')
 PAPER = 680  # width of A4 between the page's margins [CSS px]
 PAPER_HEIGHT = 1001  # likewise [CSS px]
 
@@ -60,6 +56,6 @@ def opened(room, text):
         check=True,
     )
     seen = json.loads(re.search(r"<pre>(\{.*?\})</pre>", done.stdout, re.DOTALL)[1].replace("&amp;", "&"))
-    asked = set(re.findall(r'"url":"([a-z]+://([^/"]*)[^"]*)"', (room / "net.json").read_text(errors="replace")))
-    foreign = {address for address, host in asked if not address.startswith("file:") and host not in OWN}
+    asked = set(OF_THE_PAGE.findall((room / "net.json").read_text(errors="replace")))
+    foreign = {address for address in asked if not address.startswith("file:")}
     return seen, [line for line in done.stderr.splitlines() if "CONSOLE" in line], foreign
