@@ -95,7 +95,8 @@ def _gone_on(
 def _asked(state: AnalystState, asked: m.Ask) -> AnalystState:
     match asked:
         case m.Choose(row):
-            return replace(state, row=max(0, min(row, len(rows(state)) - 1)))
+            row = max(0, min(row, len(rows(state)) - 1))
+            return state if row == state.row else replace(state, row=row, told="")  # which was of the one before
         case m.Write(what, path):
             return replace(state, step=m.Step(0.0, tr("writing {what} to {path}", what=what, path=path)), told="")
         case m.GoOn():

@@ -13,11 +13,11 @@ from daq_app.analyst.edges import brought_back, decision_meant, decision_of, his
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
-from daq_app.batch.derived import analysis_document, stored_settings
+from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
 from sessions.plan.plan import Blinded
-from sessions.prediction import TrialPrediction, Way, predict
+from sessions.prediction import PredictionOptions, TrialPrediction, Way, predict
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
@@ -26,7 +26,8 @@ from sessions.report import Field, Report, findings
 from sessions.report.predictions import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DecisionError, append, read
-from solver import Cancelled, SceneError
+from solver import Cancelled, Prediction, Scene, SceneError
+from solver.mesh.mesh import Mesh
 from solver.response.fields import Sketch
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ class Work:
         self._recording = _opened(folder)
         self._raw = RawFile(self._recording)
         self._chosen = 0
-        self._ways: dict[m.Key, tuple[TrialPrediction, Way]] = {}
+        self._ways: dict[m.Key, tuple[TrialPrediction, Way | None]] = {}  # no way at finite strain
         self._sketches: dict[int, Sketch] = {}
         self._other: Report | None = None  # that is compared
         self._filmed: m.Filmed | None = None  # the last history
@@ -60,8 +61,9 @@ class Work:
     def go_on(self) -> None:
         """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
         told = self.timed(tr("predicting"))
+        options = _options(self._recording)
         self._prediction = predict(
-            self._analysis, self._recording.plan, progress=told, watch=self._answered, first=self._first()
+            self._analysis, self._recording.plan, options, progress=told, watch=self._answered, first=self._first()
         )
         self._report = findings(self._recording, self._analysis, self._prediction)
         self._say(m.Found("predicted", self._report, history(read(self._recording.folder))))
@@ -148,17 +150,15 @@ class Work:
 
     def _answered(self, _number: int, row: TrialPrediction, way: Way | None) -> None:
         finding = finding_of(row)
-        finger = None
-        if way is not None:
-            self._ways[finding.trial, finding.stroke] = row, way
-            if row.prediction is not None:
-                finger = finger_of(row.prediction, self._sketch(way))
-        self._say(m.Answered(finding, finger))
+        self._ways[finding.trial, finding.stroke] = row, way
+        self._say(m.Answered(finding, self._finger(row.prediction)))
 
-    def _sketch(self, way: Way) -> Sketch:
-        mesh = way.finger.geometry.mesh
+    def _finger(self, found: Prediction | None) -> Finger | None:
+        return None if found is None else finger_of(found, self._sketch(found.mesh, found.scene))
+
+    def _sketch(self, mesh: Mesh, scene: Scene) -> Sketch:
         if id(mesh) not in self._sketches:
-            self._sketches = {id(mesh): Sketch.of(mesh, way.scene)}
+            self._sketches = {id(mesh): Sketch.of(mesh, scene)}
         return self._sketches[id(mesh)]
 
     def _draw(self, name: str) -> None:
@@ -233,14 +233,17 @@ class Work:
         if found is None:
             raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
         prediction, way = found
+        if way is None:
+            raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
+        sketch = self._sketch(way.finger.geometry.mesh, way.scene)
         if way.march is not None:
             told = self.timed(tr("drawing the history"), len(way.march))
-            self._filmed = m.Filmed(key, film_of(way, way.march, self._sketch(way), told))
+            self._filmed = m.Filmed(key, film_of(way, way.march, sketch, told))
             self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:
             raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
-        film, why = lost_film(way, self._sketch(way), self.timed(tr("drawing the history")))
+        film, why = lost_film(way, sketch, self.timed(tr("drawing the history")))
         first = prediction.reasons.get("sed", "")
         self._filmed = m.Filmed(
             key, film, tr("{first} Followed from first touch: {why}", first=first, why=why) if why else first
@@ -258,12 +261,14 @@ class Work:
         told = self.timed(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 
-        def answered(_number: int, row: TrialPrediction, way: Way | None) -> None:
-            if way is not None and row.prediction is not None:
+        def answered(_number: int, row: TrialPrediction, _way: Way | None) -> None:
+            finger = self._finger(row.prediction)
+            if finger is not None:
                 finding = finding_of(row)
-                fingers[finding.trial, finding.stroke] = finger_of(row.prediction, self._sketch(way))
+                fingers[finding.trial, finding.stroke] = finger
 
-        self._other = findings(recording, analysis, predict(analysis, recording.plan, progress=told, watch=answered))
+        prediction = predict(analysis, recording.plan, _options(recording), progress=told, watch=answered)
+        self._other = findings(recording, analysis, prediction)
         self._say(m.Compared(str(folder), self._other, fingers))
 
     def _write(self, asked: m.Write) -> str:
@@ -322,6 +327,12 @@ def _opened(folder: Path) -> Recording:
     if recording.plan.blinded:
         raise Blinded(f"{folder} is blinded: its results are told by index; 'daq-app unblind' opens the key")
     return recording
+
+
+def _options(recording: Recording) -> PredictionOptions:
+    """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
+    kept = stored_options(recording) or PredictionOptions()
+    return replace(kept, intervals=False, beside="none", beside_intervals=False)
 
 
 def sentence_of(error: Exception) -> str:

@@ -39,8 +39,9 @@ def predict(
 
     The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
     without friction, without depth or without a settled state keeps its row, with the reason. The row at position
-    `first` is solved before the others; `watch` is told each row as soon as it is known. Raises SceneError where the
-    options make no scene, Cancelled where `progress` (told the part done) returns False.
+    `first` is solved before the others; `watch` is told each row as soon as it is known, and at finite strain once all
+    are. Raises SceneError where the options make no scene, Cancelled where `progress` (told the part done) returns
+    False.
     """
     asked = with_own_finger(options or PredictionOptions(), plan)
     prepared = prepared_cases(analysis, plan, asked)
@@ -74,6 +75,8 @@ def predict(
     found |= dict(enumerate(solve_many(both, progress, seen if watch else None)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
+        if not small:
+            told(number, rows[number], None)
     base = asked.scene
     return SessionPrediction(
         simulated=analysis.simulated,

@@ -291,6 +291,12 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
         np.testing.assert_allclose(finger.frame.row, [sed for _, sed in answered[key].row])
 
 
+def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
+    said = fold(state, m.Problem("Trial 1 has no history."))
+    assert fold(said, m.Choose(state.row)).told == "Trial 1 has no history."
+    assert fold(said, m.Choose(state.row + 1)).told == ""
+
+
 def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):
     work, said = at_work
     work.do(m.ShowReadings(1))

@@ -1,5 +1,6 @@
 """Ten surfaces at small and at finite strain, from a kept session through every verb, the window and a study."""
 
+import contextlib
 import json
 import shutil
 
@@ -7,7 +8,7 @@ import pytest
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.shown import session_pictures
-from daq_app.analyst.work import Work
+from daq_app.analyst.work import NothingToShow, Work
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
@@ -64,19 +65,23 @@ def test_every_export_carries_the_kept_prediction(predicted, format_, tmp_path):
     assert any(out.rglob("*") if out.is_dir() else [out])
 
 
-def test_the_window_opens_the_session_and_draws_every_surface(predicted):
-    said = []
-    work = Work(predicted[0], said.append)
+def test_the_window_shows_the_kept_prediction_and_draws_every_surface(predicted):
+    folder, document = predicted
+    strain, said = document["options"]["kinematics"], []
+    work = Work(folder, said.append)
     work.go_on()
     report = next(one.report for one in said if isinstance(one, m.Found) and one.stage == "predicted")
     answered = [one for one in said if isinstance(one, m.Answered)]
     assert len(answered) == 10
+    assert report.model.startswith(f"{strain} strain")
+    assert [one.sed for one in report.predictions] == pytest.approx([row["sed"] for row in document["trials"]])
     for name, _ in session_pictures(report):
         work.do(m.Draw(name))
     for one in answered:
         assert (one.finger is not None) == (one.finding.sed is not None)
         work.do(m.Draw(f"finger {one.finding.stroke}"))
-        work.do(m.ShowHistory((one.finding.trial, one.finding.stroke)))
+        with contextlib.nullcontext() if strain == "small" else pytest.raises(NothingToShow):
+            work.do(m.ShowHistory((one.finding.trial, one.finding.stroke)))
     assert not [one for one in said if isinstance(one, m.Problem)]
 
 
