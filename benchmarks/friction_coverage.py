@@ -50,7 +50,7 @@ class Trouble:
     law: float = 0.0  # mu follows N by this power [-]
     cross_talk: float | None = None  # each force errs by exactly so much of each other, either sign; None: drawn [-]
     tilt: tuple[float, float] | None = None  # [degrees]; None: drawn
-    presses: int = 0  # before the strokes, from which the lean is told
+    presses: int = 0  # before the strokes, by which the analysis measures the lean
     level: bool = False  # mu's truth is the level that it wanders about, not its mean over this very stroke
     slips: bool = False  # T/N climbs and drops again and again while the finger slides
 

@@ -125,7 +125,7 @@ class _Choice(QComboBox):
         self._label.hide()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
-        """Keep the label beside it."""
+        """Move the label to the parent that the list is given."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ParentChange:
             self._label.setParent(self.parentWidget())

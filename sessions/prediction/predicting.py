@@ -38,10 +38,9 @@ def predict(
     """Return what the model predicts for every trial of `plan`, or for every stroke where it plans none.
 
     The finger is the one asked for, or else the published one with what the plan knows of the subject's own. A trial
-    without friction, without depth or without a settled state keeps its row, with the reason. The row at position
-    `first` is solved before the others; `watch` is told each row as soon as it is known, and at finite strain once all
-    are. Raises SceneError where the options make no scene, Cancelled where `progress` (told the part done) returns
-    False.
+    without friction, depth or a settled state keeps its row, with the reason. The row at position `first` is solved
+    first. `watch` takes each row as soon as it is known, at finite strain once all are. Raises SceneError where the
+    options make no scene, Cancelled where `progress` says so.
     """
     asked = with_own_finger(options or PredictionOptions(), plan)
     prepared = prepared_cases(analysis, plan, asked)
@@ -77,12 +76,11 @@ def predict(
         rows[number] = known(at)
         if not small:
             told(number, rows[number], None)
-    base = asked.scene
     return SessionPrediction(
         simulated=analysis.simulated,
         trials=tuple(rows),
         width=template(asked).finger.width,
-        width_origin="assumed" if base is None or base.finger.width == Finger().width else "set",
+        width_origin="assumed" if template(asked).finger.width == Finger().width else "set",
         options=asked,
         decisions=analysis.decisions,
         area=analysis.settings.area,

@@ -62,7 +62,7 @@ class Further:
     afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
     firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
     response: str = SED.name  # the quantity at the ending that is held against scores
-    paths: Mapping[int, Values] | None = None  # trial -> SED along many paths of the analysis
+    paths: Mapping[int, Values] | None = None  # trial -> that quantity along many paths of the analysis
 
 
 def findings(
@@ -85,6 +85,7 @@ def findings(
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
+    others = [Path(table.session).name for table in tables[1:]]
     numbers = quantities(predicted, found)
     judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area, more.response)
     return Report(
@@ -112,13 +113,7 @@ def findings(
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
         again=facts.again(recording, analysis),
         commands=session_commands(
-            recording,
-            analysis,
-            prediction,
-            more.firing_settings,
-            more.paths,
-            [Path(table.session).name for table in tables[1:]],
-            more.response,
+            recording, analysis, prediction, more.firing_settings, more.paths, others, more.response
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,

@@ -85,7 +85,7 @@ def test_one_device_is_let_in_by_the_code_and_comes_back_by_its_token(server):
     with socket(server, token=welcome["token"]) as again:
         assert said(again)["type"] == "welcome"
         assert server.connected
-        until(lambda: len(server.heard) == 2)  # the welcome goes out before the window is told
+        until(lambda: len(server.heard) == 2)  # the server sends the welcome before it calls the window
     assert [type(one) for one in server.heard] == [Hello, Hello]
     assert server.heard[0].pixels_per_mm == 4.0
 
