@@ -16,6 +16,7 @@ from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, 
 from daq_app.wording import tr
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
+from sessions.prediction.stored import known_error
 from sessions.strokes import FrictionParameters
 from sessions.strokes.settings import RatioSettings
 from solver import Friction, Loading, Scene, Solve, SolveFailure, solve
@@ -194,8 +195,8 @@ def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, s
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
     return Settled(
-        asked.trial, found.sed_ending, found.error_estimate, provisional, found.row.sed, picture,
-        found.indentation, kinematics, effect=_greatest_effect(found),
+        asked.trial, found.sed_ending, known_error(found, found.error_estimate), provisional, found.row.sed,
+        picture, found.indentation, kinematics, effect=_greatest_effect(found),
     )  # fmt: skip
 
 

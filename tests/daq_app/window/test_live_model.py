@@ -133,6 +133,14 @@ def test_the_full_solve_is_told_beside_the_mean_of_what_was_shown_over_the_stead
     assert f"{1000 * settled.provisional:.2f} kPa" in words
 
 
+def test_a_full_solve_whose_nested_mesh_has_no_such_state_has_no_estimate_from_the_mesh(follower, monkeypatch):
+    monkeypatch.setattr("daq_app.window.live_follower.solve", lambda scene: replace(solved(scene), nested=None))
+    follower.take(forces_of(stroke(), FRAME))
+    settled = follower.settle(Settle(1, PLAN, FRICTION, NORMAL, (1.2, 2.0)))
+    assert settled.error is None
+    assert f"SED {1000 * settled.sed:.2f} kPa; mesh: no estimate; model: " in model_words(None, settled, "").words
+
+
 def test_a_full_solve_that_fails_says_why_and_keeps_what_was_shown(follower):
     follower.take(forces_of(stroke(), FRAME))
     settled = follower.settle(Settle(1, PLAN, replace(FRICTION, mu=None), NORMAL, (1.2, 2.0)))
