@@ -21,7 +21,6 @@ from solver import Scene
 
 Array = NDArray[np.float64]
 
-SPREAD = float(np.log(2.0))  # of each log stiffness in the prior, assumed: 95 % within a factor of 3.9 either way
 POINTS = 16  # of one press, each the mean over as much of its travel: noise of single readings is no model's error
 CHI_SQUARED = 3.841  # 95 % of chi squared with one degree of freedom
 # Halving and doubling these moved ends of intervals by so much of their width, over twelve planted fingers.

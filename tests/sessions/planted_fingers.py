@@ -11,6 +11,7 @@ from solver import Friction, Loading, Material, Materials, Scene, Solve, solve_m
 
 LAYERS = ("epidermis", "dermis", "fat")
 PUBLISHED = np.array([0.136, 0.08, 0.034])  # [MPa], the paper's Table 3
+SPREAD = float(np.log(2.0))  # standard deviation of each log stiffness in the prior
 TAKEN = np.geomspace(0.1, 1.8, 12)  # depths at which a planted finger is solved [mm]
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from planted_fingers import LOUD, PUBLISHED, WIDER, law, power_law, power_law_model, presses, published
+from planted_fingers import LOUD, PUBLISHED, SPREAD, WIDER, law, power_law, power_law_model, presses, published
 
-from sessions.prediction.finger_fit import SPREAD, fit
+from sessions.prediction.finger_fit import fit
 from sessions.prediction.press_model import CONTRASTS, FitError, check, press_model
 
 PLANTED = np.array([0.2, 0.06, 0.05])  # [MPa]

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_fingers import PUBLISHED, law, power_law, power_law_model, presses, published
+from planted_fingers import PUBLISHED, SPREAD, law, power_law, power_law_model, presses, published
 
-from sessions.prediction.finger_fit import SPREAD, LoadingCurve, fit
+from sessions.prediction.finger_fit import LoadingCurve, fit
 from sessions.prediction.press_model import FitError
 from sessions.prediction.relaxation_fit import HoldCurve, relaxation, relaxing_fit
 from solver import Friction, Loading, Relaxation, Solve, solve
