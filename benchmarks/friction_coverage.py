@@ -1,7 +1,7 @@
 """Coverage of the 95 % intervals of friction on planted strokes, in nine kinds of trouble, and false static peaks.
 
 Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
-of 1 %, the lean of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
+of 1 %, the tilt of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
 
 Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [FIRST [SET ...]]]; by default 100 seeds
 from 5000.

@@ -14,7 +14,7 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
     parser.add_argument(
         "--area",
         metavar="LAW",
-        help="contact area by which tau_max is told: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
+        help="contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
         f"N; where none is given {otherwise}",
     )
     parser.add_argument(

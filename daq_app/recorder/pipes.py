@@ -130,7 +130,7 @@ class Outbox:
         try:
             return self._codec.packed(report)
         except Exception as error:  # noqa: BLE001  the client must not go blind for an error of ours
-            return self._codec.packed(Failed(type(report).__name__, f"a report could not be told ({error})"))
+            return self._codec.packed(Failed(type(report).__name__, f"a report could not be sent ({error})"))
 
     def _next(self) -> Report | None:
         with self._lock:

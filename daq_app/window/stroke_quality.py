@@ -33,7 +33,7 @@ WORDS = {
     FlawName.NOT_LIFTED: tr_noop("the finger was not lifted between strokes"),
     FlawName.DIRECTION_TURNS: tr_noop("the direction turned"),
     FlawName.SATURATED: tr_noop("the transducer was overloaded"),
-    FlawName.DEVICE_FAULT: tr_noop("the transducer told of a fault"),
+    FlawName.DEVICE_FAULT: tr_noop("the transducer reported a fault"),
     FlawName.LOST_READINGS: tr_noop("readings were lost"),
     FlawName.DRIFT: tr_noop("the zero drifted"),
     FlawName.FROZEN: tr_noop("the transducer stood still"),

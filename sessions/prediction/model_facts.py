@@ -13,19 +13,19 @@ _READINGS = {
 }
 UNKNOWNS = "unknowns"  # of the mesh: the name of that fact
 _AUDITS = {  # 0 is perfect, but for the volume
-    "equilibrium_x": "forces along the surface out of balance by, of the contact force",
-    "equilibrium_y": "forces across the surface out of balance by, of the contact force",
-    "inner_forces": "largest unbalanced force inside the tissue, of the contact force",
-    "work_balance": "work of the contact forces against stored energy",
-    "penetration": "skin too low by, of the indentation",
-    "tension": "largest pull on a touching point, of the largest push",
-    "cone_violation": "friction beyond its law by, of the largest force on a node",
-    "normal_force_missed": "normal force given and missed by, of it",
-    "drag_missed": "drag given and missed by, of what friction could carry",
-    "smallest_det_F": "smallest volume, of what it was",
-    "course_work_balance": "over the course, work of the bone less stored and lost energy, of that work",
-    "course_step_work": "over the course, work of points that touch or let go within a step, of the bone's work",
-    "course_least_dissipation": "least energy that friction takes in a step of the course, of the bone's work",
+    "equilibrium_x": "imbalance of forces along the surface, as a share of the contact force",
+    "equilibrium_y": "imbalance of forces across the surface, as a share of the contact force",
+    "inner_forces": "largest unbalanced force inside the tissue, as a share of the contact force",
+    "work_balance": "difference of the work of the contact forces and the stored energy, relative",
+    "penetration": "penetration of the skin, as a share of the indentation",
+    "tension": "largest tension at a touching node, as a share of the largest pressure",
+    "cone_violation": "friction above its law, as a share of the largest nodal force",
+    "normal_force_missed": "deviation from the given normal force, relative",
+    "drag_missed": "deviation from the given drag, as a share of the friction limit",
+    "smallest_det_F": "smallest volume ratio",
+    "course_work_balance": "over the course, imbalance of work, stored and lost energy, as a share of the work",
+    "course_step_work": "over the course, work of nodes that touch or release in a step, as a share of the bone's work",
+    "course_least_dissipation": "least dissipation of friction in a step of the course, as a share of the bone's work",
 }
 
 
@@ -44,7 +44,7 @@ def model_facts(found: SessionPrediction | None) -> tuple[tuple[str, str, str], 
         f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
         for name in first.audits
     )
-    return (*facts, ("audits", audits, "the worst over all trials; 0 is perfect, of a volume 1"))
+    return (*facts, ("audits", audits, "the worst over all trials; 0 is perfect, 1 for the volume ratio"))
 
 
 def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:

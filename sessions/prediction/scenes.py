@@ -115,9 +115,9 @@ def _missing(row: TrialPrediction, stroke: Stroke | None) -> str | None:
         flaws = ", ".join(stroke.flaws) or "no steady sliding"
         return f"The stroke gives no {what} ({flaws})."
     if row.direction is None:
-        return "Neither the stroke nor a plan tells the direction."
+        return "Neither the stroke nor a plan gives the direction."
     if row.indentation is None:
-        return "No plan tells how deep the model is to press: give an indentation."
+        return "No plan says how deep the model is pressed: give an indentation."
     return None
 
 

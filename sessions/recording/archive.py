@@ -89,9 +89,7 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
     expected: dict[str, Any] = json.loads(json.dumps(description(recording)))
-    yield from (
-        f"{where} of {DESCRIPTION_FILE} is not what the live file tells" for where in _unlike(stored, expected, "")
-    )
+    yield from (f"{where} of {DESCRIPTION_FILE} differs from the live file" for where in _unlike(stored, expected, ""))
 
 
 def _unlike(stored: object, expected: object, where: str) -> Iterator[str]:

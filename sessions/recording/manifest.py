@@ -54,7 +54,7 @@ def changed_files(folder: Path, simulated: str | None, form: Mapping[str, Any]) 
                 f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
             )
     if _head_of(folder) != {**_simulated(simulated), "format": form}:
-        problems.append(f"the head of {MANIFEST_FILE} is not what the live file tells")
+        problems.append(f"the head of {MANIFEST_FILE} differs from the live file")
     return tuple(problems)
 
 

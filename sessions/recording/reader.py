@@ -47,7 +47,7 @@ LOSS_SENTENCES = {
     "stalled": "{} readings came while the device's counter stood still",
     "restarted": "how often the device began to count anew: {}",
     "saturated": "the device called {} readings invalid, as when it is saturated",
-    "doubtful": "the device told of a fault with {} readings: they are doubtful",
+    "doubtful": "the device reported a fault with {} readings: they are doubtful",
     "noted": "the status of {} readings says something, though nothing against their values",
     "off_units": "{} readings came when the device may have counted in other units already: they are doubtful",
     "off_rate": "how often the device's rate was found to be another than set, or than before: {}",
@@ -262,7 +262,7 @@ def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
         raise ValueError("its bytes do not give the CRC-32 stored with them")
     block = block_from_blobs(columns)
     if len(block) != readings or ends != [column[i] for column in (block.sequence, block.counter) for i in (0, -1)]:
-        raise ValueError("its readings are not those its row tells of")
+        raise ValueError("its readings are not those that its row describes")
     return block
 
 

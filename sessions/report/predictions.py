@@ -93,7 +93,7 @@ def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
             warned[_NUMBER.sub("#", sentence)].append(sentence)
     return (
         *facts,
-        *(Fact("warning", same[0], f"the first of {len(same)} trials warned so") for same in warned.values()),
+        *(Fact("warning", same[0], f"the first of {len(same)} trials with this warning") for same in warned.values()),
     )
 
 

@@ -20,15 +20,15 @@ def robustness(report: Report) -> list[str]:
         _in_variant(
             report,
             Variant(other, "computed", "depth"),
-            f"At {other} strain the SED goes with the mean scores thus",
-            f"At {other} strain, which was not tried here, the sign of r may be another.",
+            f"At {other} strain, r of the SED with the mean scores",
+            f"At {other} strain, which was not tried here, the sign of r may differ.",
         ),
         _by_place(report),
         _in_variant(
             report,
             Variant(kind, "computed", "force"),
-            "Pressed by the force measured, and not to a depth, thus",
-            "Pressed by the force measured, which was not tried here, the sign of r may be another.",
+            "Under the measured normal force, and not at a given depth, r",
+            "Under the measured normal force, which was not tried here, the sign of r may differ.",
         ),
     ]
 
@@ -76,10 +76,10 @@ def _by_place(report: Report) -> str:
             low, high = _alike(known)
             told.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
     if not told:
-        return "What another place of the ending would say of the sign of r is not known here."
+        return "How the sign of r depends on the place of the ending is not known here."
     return (
-        f"An ending elsewhere along the skin, looked at up to {REACH:g} mm to each side, keeps the sign of r in "
-        f"{' and in '.join(told)} of its place, positive towards the tip."
+        f"The sign of r stays the same if the ending is moved along the skin (tried up to {REACH:g} mm to each side, "
+        f"positive towards the tip): in {' and in '.join(told)}."
     )
 
 

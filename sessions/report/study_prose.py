@@ -86,7 +86,7 @@ def _otherwise(one: DescriptorFindings, other: str) -> str:
     there = None if usual is None else replace(usual, kinematics=other)
     tried = next((found for found in one.paths if found.path == there), None)
     if tried is None:
-        return f"at {other} strain, which was not tried here, the sign may be another"
+        return f"at {other} strain, which was not tried here, the sign may differ"
     trials = plural(tried.trials, "trial")
     if tried.within is None or tried.low is None or tried.high is None:
         return f"at {other} strain {trials} of {len(one.points)} had a prediction, too few for a correlation"

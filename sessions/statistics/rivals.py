@@ -36,7 +36,7 @@ FIELDS: Mapping[str, str] = {
 }
 NAMES = (*RESPONSES, *FIELDS)
 _RESAMPLES = 10_000
-_NO_LINE = "without some surface the others fix no line"
+_NO_LINE = "without one of the surfaces the others do not determine a line"
 _LEAST_SUBJECTS = 3  # of a bootstrap over subjects, and of the jackknife beside it
 
 

@@ -175,14 +175,14 @@ def _with_intervals(analysis: Analysis) -> Analysis:
 
 
 def _tilt_assumed(analysis: Analysis) -> Iterable[Flaw]:
-    """Yield the note that too few presses tell the lean, where friction depends on it."""
+    """Yield the note that too few presses measure the tilt, where friction depends on it."""
     count, fewest = len(analysis.presses), analysis.settings.press.press_fewest
     if count < fewest and any(stroke.mu_dynamic is not None for stroke in analysis.strokes):
         prior = analysis.settings.systematic.tilt_prior
         sentence = (
-            f"{count or 'No'} press{'es' if count > 1 else ''} cannot tell how the face leans: intervals of friction "
-            f"allow for a standard deviation of {prior:g}° about each axis. Press {fewest} times without sliding to "
-            "narrow them."
+            f"The tilt of the face is not known from {count or 'no'} press{'' if count == 1 else 'es'}: intervals of "
+            f"friction assume a standard deviation of {prior:g}° about each axis. Press {fewest} times without sliding "
+            "to narrow them."
         )
         yield Flaw(FlawName.TILT_ASSUMED, sentence, "note")
 
@@ -260,7 +260,7 @@ def _pull(span: Span, zero: StrokeZero, context: _Context) -> Flaw | None:
         return None
     sentence = (
         f"Along {axis} the recording reaches {high:.3g} N pressing but {-low:.3g} N pulling, and a finger does not "
-        "pull: the normal axis is another one, or there is none; no stroke is told."
+        "pull: the normal axis is another one, or there is none; no stroke is reported."
     )
     return Flaw(FlawName.NORMAL_IMPLAUSIBLE, sentence, "refused")
 
@@ -329,7 +329,7 @@ def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: _Co
     gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
     turned = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
     ways = " (each way of a finger that turned without lifting is one)" if turned else ""
-    sentence = f"{len(strokes)} strokes{ways} in a trial that asks for {task}: the model gets {gets}."
+    sentence = f"{len(strokes)} strokes{ways} in a trial that asks for {task}: the model uses {gets}."
     yield Flaw(FlawName.SECOND_STROKE, sentence, "doubtful")
 
 
@@ -363,12 +363,12 @@ def _worth_measuring(
         gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
         if gaps:
             sentence = (
-                f"What presses from {start:.2f} to {stop:.2f} s goes on where readings are not sound "
-                f"({gaps[0].cause}): how long is not known, and nothing of it is measured."
+                f"The contact from {start:.2f} to {stop:.2f} s goes on into readings that are not sound "
+                f"({gaps[0].cause}): its length is not known, so it is not measured."
             )
             flaws.append(Flaw(gaps[0].cause, sentence, "doubtful"))
         else:
             what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
-            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is no stroke."
+            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is not a stroke."
             flaws.append(Flaw(name, sentence, "note"))
     return kept, flaws

@@ -1,7 +1,7 @@
 """Intervals of a stroke's numbers from sensor noise, zero, calibration and choice of window: a seeded block bootstrap.
 
 Readings within a tenth of a second are alike, so blocks of them are drawn again, not readings (Künsch 1989, Ann.
-Statist. 17:1217). Every repeat also draws how wrong calibration, lean of the face and zero may be, and where the
+Statist. 17:1217). Every repeat also draws how wrong calibration, tilt of the face and zero may be, and where the
 window may have begun and ended; the interval lies between two quantiles of what the repeats give.
 """
 
@@ -89,7 +89,7 @@ def _repeats(stroke: Stroke, number: int, settings: BootstrapSettings) -> Mappin
 
 
 def _agreement(stroke: Stroke, repeats: Mapping[str, Array]) -> float | None:
-    """Return the share of repeats whose heading lies within 60 degrees of the direction told, as the analysis asks."""
+    """Return the share of repeats whose heading lies within 60 degrees of the reported direction."""
     if stroke.direction is None or "heading" not in repeats:
         return None
     return float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))

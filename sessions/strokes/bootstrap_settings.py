@@ -20,9 +20,9 @@ class BootstrapSettings:
     gain_error: float = ASSUMED_GAIN_ERROR  # standard uncertainty of each axis' gain [-]
     gain_error_origin: str = "assumed"  # nobody stated it for this transducer; "set" where somebody did
     cross_talk: float = ASSUMED_GAIN_ERROR  # standard uncertainty of what each force shows of another [-]
-    tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is not levelled [degrees]
+    tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is not levelled [degrees]
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
-    tilt_origin: str = "assumed: too few presses tell it"
+    tilt_origin: str = "assumed: since too few presses measure it"
     tilt_from_presses: bool = False  # then the lean holds the cross-talk from N into the drag, too
     confidence: float = 0.95
     fewest_blocks: int = 4  # from which a spread is estimated
@@ -68,14 +68,14 @@ class BootstrapSettings:
         """What an interval is, for people."""
         return (
             f"{100 * self.confidence:g} % percentile interval of {self.repeats} block-bootstrap repeats (blocks of "
-            f"{self.block:g} s, neighbours being alike allowed for, seed {self.seed}): sensor noise, zero and its "
+            f"{self.block:g} s, widened for correlation between blocks, seed {self.seed}): sensor noise, zero and its "
             f"drift, calibration ({self.calibration}; cross-talk {100 * self.cross_talk:g} % of each other force), "
-            f"lean of the face ({self.leaning}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
+            f"tilt of the face ({self.leaning}), choice of window (ends up to {100 * self.inwards:g} % inwards)"
         )
 
     @property
     def leaning(self) -> str:
-        """The lean of the face that is not levelled, and its standard uncertainty, for people."""
+        """The tilt of the face that is not levelled, and its standard uncertainty, for people."""
         x, y = (f"{a:.2g} ± {error:.2g}°" for a, error in zip(self.tilt, self.tilt_error, strict=True))
         return f"{x} to +x and {y} to +y, {self.tilt_origin}"
 
@@ -89,16 +89,15 @@ class BootstrapSettings:
         """What the intervals hold of the numbers that are no plain means, for people."""
         low, high = (100 * share for share in self.slide_share)
         return {
-            "normal_force": "zero and its drift, calibration, choice of window; that the force changes along the "
-            "stroke is no uncertainty of its mean; of the tangential force likewise",
-            "heading": "noise, zero, choice of window, and gains of the axes that differ; not a transducer that is "
-            "turned; with it the share of repeats whose direction is the one told",
-            "onset": "the detector's rule repeated (a force that climbs as steeply crosses three standard deviations "
-            "of its noise between two readings, noise drawn anew), zero; a gain moves no instant; none where a person "
-            "decided it",
-            "break_away": "deviations from the fitted climb turned at random (wild bootstrap, the same blocks), zero, "
-            "and where the fit ends; a gain moves no instant; none where a person decided it",
-            "slide_onset": f"a range rather: any share of the steady speed may tell it, {low:g} to {high:g} %, with "
-            "noise and unevenness of the speed; where the finger slid as fast when its speed was first known, any "
-            "instant since the contact; none where a person decided it",
+            "normal_force": "zero and its drift, calibration, choice of window, for the tangential force too; how the "
+            "force varies along the stroke is not an uncertainty of its mean",
+            "heading": "noise, zero, choice of window, and unequal gains of the axes, but not a rotated "
+            "transducer; beside it the share of repeats with the reported direction",
+            "onset": "the zero, and the detector repeated with fresh noise on a force that rises as steeply; a gain "
+            "does not move an instant; no interval where a person decided the instant",
+            "break_away": "wild bootstrap of the residuals of the fitted rise (the same blocks), zero, and the end of "
+            "the fit; a gain does not move an instant; no interval where a person decided the instant",
+            "slide_onset": f"a range of thresholds from {low:g} to {high:g} % of the steady speed, with noise and "
+            "variation of the speed; from the contact on where the finger already slid when its speed was first known; "
+            "no interval where a person decided the instant",
         }

@@ -16,9 +16,9 @@ def doubtful_readings(recording: Recording) -> Iterator[str]:
         count.take(block.status)
     words = flagged_words(count.flagged)
     if faulty := count.verdicts["doubtful"]:
-        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device told of a fault: {words}"
+        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device reported a fault: {words}"
     if saturated := count.verdicts["saturated"]:
-        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device told: {words}"
+        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device reported: {words}"
     if unsure := sum(event.data.get("off_units", 0) for event in recording.events if event.kind == "losses"):
         yield (
             f"{FlawName.RECORDING}: the last {unsure} readings of a stream are doubtful, the device was found to "

@@ -208,7 +208,7 @@ class AnalysisSettings:
     confidence: float = 0.95
     gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
     bootstrap_seed: int = 0  # of the intervals drawn
-    tilt: tuple[float, float] = (0.0, 0.0)  # lean of the face's normal to +x and +y that is levelled [degrees]
+    tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is levelled [degrees]
 
     @property
     def gain_uncertainty(self) -> float:

@@ -170,7 +170,8 @@ def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
         )
         if clipped:
             sentence += (
-                "and never goes beyond it: clipped. These readings are left out, and no peak that they hide is told."
+                "and never goes beyond it: clipped. These readings are left out, and peaks that they may hide are not "
+                "given."
             )
             flaws.append((FlawName.SATURATED, sentence, "doubtful"))
         else:
@@ -188,20 +189,20 @@ def _wild_flaws(wild: Mask, time: Array) -> _Found:
     count = int(at.sum())
     sentence = (
         f"{count} {'reading stands' if count == 1 else 'readings stand'} far beyond everything around on {axes}, first "
-        f"at {time[at][0]:.3f} s: wild, and left out before anything is filtered."
+        f"at {time[at][0]:.3f} s: spikes, which are left out before filtering."
     )
     return [(FlawName.WILD, sentence, "doubtful")]
 
 
 def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _Found:
-    """Name the faults that the device told of."""
+    """Name the faults that the device reported."""
     faulty = table.faulty(block.status)
     if not faulty.any():
         return []
     count = StatusCount(table)
     count.take(block.status[faulty])
     sentence = (
-        f"{int(faulty.sum())} readings came while the device told of a fault, first at {block.time[faulty][0]:.2f} s: "
+        f"{int(faulty.sum())} readings came while the device reported a fault, first at {block.time[faulty][0]:.2f} s: "
         f"{flagged_words(count.flagged)}; they are doubtful and left out."
     )
     return [(FlawName.DEVICE_FAULT, sentence, "doubtful")]

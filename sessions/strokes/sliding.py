@@ -273,12 +273,12 @@ def _speed_trouble(
     way = motion.speed * float(track.time[window.stop - 1] - track.time[window.start])
     step = span.torque_step / float(np.nanmean(track.normal[window]))
     if step > settings.slide.speed_step * way:
-        return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is told."
+        return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is given."
     if motion.error > settings.slide.speed_error * motion.speed:
-        return name, f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s: no speed is told."
+        return name, f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s: no speed is given."
     if motion.explained < settings.slide.speed_line:
         share = 100 * motion.explained
-        return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is told."
+        return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is given."
     if frame.height_origin == "default":
         lever = movement(
             track.time[window], -track.wrench[window, :2] / track.normal[window, None], track.rate, settings

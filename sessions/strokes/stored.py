@@ -53,7 +53,7 @@ def check_analysis(document: Mapping[str, Any]) -> None:
         raise SettingsError("it has intervals of another number of strokes")
     beyond = [row.stroke for row in analysis.friction if not 0 <= row.stroke < len(analysis.strokes)]
     if beyond:
-        raise SettingsError(f"it tells the friction of stroke {beyond[0]}, which it does not hold")
+        raise SettingsError(f"it gives the friction of stroke {beyond[0]}, which it does not hold")
     settings = {**_DEFAULTS, **analysis.bootstrap.settings}
     complete({"settings": settings}, _Settings)
     from_table(settings, BootstrapSettings, "bootstrap")

@@ -61,7 +61,7 @@ class Stroke:
     # Along +x of the face frame is +1.
     direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back, as measured")]
     # "centre of pressure", "tangential force" or "decision"
-    direction_from: Annotated[str | None, Meaning("", "what the direction was told from")]
+    direction_from: Annotated[str | None, Meaning("", "what the direction was derived from")]
     heading: Annotated[
         float | None, Meaning("deg", "angle of the movement, or else of the drag, from +x towards +y of the face")
     ]

@@ -142,7 +142,7 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact, settings: Anal
     wild = [gap for gap in inside if gap.cause is FlawName.WILD]
     if wild:
         sentence = (
-            f"A wild reading at {wild[0].start:.2f} s of this stroke was left out: hold its numbers against its curve."
+            f"A wild reading at {wild[0].start:.2f} s of this stroke was left out: compare its numbers with its curve."
         )
         findings.flaw(FlawName.WILD, sentence, "doubtful")
 
@@ -165,7 +165,7 @@ def _judge_loads(findings: Findings, track: Track, contact_area: float, settings
         )
         findings.flaw(FlawName.TOO_LITTLE_FORCE, sentence, "refused", (*COEFFICIENTS, *SPEED, *DIRECTION))
     if peak > settings.contact.greatest_force:
-        sentence = f"The normal force reaches {peak:.3g} N, which is no finger's: check the units of the forces."
+        sentence = f"The normal force reaches {peak:.3g} N, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
     with np.errstate(invalid="ignore"):

@@ -136,7 +136,7 @@ def test_verify_names_a_changed_reading_whose_check_sums_were_made_to_fit(sessio
     assert run(["verify", str(session), "--json"]) == 3
     problems = printed(capsys)["problems"]
     assert any(problem.startswith(f"{column} of the readings") and "session.h5" in problem for problem in problems)
-    assert f"sha256.columns.{column} of session.json is not what the live file tells" in problems
+    assert f"sha256.columns.{column} of session.json differs from the live file" in problems
 
 
 @pytest.mark.parametrize("content", ["{", "[]", '{"options": {"course": 7}}', '{"options": []}', "nothing"])

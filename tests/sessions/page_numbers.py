@@ -29,7 +29,7 @@ BARE = {
     "found",
     "geometric mean",
     "at one modulus",
-    "SED's r less this",
+    "r of SED minus this",
     "r given the model's µ",
 }
 # Correlations have no unit; a row of effects has a column for its own; magnitude estimates have the subject's own.

@@ -274,7 +274,7 @@ def test_the_model_gets_the_stroke_decided_and_never_one_that_was_left_out():
     chosen = decided(choose, raw=both, t=t)
     assert chosen.friction[0].mu == pytest.approx(0.6, rel=0.01)
     assert chosen.friction[0].stroke == 1
-    assert any("gets the one numbered 2" in flaw.sentence for flaw in chosen.flaws)
+    assert any("uses the one numbered 2" in flaw.sentence for flaw in chosen.flaws)
     left = decided(choose, drop, raw=both, t=t)
     assert left.friction[0].mu == pytest.approx(0.4, rel=0.01)
     assert any(flaw.name == "decision" and "left out" in flaw.sentence for flaw in left.flaws)

@@ -240,7 +240,7 @@ def test_the_headline_says_whether_the_other_strain_was_tried_and_what_it_gave()
     plain = pooled(VISITS[:4])
     untried = summary(plain)[1]
     assert "at small strain go together by r = " in untried
-    assert untried.endswith("at finite strain, which was not tried here, the sign may be another.")
+    assert untried.endswith("at finite strain, which was not tried here, the sign may differ.")
     turned = [
         replace(
             v,

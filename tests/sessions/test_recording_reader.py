@@ -103,7 +103,7 @@ def test_a_missing_block_is_named(tmp_path):
 def test_a_row_that_tells_of_other_readings_than_it_holds_is_named(tmp_path):
     folder = ended(tmp_path / "s")
     change(folder, "UPDATE blocks SET sequence_last = 7 WHERE number = 3")
-    assert "not those its row tells of" in Recording.open(folder).losses[0]
+    assert "not those that its row describes" in Recording.open(folder).losses[0]
 
 
 def test_a_changed_and_a_missing_event_are_named_and_the_others_read(tmp_path):

@@ -215,7 +215,7 @@ def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
     warned = [fact.value for fact in report.left_out if fact.name == "warning"]
     assert len({re.sub(r"[\d.]+", "#", sentence) for sentence in warned}) == len(warned)
     (checks,) = [fact.value for fact in report.modelled if fact.name == "audits"]
-    assert "smallest volume, of what it was: 0." in checks
+    assert "smallest volume ratio: 0." in checks
     assert "det F" not in checks
     text = page(report)
     assert "What was modelled, and what was left out" in text

@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     rows, courses = [_row(one) for one in analysis.intervals], [_course(one) for one in analysis.intervals]
     if any(end != "–" for row in (*rows, *courses) for end in row[1:]):
         console.say(f"\n{analysis.bootstrap.kind}:", table(rows, head=INTERVALS))
-        console.say("\nof the same repeats; same way: share of them with the direction told:")
+        console.say("\nfrom the same repeats; same way: share of repeats with the reported direction:")
         console.say(table(courses, head=COURSES))
         console.say(*(f"  {name.replace('_', ' ')}: {kind}" for name, kind in analysis.bootstrap.kinds.items()))
     if analysis.tilt is not None:

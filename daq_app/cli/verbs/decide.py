@@ -105,7 +105,7 @@ def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
     if given:
         return Decision(options.by, options.why, "tilt", new=(given[0], given[1]))
     if analysis.tilt is None:
-        raise DecisionError("nothing pressed without sliding, so no tilt is told: give two angles after --tilt")
+        raise DecisionError("nothing pressed without sliding, so the tilt is not known: give two angles after --tilt")
     return Decision(options.by, options.why, "tilt", new=analysis.tilt.lean)
 
 

@@ -323,4 +323,4 @@ def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> tuple[Grou
 
 
 def _depth(p: PredictionFinding, notes: Notes) -> Cell:
-    return notes.number(p.indentation, lambda v: f"{v:g}", "no plan tells how deep the model is to press")
+    return notes.number(p.indentation, lambda v: f"{v:g}", "no plan says how deep the model is pressed")

@@ -24,8 +24,8 @@ def rivals_table(compared: Compared, quantity: str, model: str) -> Table | None:
     """
     caption = (
         f"r of scores with the {quantity} ({model}) and with what was measured. Differences: with both r made "
-        "positive; Zou (2007), Steiger (1980), within subjects by bootstrap. Left-out error: of surfaces left out, "
-        "root mean square. AIC: crossed mixed models. Exploratory, not corrected."
+        "positive; Zou (2007), Steiger (1980), within subjects by bootstrap. Left-out error: root mean "
+        "square over surfaces left out. AIC: crossed mixed models. Exploratory, not corrected."
     )
     return _table("table-rivals", caption, compared, quantity, lambda name: name == quantity or name not in RESPONSES)
 
@@ -43,7 +43,7 @@ def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: 
         for name, rivals in compared
     ]
     columns = (
-        f"quantity | n | r | {quantity}'s r less this | Steiger's Z | p | r given the model's µ | "
+        f"quantity | n | r | r of {quantity} minus this | Steiger's Z | p | r given the model's µ | "
         "left-out error [0–100] | AIC weight"
     )
     return table(anchor, caption, columns, groups, notes)

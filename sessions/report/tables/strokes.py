@@ -10,13 +10,13 @@ Told = Callable[[float], str]
 
 _TOO_SHORT = "the stroke has too few readings"
 _WITHOUT = {
-    "onset": "the force had left its noise before, or too few readings tell how large that is",
-    "break_away": "too few readings tell how T/N climbs",
-    "slide_onset": "too few readings tell the speed",
+    "onset": "the force had left its noise before, or too few readings measure its noise",
+    "break_away": "too few readings to fit the rise of T/N",
+    "slide_onset": "too few readings to measure the speed",
 }
 _MISSING = {
-    "break_away": "the ratio does not climb before the slide, so there is no stick phase, or climbs on while it slides",
-    "slide_onset": "nothing tells when the slide begins",
+    "break_away": "T/N does not rise before the slide, so there is no stick phase, or rises on while it slides",
+    "slide_onset": "the start of the slide cannot be determined",
 }
 _OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_onset"}
 
@@ -83,7 +83,7 @@ def course_table(report: Report) -> Table | None:
     caption = (
         "Forces, direction and instants of the strokes, each over its interval from the same repeats. Forces: means "
         "over the steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share "
-        "of repeats with the direction told. Onset: where N leaves its noise. Break-away: where T/N stops climbing. "
+        "of repeats with the reported direction. Onset: where N leaves its noise. Break-away: where T/N stops rising. "
         "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
         f"{kinds}."
     )
