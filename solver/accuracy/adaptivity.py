@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
-from solver.continuation.finite_states import course, depends_on_way, nearby, roughly, settled
+from solver.continuation.finite_states import nearby, roughly, settled
 from solver.equilibrium.finger import FiniteFinger, forces_of, sliding_load
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import end, march
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -97,7 +97,7 @@ def coarse_solution(
     beyond = False
     try:
         low = meshes.coarse(scene, sizing, stop)
-        if low.finger.runs_out(low.shape):
+        if low.shape.reaches_end:
             sizing = replace(sizing, margin=WIDER)
             low = meshes.coarse(scene, sizing, stop)
         if sound(low.finger, low.shape):
@@ -126,7 +126,7 @@ def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], meshes: Meshe
     finger = meshes.finger(scene, sizing)
     setup = perf_counter() - begun
     shape = settled(finger, scene, stop)
-    if sizing.margin < WIDER and finger.runs_out(shape):
+    if sizing.margin < WIDER and shape.reaches_end:
         return _plain(scene, replace(sizing, margin=WIDER), stop, meshes)
     return MeshSolution(finger, sizing, shape, setup)
 
@@ -141,8 +141,8 @@ def _on_coarse(
     try:
         slide = roughly(finger, scene.undragged(), stop, near)
     except SolveFailure:
-        return course(scene, finger, stop).last  # the drag may be met before sliding would fold the skin
-    return slide if drag >= NEARLY * abs(slide.force[0]) else course(scene, finger, stop).last
+        return march(scene, finger, stop=stop).last  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger, stop=stop).last
 
 
 def refine(
@@ -152,7 +152,7 @@ def refine(
     steps = steps_asked(scene, low.finger, stop, low.shape)
     sizing = replace(low.sizing, fineness=fineness)
     top = solution_on(scene, sizing, low, stop, meshes, 1 if steps is None else steps.times)
-    if top.sizing.margin < WIDER and top.finger.runs_out(top.shape):
+    if top.sizing.margin < WIDER and top.shape.reaches_end:
         wider = replace(sizing, margin=WIDER)
         top = solution_on(scene, wider, low, stop, meshes, 1 if steps is None else steps.times)
     return NestedSolution(low, top, steps)
@@ -196,46 +196,16 @@ def on_nested(
     begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
     try:
-        if depends_on_way(scene, top.shape):
+        if top.shape.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
                 judged = steps_asked(scene, top.finger, stop, top.shape)
                 steps = None if judged is None else replace(judged, times=1)
-            shape = end(finger, scene, stop)
+            shape = end(scene, finger, stop=stop)
         else:
             steps = None
             shape = nearby(finger, scene, begun.shape, stop) or settled(finger, scene, stop, begun.shape)
     except SolveFailure:
         return None, steps
-    given = None if relaxes(scene) else forces_of(scene, shape.load)
+    given = None if scene.viscoelastic else forces_of(scene, shape.load)
     (values,), (changes,) = edge_changes(finger.newton, [(shape, given)], finger.numbers_and_row)
     return nested_numbers(values, changes, steps), steps
-
-
-def relaxes(scene: Scene) -> bool:
-    """Return whether the course of a scene is marched in time."""
-    return scene.materials.relax and scene.solve.course == "history"
-
-
-def end(finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], times: float = 1.0) -> EquilibriumState:
-    """Return the end of a course, in so many `times` the usual load steps. Raises NotConverged, Cancelled."""
-    if relaxes(scene):
-        return march(scene, finger, times, relaxing=True, stop=stop).last
-    return course(scene, finger, stop, times).last
-
-
-def steps_asked(
-    scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], shape: EquilibriumState | None = None
-) -> Steps | None:
-    """Return the load steps that a scene asks for, judged on a mesh, on which it may have led to `shape` already.
-
-    None where that is a settled slide. Raises NotConverged, Cancelled.
-    """
-    usual = end(finger, scene, stop) if shape is None else shape
-    if not depends_on_way(scene, usual):
-        return None
-
-    def after(times: float) -> EquilibriumState:
-        settled_only = shape is not None and relaxes(scene)
-        return usual if times == 1.0 and not settled_only else end(finger, scene, stop, times)
-
-    return Steps.asked(after, finger.all_numbers, scene.solve.tolerance)

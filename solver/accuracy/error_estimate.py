@@ -22,6 +22,10 @@ import numpy as np
 
 from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
+from solver.body.receptor import Patches
+from solver.equilibrium.finger import Finger
+from solver.equilibrium.load_path import end
+from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response
 from solver.quantities import NAMES
@@ -66,16 +70,6 @@ class Steps:
         times = min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST)
         return Steps(times, excess.mean(axis=0), bound)
 
-    @staticmethod
-    def asked(
-        end: Callable[[float], EquilibriumState],
-        numbers: Callable[[Sequence[EquilibriumState]], Array],
-        tolerance: float | None,
-    ) -> "Steps":
-        """Return those that a tolerance asks for; `end` returns that of the course in so many times the usual steps."""
-        usual, *fewer = numbers([end(times) for times in (1.0, *PARTS.tolist())])
-        return Steps.of(usual, np.array(fewer), tolerance)
-
     @property
     def error(self) -> Array:
         """By how much numbers may be off for not taking more steps (c,)."""
@@ -86,14 +80,28 @@ class Steps:
         return usual - (1.0 - 1.0 / self.times) * self.excess
 
 
-def times_on_way(scene: Scene, asked: Callable[[Scene], Steps | None]) -> int:
+def steps_asked(
+    scene: Scene, finger: Finger[Patches], stop: Callable[[], bool] = never, settled: EquilibriumState | None = None
+) -> Steps | None:
+    """Return the load steps that a scene asks for, judged on one mesh, whose `settled` state may be known.
+
+    None where that does not depend on its way. Raises SolveFailure, Cancelled.
+    """
+    if settled is not None and not settled.load.path_dependent:
+        return None
+    ends = [end(scene, finger, 1.0, stop) if settled is None or scene.viscoelastic else settled]
+    usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part, stop) for part in PARTS.tolist()])
+    return Steps.of(usual, np.array(fewer), scene.solve.tolerance)
+
+
+def steps_of_press(scene: Scene, finger: Finger[Patches], stop: Callable[[], bool] = never) -> int:
     """Return how many times the usual load steps a history takes whose end does not depend on them.
 
-    Those that a tolerance asks for at the end of its press; `asked` returns the steps of that. Raises as it does.
+    Those that a tolerance asks for at the end of its press. Raises as `steps_asked`.
     """
     if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
         return 1
-    steps = asked(scene.pressed_only())
+    steps = steps_asked(scene.pressed_only(), finger, stop)
     return 1 if steps is None else steps.times
 
 

@@ -15,7 +15,7 @@ from solver.continuation.existence import APART, Reach, all_at_the_bound, of_dep
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger, sliding_load
-from solver.equilibrium.load_path import Way, march
+from solver.equilibrium.load_path import march
 from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
@@ -54,7 +54,7 @@ def settled(
     if scene.normal_force is not None:
         return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop, times).last
+        return march(scene, finger, times, stop=stop).last
     return steady(finger, sliding_load(scene), start=start, stop=stop)
 
 
@@ -111,11 +111,11 @@ def _settled_under(
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
     direction, drag = scene.loading.direction, scene.tangential_force
     if direction == 0 and scene.friction.mu > 0.0:
-        return course(scene, finger, stop, times).last
+        return march(scene, finger, times, stop=stop).last
     if start is not None and start.load.sense == 0:  # the end of a course, and no slide to start from
         start = None
         try:
-            return course(scene, finger, stop, times).last
+            return march(scene, finger, times, stop=stop).last
         except NotConverged:
             pass
     try:
@@ -123,13 +123,13 @@ def _settled_under(
     except SolveFailure as failure:
         if drag is None:
             raise _under_force(scene, force, failure) from failure
-        return course(scene, finger, stop, times).last  # the drag may be met before sliding would fold the skin
+        return march(scene, finger, times, stop=stop).last  # the drag may be met before sliding would fold the skin
     most = abs(float(slides.force[0]))
     if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
         return slides
     if drag > most:
         raise beyond_friction(drag, most, force)
-    return course(scene, finger, stop, times).last
+    return march(scene, finger, times, stop=stop).last
 
 
 def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFailure:
@@ -235,21 +235,6 @@ def _risen_to(
     return shape
 
 
-def depends_on_way(scene: Scene, shape: EquilibriumState) -> bool:
-    """Return whether a state is the end of a course and not a settled slide, found directly."""
-    return shape.load.sense == 0 and scene.friction.mu > 0.0
-
-
-def course(scene: Scene, finger: FiniteFinger, stop: Callable[[], bool], times: float = 1.0) -> Way:
-    """Return the way from first touch to the last settled slide, or to the end of the press or drag.
-
-    `times` the usual load steps are taken.
-    """
-    for leg in scene.earlier_slides():  # one that never settles is refused with its limits
-        settled(finger, leg, stop)
-    return march(scene, finger, times, stop=stop)
-
-
 def steady_body(
     whole: FiniteBody,
     load: LoadState,
@@ -298,4 +283,4 @@ class _OwnBody:
 
     def spoilt(self, shape: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        return bool(shape.touching[[0, -1]].any()) or self.body.smallest_det(shape.u) < FORCE_SEARCH.crushed
+        return shape.reaches_end or self.body.smallest_det(shape.u) < FORCE_SEARCH.crushed

@@ -14,18 +14,16 @@ from math import log2, sqrt
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
-from solver.equilibrium.finger import LinearFinger, forces_of, load_of, settled_moduli, sliding_load
+from solver.equilibrium.finger import LinearFinger, forces_of, settled_moduli, sliding_load
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
-from solver.equilibrium.load_path import Instant, RelaxingWay, march
+from solver.equilibrium.load_path import march
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.failures import ContactLost, NoSteadyState, NotConverged, beyond_friction
 from solver.mesh.mesher import Sizing, finger_mesh
-from solver.progress import Progress, report_part
 from solver.scene.scene import Scene
 from solver.tolerances import ALL_SLIPS
 
@@ -68,7 +66,7 @@ def continue_branch(
         except ContactLost:
             step /= 2.0
             continue
-        if found.touching[0] or found.touching[-1]:  # the skin that may touch ends: what lies beyond is not known
+        if found.reaches_end:  # the skin that may touch ends: what lies beyond is not known
             step, unknown = step / 2.0, first is not None
             continue
         if first is not None and not found.load.depth > 0.0:  # pressed by a surface that it does not reach
@@ -223,7 +221,7 @@ def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState
 def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether a settled slide under a given force would be less deep under a little more force."""
     force = scene.normal_force
-    if force is None or scene.loading.direction == 0 or (state.state == STICK).any():
+    if force is None or scene.loading.direction == 0 or state.load.path_dependent:
         return False
     try:
         beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
@@ -239,28 +237,6 @@ def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
         with suppress(ContactLost):
             most = float(full_slip(finger.newton, sliding_load(scene)._replace(depth=room)).force[1])
     within_reach(scene, depth, most)
-
-
-def depends_on_way(scene: Scene, state: EquilibriumState) -> bool:
-    """Return whether a state is the end of a course and not a settled slide."""
-    pressed = scene.loading.direction == 0 and not load_of(scene).frictionless
-    return pressed or bool((state.state == STICK).any())
-
-
-def marched(
-    scene: Scene, finger: LinearFinger, progress: Progress | None = None, times: float = 1.0
-) -> tuple[tuple[Instant, ...], Array | None]:
-    """Return the whole way, and where tissues relax the SED of ending and point at each instant (m, 2) [MPa]."""
-    way = march(
-        scene, finger, times, relaxing=scene.materials.relax, report=lambda _, part: report_part(progress, part)
-    )
-    over_time = np.array([(0.0, 0.0), *way.energies]) if isinstance(way, RelaxingWay) else None
-    return tuple(way.instants), over_time
-
-
-def end(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
-    """Return the end of a course that it depends on. Raises NotConverged."""
-    return march(scene, finger, times, relaxing=scene.materials.relax and scene.solve.course == "history").last
 
 
 def refined(
@@ -311,8 +287,8 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
     direction = scene.loading.direction
     try:
         state = settled(scene, finger, times)
-        on_way = direction == 0 or bool((state.state == STICK).any())
-        if on_way or not _folded(finger, state):
+        # in states that no sliding leads to tissue is turned inside out somewhere
+        if direction == 0 or state.load.path_dependent or finger.body.smallest_det(finger.displacement(state)) > 0.0:
             return state
         why = "the state found is folded"
     except ContactLost as lost:
@@ -328,21 +304,11 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
     return reached
 
 
-def _folded(finger: LinearFinger, state: EquilibriumState) -> bool:
-    """Return whether tissue is turned inside out somewhere, as in states that no sliding leads to."""
-    return finger.body.smallest_det(finger.displacement(state)) <= 0.0
-
-
-def _pressed(scene: Scene) -> str:
-    """Say how hard or deep the finger is pressed."""
-    force = scene.normal_force
-    return f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
-
-
 def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
     """Return the failure that says what is known."""
-    mu = float(scene.friction.mu)
-    at = f"{_pressed(scene)} and mu = {mu:g}"
+    force = scene.normal_force
+    at = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
+    at += f" and mu = {float(scene.friction.mu):g}"
     if scene.friction.tau_max is not None:
         at += f" with tau_max = {scene.friction.tau_max:g} MPa"
     if scene.loading.direction == 0 or limit_mu <= 0.0:
@@ -355,7 +321,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"
-    given = "at this depth" if scene.normal_force is None else "under this force"
+    given = "at this depth" if force is None else "under this force"
     message = (
         f"There is no steady sliding along {along} at {at}: the drag presses the finger against the surface faster "
         f"than it yields, so it wedges; followed from mu = 0, steady sliding {given} ends at mu = {limit_mu:.3g}"

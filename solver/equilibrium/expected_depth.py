@@ -100,5 +100,4 @@ def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: f
         found = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:
         return None
-    inside = not (found.touching[0] or found.touching[-1])
-    return found if inside and found.load.depth <= deepest else None
+    return None if found.reaches_end or found.load.depth > deepest else found

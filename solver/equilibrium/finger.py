@@ -1,11 +1,11 @@
 """The finger as the solver sees it: a mesh, Newton's iterations on its body, its endings. One serves many surfaces."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
-from typing import Generic, TypeVar
+from typing import Any, Generic, Self, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -42,6 +42,25 @@ class Finger(ABC, Generic[Placed]):
     geometry: FingerMesh
     newton: Newton
     body: Body
+
+    @classmethod
+    def of(cls, scene: Scene, sizing: Sizing) -> Self:
+        """Mesh the finger of `scene`, whose friction and loading do not matter here.
+
+        Raises SceneError where the outline cannot be meshed, NotConverged where round-off has swallowed its stiffness.
+        """
+        try:
+            return cls.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
+        except MeshError as bad:
+            radius = scene.finger.tip_radius
+            raise SceneError("finger.tip_radius", radius, f"no mesh fits this finger ({bad})") from bad
+        except LinAlgError as bad:
+            raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
+
+    @classmethod
+    @abstractmethod
+    def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
+        """Do the same on a mesh of the finger that was made before."""
 
     @abstractmethod
     def patches(self, placed: Endings) -> Placed:
@@ -141,25 +160,12 @@ class LinearFinger(Finger[LinearPatches]):
     body: LinearBody
     solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
 
-    @staticmethod
-    def of(scene: Scene, sizing: Sizing) -> "LinearFinger":
-        """Mesh and reduce the finger of `scene`, whose friction and loading do not matter here.
-
-        Raises SceneError where the outline cannot be meshed, NotConverged where round-off has swallowed its stiffness.
-        """
-        try:
-            return LinearFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
-        except MeshError as bad:
-            raise _not_meshed(scene, bad) from bad
-        except LinAlgError as bad:
-            raise NotConverged(f"Round-off has swallowed the finger's stiffness ({bad}): {MIXED} do that.") from bad
-
-    @staticmethod
-    def on(scene: Scene, geometry: FingerMesh) -> "LinearFinger":
-        """Do the same on a mesh of the finger that was made before."""
+    @classmethod
+    def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
+        """Do as `Finger` says."""
         begun = perf_counter()
         body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
-        return LinearFinger(scene, geometry, Newton(body.condensed), body, perf_counter() - begun)
+        return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - begun)
 
     @property
     def centred(self) -> Centred:
@@ -188,7 +194,7 @@ class LinearFinger(Finger[LinearPatches]):
         may = np.zeros(len(displacement), bool)
         may[self.geometry.mesh.skin] = True
         may = may[whole]
-        ends = bool(state.touching[0] and may[0] == 0) or bool(state.touching[-1] and may[-1] == 0)
+        ends = bool(state.touching[0] and not may[0]) or bool(state.touching[-1] and not may[-1])
         return ends or bool((below & ~may).any())
 
 
@@ -198,19 +204,11 @@ class FiniteFinger(Finger[FinitePatches]):
 
     body: FiniteBody
 
-    @staticmethod
-    def of(scene: Scene, sizing: Sizing) -> "FiniteFinger":
-        """Mesh the finger of `scene`. Raises SceneError where its outline cannot be meshed."""
-        try:
-            return FiniteFinger.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
-        except (MeshError, LinAlgError) as bad:
-            raise _not_meshed(scene, bad) from bad
-
-    @staticmethod
-    def on(scene: Scene, geometry: FingerMesh) -> "FiniteFinger":
-        """Do the same on a mesh of the finger that was made before."""
+    @classmethod
+    def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
+        """Do as `Finger` says."""
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
-        return FiniteFinger(scene, geometry, Newton(body.condensed), body)
+        return cls(scene, geometry, Newton(body.condensed), body)
 
     @property
     def centred(self) -> Centred:
@@ -223,13 +221,9 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `shape`, found on `other`, as a start on this mesh."""
-        return self.bridge(other).carried(shape)
-
-    def bridge(self, other: "FiniteFinger") -> MeshTransfer:
-        """Return the way here from the mesh of `other`, made when first asked for."""
         if other not in self._bridges:
             self._bridges[other] = MeshTransfer.of(other.places, self.places)
-        return self._bridges[other]
+        return self._bridges[other].carried(shape)
 
     @cached_property
     def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":
@@ -240,29 +234,18 @@ class FiniteFinger(Finger[FinitePatches]):
         """Where nodes and quadrature points lie, for states that are carried."""
         return Places.of(self.geometry, self.body)
 
-    def runs_out(self, shape: EquilibriumState) -> bool:
-        """Return whether contact reaches an end of the skin that is looked at."""
-        return bool(shape.touching[[0, -1]].any())
-
     def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        geometry, first = self.geometry, self._first
-        return SkinCompression(
-            *skin_loops.pinched(geometry.mesh.nodes, shape.u, geometry.whole, geometry.loose, shape.state, first)
-        )
-
-    @cached_property
-    def _first(self) -> int:
-        """The first node of the whole skin that may touch."""
-        return int(np.searchsorted(self.geometry.whole, self.geometry.mesh.skin)[0])
+        at = self.geometry
+        touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first of it that may touch
+        return SkinCompression(*skin_loops.pinched(at.mesh.nodes, shape.u, at.whole, at.loose, shape.state, touchable))
 
     def crosses(self, shape: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         return skin_loops.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
 
 
-def _not_meshed(scene: Scene, why: Exception) -> SceneError:
-    return SceneError("finger.tip_radius", scene.finger.tip_radius, f"no mesh fits this finger ({why})")
+KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics
 
 
 def settled_moduli(materials: Materials) -> list[Moduli]:
@@ -302,8 +285,8 @@ def sliding_load(scene: Scene) -> LoadState:
 
 def forces_of(scene: Scene, load: LoadState) -> Given | None:
     """Return the forces that a scene gives to a state under `load`, None where it gives a depth."""
-    if scene.normal_force is None:
+    force, drag = scene.normal_force, scene.tangential_force
+    if force is None:
         return None
-    holds = scene.tangential_force is not None and load.sense == 0 and not load.frictionless
-    drag = -scene.loading.direction * scene.tangential_force if holds and scene.tangential_force is not None else None
-    return Given(scene.normal_force, drag, load.travel)
+    held = None if drag is None or not load.path_dependent else -scene.loading.direction * drag
+    return Given(force, held, load.travel)

@@ -202,6 +202,13 @@ def march(
     return way
 
 
+def end(
+    scene: Scene, finger: Finger[Patches], times: float = 1.0, stop: Callable[[], bool] = never
+) -> EquilibriumState:
+    """Return the end of the course of a scene, in so many `times` the usual load steps. Raises as `march`."""
+    return march(scene, finger, times, relaxing=scene.viscoelastic, stop=stop).last
+
+
 def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
     """Return the usual steps of the courses of a finger."""
     return SMALL if isinstance(finger, LinearFinger) else RELAXING if relaxing else FINITE

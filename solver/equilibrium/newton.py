@@ -76,6 +76,11 @@ class LoadState(NamedTuple):
         """Whether no tangential force is possible."""
         return self.mu == 0.0 or self.tau == 0.0
 
+    @property
+    def path_dependent(self) -> bool:
+        """Whether a state depends on the way to it: friction on each node then opposes how that node moved last."""
+        return self.sense == 0 and not self.frictionless
+
     def checked(self) -> "LoadState":
         """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
         law = FrictionLaw(float(self.mu), float(self.tau))
@@ -137,6 +142,11 @@ class EquilibriumState:
     def touching(self) -> NDArray[np.bool_]:
         """Which nodes touch, (k,)."""
         return self.state != OPEN
+
+    @property
+    def reaches_end(self) -> bool:
+        """Whether contact reaches an end of the skin that may touch, beyond which nothing is looked at."""
+        return bool(self.touching[[0, -1]].any())
 
     @property
     def sticking(self) -> float:

@@ -1,6 +1,5 @@
 """From a state of a finger to its prediction: numbers with errors, skin, history, and what was left out."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +11,8 @@ from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
-from solver.equilibrium.finger import Finger
-from solver.equilibrium.load_path import Instant
+from solver.equilibrium.finger import Finger, LinearFinger
+from solver.equilibrium.load_path import Instant, RelaxingWay, Way
 from solver.equilibrium.newton import EquilibriumState
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.scene.scene import Scene
@@ -28,10 +27,15 @@ class Solved:
     displacement: Array  # (nodes, 2) [mm]
     audits: dict[str, float]
     steps: Steps | None  # of a course, where the state depends on its way
-    history: History | None
-    warnings: tuple[str, ...]  # of this kinematics alone
-    wall_s: float
-    setup_s: float
+    way: Way | None  # of a course that was asked for
+    warnings: tuple[str, ...] = ()  # of this kinematics alone
+    wall_s: float = 0.0
+    setup_s: float = 0.0
+
+    @property
+    def elastic_way(self) -> tuple[Instant, ...] | None:
+        """The way, where it can be drawn from forces alone: nothing relaxes on it."""
+        return None if self.way is None or isinstance(self.way, RelaxingWay) else tuple(self.way.instants)
 
 
 def prediction(
@@ -42,7 +46,7 @@ def prediction(
     sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
     driven = scene.driven(depth)
     left = model(driven, finger, state, solved.displacement, width)
-    held = holds(scene, state)
+    held = scene.loading.dragged and state.load.path_dependent  # a finger that slides may have shifted by anything
     numbers[4] = shift if held else 0.0
     off = errors(scene, numbers, nested, solved.steps)
     return Prediction(
@@ -74,14 +78,9 @@ def prediction(
         skin=skin_of(finger, state),
         geometry=finger.geometry,
         displacement=solved.displacement,
-        history=solved.history,
+        history=None if solved.way is None else history(scene, finger, solved.way),
         warnings=(*warnings(driven, left["left_out"]), *solved.warnings, *rounding(solved.audits)),
     )
-
-
-def holds(scene: Scene, state: EquilibriumState) -> bool:
-    """Return whether a given drag holds the bone at a shift; a finger that slides may have shifted by anything."""
-    return scene.loading.dragged and state.load.sense == 0 and not state.load.frictionless
 
 
 def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
@@ -99,19 +98,22 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     )
 
 
-def history(scene: Scene, finger: Finger[Patches], way: Sequence[Instant], over_time: Array | None) -> History:
-    """Return a course as arrays; `over_time` (m, 2) is its SED of ending and point where tissues relax [MPa]."""
-    states = [instant.state for instant in way]
-    sed = finger.seds(states) if over_time is None else over_time
+def history(scene: Scene, finger: Finger[Patches], way: Way) -> History:
+    """Return a course as arrays; at small strain the finger at rest comes first."""
+    relaxing = isinstance(way, RelaxingWay)
+    first = 0 if isinstance(finger, LinearFinger) else 1
+    instants = way.instants[first:]
+    states = [instant.state for instant in instants]
+    sed = np.array([(0.0, 0.0), *way.energies])[first:] if relaxing else finger.seds(states)
     return History(
-        time=np.array([i.time for i in way]),
-        bone_x=np.array([i.travel for i in way]),
-        bone_y=np.array([-i.depth for i in way]),
+        time=np.array([i.time for i in instants]),
+        bone_x=np.array([i.travel for i in instants]),
+        bone_y=np.array([-i.depth for i in instants]),
         sed_ending=sed[:, 0],
         sed_point=sed[:, 1],
         normal_force=np.array([s.normal.sum() for s in states]),
         tangential_force=np.array([drag(scene, float(s.tangential.sum())) for s in states]),
         contact_width=np.array([finger.contact_width(s) for s in states]),
         slipping=np.array([1.0 - s.sticking if s.touching.any() else 0.0 for s in states]),
-        responses=finger.responses(states) if over_time is None else sed_alone(sed[:, 0]),
+        responses=sed_alone(sed[:, 0]) if relaxing else finger.responses(states),
     )

@@ -5,7 +5,7 @@ For its errors the course is marched again on the nested mesh, and on the answer
 relax, since what is left of their past holds with no edge moved.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -13,11 +13,10 @@ import numpy as np
 
 from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, edge_changes
 from solver.arrays import Array
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_path import RelaxingWay, march
+from solver.equilibrium.finger import KINDS, Finger
+from solver.equilibrium.load_path import Way, march
 from solver.equilibrium.newton import EquilibriumState, Given
 from solver.failures import SolveFailure
-from solver.mesh.mesher import finger_mesh
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
 from solver.response.answer import history
@@ -89,21 +88,24 @@ def course_errors(found: Prediction) -> CourseNumbers:
     """Return how far the numbers of a prediction's history may be off; all nan where the nested mesh has no course."""
     assert found.history is not None
     usual = course_numbers(found.history)
-    mesh, nested = _fingers(found)
+    scene, sizing, kind = found.scene, replace(found.geometry.sizing, halved=True), KINDS[found.scene.solve.kinematics]
+    mesh, nested = kind.on(scene, found.geometry), kind.of(scene, sizing)
+
+    def marched(finger: Finger[Any], part: float) -> Way:
+        return march(scene, finger, part, relaxing=scene.materials.relax)
+
     try:
-        fewer = [course_numbers(_marched(found.scene, mesh, part)[0]) for part in PARTS.tolist()]
-        course, states = _marched(found.scene, nested, float(PARTS[0]))
+        fewer = [course_numbers(history(scene, mesh, marched(mesh, part))) for part in PARTS.tolist()]
+        way = marched(nested, float(PARTS[0]))
     except SolveFailure:
         return CourseNumbers(usual.at * np.nan, usual.rate * np.nan)
+    course = history(scene, nested, way)
     finer = course_numbers(course)
     ends = instants(course)
-    relaxes = found.scene.materials.relax
-    edges = np.array(
-        [
-            0.0 * one if relaxes else _of_edges(found, nested, states[end - 1])
-            for one, end in zip(usual.at, ends, strict=True)
-        ]
-    )
+    states = [way.instants[end - 1 - len(course.time)].state for end in ends]
+    edges = 0.0 * usual.at
+    if not scene.materials.relax:
+        edges += [_of_edges(scene, nested, state) for state in states]
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
     of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(NUMBERS) :]])
     with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
@@ -117,23 +119,9 @@ def course_errors(found: Prediction) -> CourseNumbers:
     return CourseNumbers(error("at", edges), error("rate", rate_edges))
 
 
-def _of_edges(found: Prediction, nested: Finger[Any], state: EquilibriumState) -> Array:
+def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
     """Return what the numbers at an instant change by when edges of contact move by a node (5 + q,)."""
-    by_force = found.scene.normal_force is not None
+    by_force = scene.normal_force is not None
     given = Given(float(state.normal.sum()), None, state.load.travel) if by_force else None
     changes = edge_changes(nested.newton, [(state, given)], nested.all_numbers)[1][0]
     return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])
-
-
-def _fingers(found: Prediction) -> tuple[Finger[Any], Finger[Any]]:
-    """Return the answer's finger and the nested one."""
-    scene, sizing = found.scene, replace(found.geometry.sizing, halved=True)
-    of = LinearFinger.on if scene.solve.kinematics == "small" else FiniteFinger.on
-    return of(scene, found.geometry), of(scene, finger_mesh(scene.finger, scene.receptor, sizing))
-
-
-def _marched(scene: Scene, finger: Finger[Any], part: float) -> tuple[History, Sequence[EquilibriumState]]:
-    """Return a course in a part of its load steps, and its states. Raises NotConverged."""
-    way = march(scene, finger, part, relaxing=scene.materials.relax)
-    over_time = np.array(way.energies) if isinstance(way, RelaxingWay) else None
-    return history(scene, finger, way.instants[1:], over_time), way.states

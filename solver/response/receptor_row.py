@@ -8,18 +8,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, end, solution_on
+from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, Steps, edge_changes
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.receptor import FinitePatches, LinearPatches, Patches, endings
 from solver.body.stiffness import Elastic
-from solver.continuation import small_states
 from solver.continuation.existence import sound
-from solver.continuation.finite_states import depends_on_way, roughly
-from solver.continuation.small_states import WIDE, direct
+from solver.continuation.finite_states import roughly
+from solver.continuation.small_states import WIDE, direct, nearest
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
+from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
@@ -69,39 +69,27 @@ def _row_errors(found: Prediction, values: Array, arcs: Array, receptor: Recepto
         row = finger.patches(endings(finger.geometry, finger.centred, receptor, arcs))
         return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
 
-    nested, state, coarse, ends = (_small if scene.solve.kinematics == "small" else _finite)(found, sizing)
+    nested, state, coarse = _nested(found, sizing)
+    in_steps = state.load.path_dependent
+    if in_steps:
+        state = end(scene, nested)
     (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], probed(nested))
     errors = FROM_HALVING * np.abs(finer - values.ravel()) + FROM_EDGES * edges
-    if ends:
-        usual, *fewer = probed(coarse)(ends)
+    if in_steps:
+        usual, *fewer = probed(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound
     return errors.reshape(values.shape)
 
 
-_Nested = tuple[Finger[Any], EquilibriumState, Finger[Any], list[EquilibriumState]]
-
-
-def _small(found: Prediction, sizing: Sizing) -> _Nested:
-    """Return the nested finger, its state, and of a load path its ends after fewer steps and on which finger."""
-    scene = found.scene
-    nested = LinearFinger.of(scene, sizing)
-    state = small_states.nearest(scene, nested)
-    if not small_states.depends_on_way(scene, state):
-        return nested, state, nested, []
-    mesh = LinearFinger.on(scene, found.geometry)
-    ends = [small_states.end(scene, mesh, times) for times in (1.0, *PARTS.tolist())]
-    return nested, small_states.end(scene, nested), mesh, ends
-
-
-def _finite(found: Prediction, sizing: Sizing) -> _Nested:
-    """Do the same at finite strain, fewer steps on a coarse mesh."""
+def _nested(found: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
+    """Return the nested finger, its state, and the finger on which a course in fewer steps is judged."""
     scene, meshes = found.scene, Meshes()
+    if scene.solve.kinematics == "small":
+        finger = LinearFinger.of(scene, sizing)
+        return finger, nearest(scene, finger), LinearFinger.on(scene, found.geometry)
     low = coarse_solution(scene, expected_depth(scene), sizing.fineness, never, meshes)
     top = solution_on(scene, sizing, low, never, meshes)
-    if not depends_on_way(scene, top.shape):
-        return top.finger, top.shape, low.finger, []
-    ends = [end(low.finger, scene, never, times) for times in (1.0, *PARTS.tolist())]
-    return top.finger, end(top.finger, scene, never), low.finger, ends
+    return top.finger, top.shape, low.finger
 
 
 def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Patches:

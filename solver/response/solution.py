@@ -1,11 +1,10 @@
 """From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import sqrt
 
 from solver._kernels.skin import STEEP
-from solver.accuracy.adaptivity import Meshes
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held
@@ -15,9 +14,7 @@ from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, report_progress
-from solver.response import finite_solution, small_solution
-from solver.response.finite_solution import Pressed
-from solver.response.small_solution import Answer, Fingers, Watch
+from solver.response.answers import MESHINGS, Answer, Meshing, Watch
 from solver.scene.scene import Scene
 
 KNOWN = 0.03  # of a limit of friction, to which it is known
@@ -136,7 +133,7 @@ def _solve_group(
     depth = max(expected_depth(scene) for scene in scenes)
     asked = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
     fineness = FIRST if asked else DEFAULT[kind]
-    on_mesh = _Meshing(depth, progress, Fingers(scenes[0]))
+    on_mesh = MESHINGS[kind](depth, progress)
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (asked or compared_sets(scenes)):
         return _marched(scenes, fineness, on_mesh, watch)
@@ -144,7 +141,7 @@ def _solve_group(
     return [_warned(answer, more) for answer, more in zip(found.answers, found.warnings, strict=True)]
 
 
-def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None) -> list[Answer]:
+def _marched(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None) -> list[Answer]:
     """March courses on the mesh that their settled ends ask for, so that each is marched, and watched, once.
 
     What is to be said of an end is said of its course.
@@ -158,7 +155,7 @@ def _marched(scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: W
         if watch is not None:
             watch(number, out[number], finger, way)
 
-    found = on_mesh(scenes, ended.fineness, noted)
+    found = on_mesh.answers(scenes, ended.fineness, noted)
     return [out.get(number, answer) for number, answer in enumerate(found)]
 
 
@@ -172,7 +169,7 @@ class _Refined:
 
 
 def _refined(
-    scenes: list[Scene], fineness: float, on_mesh: "_Meshing", watch: Watch | None, rough: Rough | None
+    scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None, rough: Rough | None
 ) -> _Refined:
     """Refine until every estimate is known and meets its tolerance, of differences too, or no mesh is finer.
 
@@ -185,7 +182,7 @@ def _refined(
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
     todo = list(range(len(scenes)))
     while True:
-        solved = on_mesh([scenes[i] for i in todo], fineness, watch)
+        solved = on_mesh.answers([scenes[i] for i in todo], fineness, watch)
         for i, answer in zip(todo, solved, strict=True):
             coarser = found.get(i)
             if isinstance(answer, SolveFailure) and coarser is not None and _stands(coarser, answer):
@@ -220,7 +217,7 @@ def _refined(
 
 
 def _fallen_back(
-    scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: "_Meshing"
+    scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: Meshing
 ) -> dict[int, SolveFailure]:
     """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them.
 
@@ -229,11 +226,11 @@ def _fallen_back(
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
-            answer = on_mesh([scene], first / GROWTH[0], None)[0]
+            answer = on_mesh.answers([scene], first / GROWTH[0])[0]
             if _stands(answer, failure):
                 found[i], lost[i] = answer, failure
         if isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
-            found[i] = on_mesh([scene], first * GROWTH[0], None)[0]
+            found[i] = on_mesh.answers([scene], first * GROWTH[0])[0]
     return lost
 
 
@@ -275,22 +272,6 @@ def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: Solv
 def _warned(answer: Answer, more: tuple[str, ...]) -> Answer:
     """Return the answer with more warnings."""
     return replace(answer, warnings=(*answer.warnings, *more)) if more and isinstance(answer, Prediction) else answer
-
-
-@dataclass(frozen=True, slots=True)
-class _Meshing:
-    """Solves scenes of one finger on meshes made for it."""
-
-    depth: float  # that they reach, or about [mm]
-    progress: Progress | None
-    fingers: Fingers  # at small strain
-    kept: dict[Pressed, Meshes] = field(default_factory=dict)  # at finite strain
-
-    def __call__(self, scenes: list[Scene], fineness: float, watch: Watch | None) -> list[Answer]:
-        """Return the answers on meshes of that fineness."""
-        if scenes[0].solve.kinematics == "finite":
-            return finite_solution.answers(scenes, self.depth, fineness, self.progress, self.kept)
-        return small_solution.answers(scenes, self.depth, fineness, self.progress, watch, self.fingers)
 
 
 def _missed(answer: Answer, *, limits: bool) -> float:

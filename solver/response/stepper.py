@@ -122,7 +122,7 @@ class SmallStepper(Stepper):
         except ContactLost:
             self.forget()
             return float("nan")
-        if found.touching[0] or found.touching[-1]:
+        if found.reaches_end:
             self.forget()
             return float("nan")
         self.state = found
@@ -222,7 +222,7 @@ class FiniteStepper(Stepper):
             done = corrected(newton, shape, given, origin, before, kept=kept)
             if kept and (done is None or done[1] > CONTROL.furthest):
                 continue
-            if done is None or done[1] > CONTROL.furthest or self.finger.runs_out(done[0]):
+            if done is None or done[1] > CONTROL.furthest or done[0].reaches_end:
                 return self._lose(normal)
             shape = done[0]
             if number >= iterations and not kept and done[1] < far:

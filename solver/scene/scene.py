@@ -88,6 +88,11 @@ class Scene:
         return self.loading.indentation or 0.0, self.normal_force or 0.0, str(self.loading.slide)
 
     @property
+    def viscoelastic(self) -> bool:
+        """Whether the course is marched in time while the tissues relax."""
+        return self.materials.relax and self.solve.course == "history"
+
+    @property
     def tangential_force(self) -> float | None:
         """The drag asked for, opposing the slide [N/mm], None where the bone slides until nothing changes."""
         return self._per_mm(self.loading.tangential_force)

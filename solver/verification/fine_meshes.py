@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, relaxes, solution_on
-from solver.accuracy.adaptivity import end as finite_end
+from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.arrays import Array
-from solver.continuation import small_states
-from solver.continuation.small_states import WIDE
+from solver.continuation.small_states import WIDE, settled
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import never
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -58,8 +57,8 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) ->
     depth = max(expected_depth(scene) for scene in scenes)
     finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE))
     for scene in scenes:
-        marched = relaxes(scene) and depends_on_way(scene)
-        state = (small_states.end if marched else small_states.settled)(scene, finger, times)
+        marched = scene.viscoelastic and depends_on_way(scene)
+        state = (end if marched else settled)(scene, finger, times)
         if finger.reaches_out(state, finger.displacement(state), state.load.depth):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])
@@ -70,11 +69,11 @@ def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -
     for scene in scenes:
         low = coarse_solution(scene, depth, COARSE, never, meshes)
         sizing = replace(low.sizing, fineness=fineness, shift=shift)
-        if relaxes(scene) and depends_on_way(scene):
+        if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
-            yield np.abs(finger.numbers([finite_end(finger, scene, never, times)])[0])
+            yield np.abs(finger.numbers([end(scene, finger, times)])[0])
             continue
         top = solution_on(scene, sizing, low, never, meshes, times)
-        if top.finger.runs_out(top.shape):
+        if top.shape.reaches_end:
             top = solution_on(scene, replace(sizing, margin=WIDER), low, never, meshes, times)
         yield np.abs(top.finger.numbers([top.shape])[0])

@@ -90,7 +90,7 @@ def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str
         ("Python alone", [*python, "-c", "pass"]),
         ("Python and its arrays", [*python, "-c", "import numpy, scipy.linalg"]),
     ]
-    for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.finite_solution")):
+    for kinematics, loaded in (("small", "solver.response.solution"), ("finite", "solver.response.answers")):
         out.append((f"the solver loaded, {kinematics} strain", [*python, "-c", f"import {loaded}"]))
         scene = folder / f"{kinematics}.toml"
         scene.write_text(SCENE.format(kinematics=kinematics), encoding="utf-8")

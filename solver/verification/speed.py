@@ -7,7 +7,7 @@ from statistics import median
 import numpy as np
 
 from solver.failures import SolveFailure
-from solver.response.finite_solution import alike
+from solver.response.answers import alike
 from solver.scene.scene import Scene
 from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed

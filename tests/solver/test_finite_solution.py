@@ -11,7 +11,7 @@ from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.newton import LoadState
-from solver.response import finite_solution
+from solver.response import answers
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.verification.methods import FiniteMeshed
@@ -164,12 +164,12 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, lost_below, known
 ):
-    nested = finite_solution.on_nested
+    nested = answers.on_nested
 
     def lost(scene, top, *more):
         return (None, None) if top.sizing.fineness < lost_below else nested(scene, top, *more)
 
-    monkeypatch.setattr(finite_solution, "on_nested", lost)
+    monkeypatch.setattr(answers, "on_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (UNKNOWN in found.warnings) == (not known)

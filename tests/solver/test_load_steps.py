@@ -7,8 +7,8 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.accuracy.error_estimate import PARTS, Steps
-from solver.continuation.small_states import end
 from solver.equilibrium.finger import LinearFinger
+from solver.equilibrium.load_path import end
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT
 from solver.quantities import NAMES

@@ -1,0 +1,333 @@
+"""From scenes that share a finger to predictions, on meshes of one fineness, an error estimate with each.
+
+Settled sliding is found directly and refused where it does not exist; a course is marched, and where tissues relax, in
+time (`solver.equilibrium.relaxation`).
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from solver.accuracy import audits as audit
+from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked, steps_of_press
+from solver.arrays import Array
+from solver.body.receptor import Patches
+from solver.continuation.existence import doubts
+from solver.continuation.finite_states import settled
+from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined
+from solver.equilibrium.expected_depth import within_reach
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, forces_of
+from solver.equilibrium.load_path import Instant, end, march
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
+from solver.equilibrium.relaxation import CondensedRelaxing
+from solver.failures import NotConverged, SolveFailure
+from solver.mesh.mesher import Sizing
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
+from solver.progress import Cancelled, Progress, report_part, report_progress
+from solver.response.answer import Solved, prediction
+from solver.scene.scene import Scene
+
+# unbalanced part of the forces from which displacements are corrected further [-]
+SMALL_IMBALANCE, FINITE_IMBALANCE = 1e-10, 1e-8
+CORRECTIONS = 4  # at finite strain, at most
+
+YIELDS = (
+    "The drag lifts the bone: pressed a little harder, the finger would slide at a smaller depth. Under a weight, that "
+    "follows it down, this slide would not last; held at this depth, the finger slides under less force."
+)
+
+BEYOND_THE_SKIN = NotConverged(
+    "The drag lays more skin on the surface than the finger's palmar side has, where contact is looked for: ask "
+    "for less friction, drag or depth."
+)
+
+Answer = Prediction | SolveFailure
+Pressed = tuple[float, float, str]  # how deep or hard, and which way: `Scene.pressed`
+Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # called with each answer, and its way
+
+
+class Meshing(ABC):
+    """Solves scenes of one finger on meshes of any fineness, and keeps those that may serve again."""
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Make none yet. The scenes reach a `depth` [mm], or about it where forces are given."""
+        self.depth, self.progress = depth, progress
+
+    @abstractmethod
+    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:
+        """Return the predictions of scenes, or why there is none, on meshes of that fineness.
+
+        Raises SceneError where the finger cannot be meshed, Cancelled where `progress` says so.
+        """
+
+
+def _audited(
+    scene: Scene, finger: Finger[Patches], one: Solved, newton: Newton, settled_sed: Callable[[], float]
+) -> None:
+    """Complete the audits of a state and of its course, or raise the SolveFailure that they ask for.
+
+    `newton` is that of the body whose energy the course stores; `settled_sed` returns the SED of the state found
+    directly, which a course must end in.
+    """
+    checks, state, way = one.audits, one.state, one.way
+    audit.refuse_unsound(checks, state.load.depth)
+    audit.refuse_beyond_finger(finger, state, one.displacement)
+    checks |= audit.forces_missed(scene, float(state.force[1]), float(state.force[0]))
+    if way is None:
+        return
+    relaxing = isinstance(way, RelaxingWay)
+    checks |= audit.course_audits(newton, [instant.state for instant in way.instants], relaxing=relaxing)
+    if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
+        checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(one.displacement) - 1.0)
+
+
+class SmallMeshing(Meshing):
+    """Small strain: all scenes share one mesh, and its nested one for their estimates."""
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Make none yet."""
+        super().__init__(depth, progress)
+        self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and what each took to make [s]
+
+    def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
+        if sizing not in self._fingers:
+            begun = perf_counter()
+            finger = LinearFinger.of(scene, sizing)
+            self._fingers[sizing] = finger, perf_counter() - begun
+        return self._fingers[sizing]
+
+    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:
+        """Do as `Meshing` says; where contact reaches out, all are solved again on a mesh with more skin."""
+        self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
+        most = max(self.depth, min(WIDE * self.depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
+        narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (self.depth, most))
+        try:
+            done = self._on_mesh(scenes, narrow, watch, last=False)
+            return self._on_mesh(scenes, wide, watch, last=True) if len(done) < len(scenes) else done
+        except NotConverged as failure:  # a mesh does not stand for a body
+            return [failure] * len(scenes)
+
+    def _on_mesh(self, scenes: list[Scene], sizing: Sizing, watch: Watch | None, *, last: bool) -> list[Answer]:
+        """Return the answers on one mesh; none where contact must be looked for on more of the skin than this.
+
+        Of settled slides the steepest, whose contact reaches farthest, comes first. On the `last` mesh what reaches out
+        nevertheless has no answer.
+        """
+        finger, took = self._finger(scenes[0], sizing)
+        done: dict[int, Answer] = {}
+        # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
+        every = range(len(scenes))
+        steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
+        marched = any(scene.solve.course == "history" for scene in scenes)
+        for batch in [[number] for number in every] if marched else [steepest_first]:
+            states: dict[int, Solved] = {}
+            for number in batch:
+                position = len(done) + len(states)
+                report_part(self.progress, position / len(scenes))
+                try:
+                    found = self._solved(scenes[number], finger, position, len(scenes))
+                except SolveFailure as failure:
+                    done[number] = failure.in_a_sentence()
+                    continue
+                if found is not None:
+                    states[number] = replace(found, setup_s=took - finger.solve_s)
+                elif last:
+                    done[number] = BEYOND_THE_SKIN
+                else:
+                    return []
+            if states:
+                done |= zip(states, self._estimated(list(states.values()), finger, sizing), strict=True)
+            if watch is not None:
+                for number in batch:
+                    if done[number] is not BEYOND_THE_SKIN:
+                        watch(number, done[number], finger, states[number].elastic_way if number in states else None)
+        return [done[number] for number in every]
+
+    def _solved(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> Solved | None:
+        """Return the state of one of `count` scenes; None where contact must be looked for on more of the skin.
+
+        Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its
+        limits. Raises SolveFailure.
+        """
+        begun = perf_counter()
+        history = scene.solve.course == "history"
+        for leg in scene.earlier_slides() if history else ():
+            direct(leg, finger)
+        found = direct(scene, finger)
+        try:
+            steps = steps_asked(scene, finger, settled=found)
+            times = steps_of_press(scene, finger) if steps is None else steps.times
+        except SolveFailure:
+            steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # nor will there be an estimate
+        if times > 1 and steps is not None:
+            found = direct(scene, finger, times)
+        way, state, relaxing = None, found, history and scene.materials.relax
+        if history:
+            progress = self.progress
+
+            def report(_: str, part: float) -> None:
+                report_part(progress, (position + part) / count)
+
+            way = march(scene, finger, times, relaxing=relaxing, report=report)
+            state = way.last
+            if relaxing:
+                state = replace(state, u=finger.body.condensed.held_by(state.reaction))
+        displacement = finger.displacement(state)
+        in_tissue(scene, finger, state.load.depth)
+        if finger.reaches_out(state, displacement, state.load.depth):
+            return None
+        simple = way is None and scene.normal_force is None and not state.load.path_dependent
+        if simple:  # round-off is taken out at once, else where it shows
+            state, displacement = refined(scene, finger, state, displacement)
+        checks = audit.audits(finger, state, displacement)
+        if not relaxing and audit.unbalanced(checks) > SMALL_IMBALANCE:
+            state, displacement = refined(scene, finger, state, displacement)
+            checks = audit.audits(finger, state, displacement)
+        solved = Solved(scene, state, displacement, checks, steps, way)
+        _audited(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(found)))
+        warnings = tuple(filter(None, [audit.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
+        return replace(solved, warnings=warnings, wall_s=perf_counter() - begun + finger.solve_s / count)
+
+    def _estimated(self, solved: list[Solved], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
+        """Return the prediction of each state, with its error; numbers of all are made at once."""
+        begun = perf_counter()
+        numbers = finger.all_numbers([one.state for one in solved])
+        displacements = np.stack([one.displacement for one in solved], axis=2)
+        numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
+        numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
+        rows = finger.row.average(displacements)
+        nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved)
+        took = (perf_counter() - begun) / len(solved)
+        return [
+            prediction(one, finger, numbers[number], rows[:, number], nested[number], took)
+            for number, one in enumerate(solved)
+        ]
+
+
+def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved]) -> list[NestedNumbers | None]:
+    """Return the numbers of solved scenes on the nested `mesh`, None where one has no state there."""
+    states: dict[int, EquilibriumState] = {}
+    for number, one in enumerate(solved):
+        try:
+            states[number] = nearest(one.scene, mesh) if one.steps is None else end(one.scene, mesh)
+        except SolveFailure:
+            continue
+    out: list[NestedNumbers | None] = [None] * len(solved)
+    if states:
+        forced = [(state, forces_of(solved[number].scene, state.load)) for number, state in states.items()]
+        values, changes = edge_changes(mesh.newton, forced, mesh.numbers_and_row)
+        for number, value, change in zip(states, values, changes, strict=True):
+            out[number] = nested_numbers(value, change, solved[number].steps)
+    return out
+
+
+class FiniteMeshing(Meshing):
+    """Finite strain: each scene has a mesh made for its contact, and begins on a coarse one.
+
+    Scenes pressed alike and moved the same way share meshes and are solved one after the other, friction rising, each
+    begun at the one before.
+    """
+
+    def __init__(self, depth: float, progress: Progress | None) -> None:
+        """Make none yet."""
+        super().__init__(depth, progress)
+        self._meshes: dict[Pressed, Meshes] = {}
+
+    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
+        """Do as `Meshing` says."""
+        done: dict[int, Answer] = {}
+
+        def stop() -> bool:
+            return self.progress is not None and not self.progress(len(done) / len(scenes))
+
+        for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
+            if stop():
+                raise Cancelled
+            begun, scene = perf_counter(), scenes[number]
+            report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
+            meshes = self._meshes.setdefault(scene.pressed, Meshes())
+            meshes.keep(fineness)
+            try:
+                low = coarse_solution(scene, self.depth, fineness, stop, meshes)
+                done[number] = _predicted(scene, refine(scene, fineness, low, stop, meshes), stop, meshes, begun)
+            except SolveFailure as failure:
+                done[number] = failure
+        return [done[number] for number in range(len(scenes))]
+
+
+def alike(scene: Scene) -> tuple[Pressed, float]:
+    """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
+    return scene.pressed, float(scene.friction.mu)
+
+
+def _predicted(
+    scene: Scene, nested: NestedSolution, stop: Callable[[], bool], meshes: Meshes, begun: float
+) -> Prediction:
+    """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
+    top, steps = nested.top, nested.steps
+    finger, state, way = top.finger, top.shape, None
+    setup = nested.coarse.setup_s + top.setup_s
+    if scene.solve.course == "history":
+        times = steps_of_press(scene, nested.coarse.finger, stop) if steps is None else steps.times
+        for leg in scene.earlier_slides():  # one that never settles is refused with its limits
+            settled(finger, leg, stop)
+        way = march(scene, finger, times, relaxing=scene.materials.relax, stop=stop)
+        state = way.last
+    if not state.touching.any():
+        raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
+    within_reach(scene, state.load.depth)
+    newton = finger.newton if way is None else way.newton
+    state, checks = _balanced(finger, newton, state)
+    solved = Solved(scene, state, state.u, checks, steps, way)
+    _audited(scene, finger, solved, newton, lambda: finger.sed_ending(top.shape.u))
+    numbers = finger.all_numbers([state])[0]
+    before_estimate = perf_counter()
+    report_progress("estimating errors, on the nested mesh")
+    finer, steps = on_nested(scene, top, steps, stop, meshes)
+    row = finger.row.average(state.u)
+    took = perf_counter() - before_estimate
+    warnings, wall = doubts(finger, state, stop), before_estimate - begun - setup
+    solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
+    return prediction(solved, finger, numbers, row, finer, took)
+
+
+def _balanced(
+    finger: FiniteFinger, newton: Newton, shape: EquilibriumState
+) -> tuple[EquilibriumState, dict[str, float]]:
+    """Return a state and its checks, its displacements so good that no force is left over but by round-off.
+
+    `newton` is the finger's own, or that of its tissues as they relax. Displacements good to a part of a nanometre
+    leave much of a light touch on a nearly incompressible body unbalanced.
+    """
+    checks = _audits(finger, newton, shape)
+    for _ in range(CORRECTIONS):
+        if audit.unbalanced(checks) <= FINITE_IMBALANCE:
+            break
+        x = shape.place(newton.condensed)[:, 0]
+        if not newton.linearise(shape, shape.load, x):
+            break
+        after, _, _ = newton.moved(shape, shape.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
+        better = _audits(finger, newton, after)
+        worse = _contradicting(better) > max(_contradicting(checks), FINITE_IMBALANCE)
+        if worse or audit.unbalanced(better) >= audit.unbalanced(checks):
+            break
+        shape, checks = after, better
+    return shape, checks
+
+
+def _audits(finger: FiniteFinger, newton: Newton, shape: EquilibriumState) -> dict[str, float]:
+    body = newton.condensed
+    over: Array | None = finger.body.nodal(body.excess(shape.u)) if isinstance(body, CondensedRelaxing) else None
+    return audit.audits(finger, shape, shape.u, over)
+
+
+def _contradicting(checks: dict[str, float]) -> float:
+    return max(checks[name] for name in ("penetration", "tension", "cone_violation"))
+
+
+MESHINGS: dict[str, type[Meshing]] = {"small": SmallMeshing, "finite": FiniteMeshing}  # by kinematics
