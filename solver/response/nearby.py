@@ -5,11 +5,10 @@ solved once more for each parameter, every contact state kept, which is exact as
 where a node is about to change its state, they are those of the side on which the states stay.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Self, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +23,11 @@ from solver.contact import STATE_NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.existence import sound
 from solver.equilibrium import full_slip
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, sliding_load
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, sliding_load
 from solver.equilibrium.full_slip import slide_beside
 from solver.equilibrium.load_stepping import balanced
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton, load_arguments
-from solver.failures import ContactLost, NotConverged
+from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
 from solver.scene.scene import Scene
@@ -147,7 +146,7 @@ NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Nearby(ABC):
+class Nearby:
     """A settled slide, and those near it."""
 
     scene: Scene
@@ -162,17 +161,42 @@ class Nearby(ABC):
         """Return the SED (n, 2) [MPa] of scenes, as `responses` does."""
         return self.responses(scenes)[:, 0]
 
-    @abstractmethod
     def responses(self, scenes: Sequence[Scene]) -> Array:
         """Return every quantity (n, q, 2) of scenes that differ from its own in friction, depth or force alone.
 
         First that averaged over the ending, then that in its middle. nan where no settled slide is found near this one;
         how far there would be one is not looked for.
         """
+        out = np.full((len(scenes), len(NAMES), 2), np.nan)
+        near: dict[int, EquilibriumState] = {}
+        for number, scene in enumerate(scenes):
+            with suppress(NotConverged):
+                there = self._slide(scene)
+                # where a state touches at an end of the skin and this one does not, skin beyond may touch too
+                if not (there.touching & ~self.here.touching)[[0, -1]].any() and self._on_branch(there):
+                    near[number] = there
+        if near:
+            out[list(near)] = self.finger.ending_and_middle(list(near.values()))
+        return out
 
-    def reaches_out(self, there: EquilibriumState) -> bool:
-        """Return whether a state touches at an end of the skin where this one does not: skin beyond may touch too."""
-        return bool((there.touching & ~self.here.touching)[[0, -1]].any())
+    def _slide(self, scene: Scene) -> EquilibriumState:
+        """Return the settled slide of a scene that this one leads to. Raises NotConverged."""
+        if isinstance(self.finger, LinearFinger):
+            return _small_slide(self.finger, scene, self.here.state)
+        newton, here = self.finger.newton, self.here
+        load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
+        if scene.normal_force is None:
+            return full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
+        return balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
+
+    def _on_branch(self, there: EquilibriumState) -> bool:
+        """Return whether a state at finite strain lies on the branch of this one, as far as this mesh can tell."""
+        if not isinstance(self.finger, FiniteFinger):
+            return True
+        beyond = there.load.mu > self.here.load.mu or there.load.depth > self.here.load.depth
+        if beyond and not sound(self.finger, there):  # skin that may have folded since
+            return False
+        return not jumped_branch(self.finger, self.here, there)
 
 
 def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
@@ -181,19 +205,19 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     None where the finger is only pressed or held by a drag, so that its state depends on the way to it, and where the
     state is not met again.
     """
-    model: LinearFinger | None = None
+    finger: Finger[Any] | None = None
     for found in predictions:
         scene = found.scene
         if scene.loading.direction == 0 or scene.loading.dragged:
             yield None
             continue
+        if finger is None or isinstance(finger, FiniteFinger) or finger.geometry is not found.geometry:
+            finger = KINDS[scene.solve.kinematics].on(scene, found.geometry)
         try:
-            if scene.solve.kinematics == "finite":
-                yield _FiniteNearby.of(found)
-                continue
-            if model is None or model.geometry is not found.geometry:
-                model = LinearFinger.on(scene, found.geometry)
-            yield _SmallNearby(scene, _slide(model, scene, states(found.skin)), model)
+            if isinstance(finger, FiniteFinger):
+                yield Nearby(scene, _met_again(finger, found), finger)
+            elif isinstance(finger, LinearFinger):
+                yield Nearby(scene, _small_slide(finger, scene, states(found.skin)), finger)
         except NotConverged:
             yield None
 
@@ -205,27 +229,10 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
     """
     found: list[Array] = []
     for slide in nearby(predictions):
-        if not isinstance(slide, _SmallNearby):
+        if slide is None or not isinstance(slide.finger, LinearFinger):
             raise ValueError("no press at small strain that slides without friction")
         found.append(by_stiffness(slide.finger, slide.here))
     return np.array(found)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _SmallNearby(Nearby):
-    finger: LinearFinger
-
-    def responses(self, scenes: Sequence[Scene]) -> Array:
-        out = np.full((len(scenes), len(NAMES), 2), np.nan)
-        held: dict[int, EquilibriumState] = {}
-        for number, scene in enumerate(scenes):
-            with suppress(ContactLost):
-                contact = _slide(self.finger, scene, self.here.state)
-                if not self.reaches_out(contact):
-                    held[number] = contact
-        if held:
-            out[list(held)] = self.finger.ending_and_middle(list(held.values()))
-        return out
 
 
 def states(skin: Skin) -> NDArray[np.int64]:
@@ -233,50 +240,18 @@ def states(skin: Skin) -> NDArray[np.int64]:
     return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
-def _slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
+def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
     """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
     return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _FiniteNearby(Nearby):
-    """Near slides lie on the same branch of states, continued from here."""
-
-    finger: FiniteFinger
-
-    @classmethod
-    def of(cls, found: Prediction) -> Self:
-        """Return the settled slide of `found` from what is kept of it. Raises NotConverged where it is not met."""
-        finger, scene, skin = FiniteFinger.on(found.scene, found.geometry), found.scene, found.skin
-        body, sense = finger.body, -scene.loading.direction
-        length = np.empty(len(skin.x))
-        skin_loops.tributary(skin.x, body.middle, length)
-        load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
-        state = states(skin).astype(np.int32)
-        reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
-        modes, senses = body.pressure(found.displacement), np.full(len(state), sense, np.int32)
-        start = EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0)
-        return cls(scene, finger.newton.settle(start, load), finger)
-
-    def responses(self, scenes: Sequence[Scene]) -> Array:
-        out = np.full((len(scenes), len(NAMES), 2), np.nan)
-        for number, scene in enumerate(scenes):
-            there = self._beside(scene)
-            if there is not None:
-                out[number] = self.finger.ending_and_middle([there])[0]
-        return out
-
-    def _beside(self, scene: Scene) -> EquilibriumState | None:
-        newton, here = self.finger.newton, self.here
-        load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
-        try:
-            if scene.normal_force is None:
-                there = full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
-            else:
-                there = balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
-        except NotConverged:
-            return None
-        beyond = there.load.mu > here.load.mu or there.load.depth > here.load.depth
-        # Skin that may have folded since: whether the branch goes on as far as that, this mesh cannot tell.
-        unproven = beyond and not sound(self.finger, there)
-        return None if self.reaches_out(there) or unproven or jumped_branch(self.finger, here, there) else there
+def _met_again(finger: FiniteFinger, found: Prediction) -> EquilibriumState:
+    """Return the settled slide of `found` at finite strain. Raises NotConverged where it is not met."""
+    scene, skin, sense = found.scene, found.skin, -found.scene.loading.direction
+    length = np.empty(len(skin.x))
+    skin_loops.tributary(skin.x, finger.body.middle, length)
+    load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
+    state = states(skin).astype(np.int32)
+    reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
+    modes, senses = finger.body.pressure(found.displacement), np.full(len(state), sense, np.int32)
+    return finger.newton.settle(EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0), load)

@@ -18,11 +18,11 @@ from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import WIDE, direct, nearest
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
 from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EquilibriumState
-from solver.failures import SolveFailure
+from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
@@ -108,41 +108,38 @@ FINENESS = 6.0  # elements to a tip radius, at small strain
 def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> Array:
     """Return every quantity (n, q, r) of settled slides at endings at arc positions [mm]; nan where there is none.
 
-    All scenes are of one finger and one kinematics. Raises as `LinearFinger.of`.
+    All scenes are of one finger and one kinematics. At small strain they share a mesh; at finite strain those pressed
+    alike do, each begun at the one with less friction. Raises as `Finger.of`.
     """
-    first = scenes[0]
-    if first.solve.kinematics == "finite":
-        return _rough_finite(scenes, np.asarray(arcs, np.float64))
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
-    depth = max(expected_depth(scene) for scene in scenes)
-    finger = LinearFinger.of(first, Sizing(FINENESS, depth, margin=WIDE))
-    states: dict[int, EquilibriumState] = {}
-    for number, scene in enumerate(scenes):
-        with suppress(SolveFailure):
-            state = direct(scene, finger)
-            if not finger.reaches_out(state, finger.displacement(state), state.load.depth):
-                states[number] = state
-    if states:
-        row = finger.endings(np.asarray(arcs, np.float64))
-        out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
-    return out
-
-
-def _rough_finite(scenes: Sequence[Scene], arcs: Array) -> Array:
-    """Return the same at finite strain: those pressed alike share a mesh, each begun at the one with less friction."""
-    out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
+    finite = scenes[0].solve.kinematics == "finite"
     order = sorted(range(len(scenes)), key=lambda n: (scenes[n].pressed, float(scenes[n].friction.mu)))
-    for _, numbers in groupby(order, lambda n: scenes[n].pressed):
-        group, near = list(numbers), None
+    for _, numbers in groupby(order, lambda n: scenes[n].pressed if finite else None):
+        group = list(numbers)
         depth = max(expected_depth(scenes[number]) for number in group)
-        finger = FiniteFinger.of(scenes[group[0]], Sizing(COARSE, depth, margin=WIDER))
-        row = finger.endings(arcs)
+        sizing = Sizing(COARSE, depth, margin=WIDER) if finite else Sizing(FINENESS, depth, margin=WIDE)
+        finger = KINDS[scenes[0].solve.kinematics].of(scenes[group[0]], sizing)
+        states: dict[int, EquilibriumState] = {}
+        near: EquilibriumState | None = None
         for number in group:
-            try:
-                state = roughly(finger, scenes[number], never, near)
-            except SolveFailure:
-                continue
-            if sound(finger, state):
-                near = state
-                out[number] = row.responses(state.u)
+            with suppress(SolveFailure):
+                near = _rough_state(finger, scenes[number], near)
+                states[number] = near
+        if states:
+            row = finger.endings(np.asarray(arcs, np.float64))
+            out[list(states)] = np.moveaxis(row.responses(finger.displacements(list(states.values()))), 2, 0)
     return out
+
+
+def _rough_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
+    """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
+    if isinstance(finger, FiniteFinger):
+        state = roughly(finger, scene, never, near)
+        good = sound(finger, state)
+    else:
+        assert isinstance(finger, LinearFinger)
+        state = direct(scene, finger)
+        good = not finger.reaches_out(state, finger.displacement(state), state.load.depth)
+    if good:
+        return state
+    raise NotConverged("no sound state was found")
