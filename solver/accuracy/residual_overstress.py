@@ -18,7 +18,7 @@ from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, load_of, relaxing_laws
-from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, way_of
+from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, Way, way_of
 from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
@@ -110,22 +110,28 @@ def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | 
     if slide > 0.0:
         aims += [Aim(PRESSING_TIME + lasting * part, depth, direction * slide * part) for part in along.tolist()]
     try:
-        then, at_last = _small(scene, aims) if kind == "small" else _finite(scene, aims, stop)
+        if kind == "small":
+            way, at_last = _small(scene)
+        else:
+            finger = FiniteFinger.of(scene, Sizing(ROUGH[kind], depth, margin=MARGIN))
+            at_last = finger.sed_ending(roughly(finger, scene, stop).u)
+            way = way_of(scene, finger, relaxing=True, stop=stop)
+        for aim in aims:
+            way.go(aim)
     except SolveFailure:
         return None
-    return Held(abs(then / at_last - 1.0), lasting) if at_last > 0.0 else None
+    assert isinstance(way, RelaxingWay)
+    return Held(abs(way.energies[-1][0] / at_last - 1.0), lasting) if at_last > 0.0 else None
 
 
-def _small(scene: Scene, aims: list[Aim]) -> tuple[float, float]:
-    """Return the SED [MPa] after the last of `aims`, and that of the settled state."""
+def _small(scene: Scene) -> tuple[Way, float]:
+    """Return the untouched finger of a scene at the beginning of its course, and the settled SED [MPa]."""
     finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
     body = copy(body)  # each course has a past of its own
     body.rest()
     tissue = LinearTissue(body, (finger.ending.endings,))
     way = RelaxingWay(tissue, finger.newton, load_of(scene), scene.loading_per_mm)
-    for aim in aims:
-        way.go(aim)
-    return way.energies[-1][0], finger.sed_ending(finger.displacement(settled(scene, finger)))
+    return way, finger.sed_ending(finger.displacement(settled(scene, finger)))
 
 
 @lru_cache(maxsize=1)
@@ -136,14 +142,3 @@ def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: floa
     body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return made, body
-
-
-def _finite(scene: Scene, aims: list[Aim], stop: Callable[[], bool]) -> tuple[float, float]:
-    """Do the same at finite strain."""
-    finger = FiniteFinger.of(scene, Sizing(ROUGH["finite"], scene.loading.depth, margin=MARGIN))
-    at_last = finger.sed_ending(roughly(finger, scene, stop).u)
-    way = way_of(scene, finger, relaxing=True, stop=stop)
-    for aim in aims:
-        way.go(aim)
-    assert isinstance(way, RelaxingWay)
-    return way.energies[-1][0], at_last
