@@ -18,8 +18,14 @@ from solver._kernels.arguments import (
     StateChanges,
 )
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
-from solver._kernels.contact_system import COLUMNS, assemble_contact_system, assemble_force_system, solve
-from solver._kernels.skin import STEEP, bounded_length
+from solver._kernels.contact_system import (
+    COLUMNS,
+    STEEP,
+    assemble_contact_system,
+    assemble_force_system,
+    bounded_length,
+    solve,
+)
 from solver.arrays import Array, Narrow
 
 SLACK = 1e-12  # a contradiction smaller than this, relative to the largest of its kind, is round-off

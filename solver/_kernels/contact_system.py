@@ -1,14 +1,70 @@
-"""The linear system of contact on the skin: for its steps, or for its forces where the compliance is known."""
+"""The linear system of contact on the skin: for its steps, or for its forces where the compliance is known.
+
+First the length of skin that each node of it stands for.
+"""
 
 import numpy as np
 
 from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
-from solver._kernels.skin import LENGTHS, rubs
 from solver.arrays import Array, Indices, Narrow
 
 COLUMNS = 4  # of the right-hand side
 ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
+
+# how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
+LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
+
+STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
+
+
+@compiled
+def tributary(x: Array, at: Narrow, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
+
+    Simpson's rule on edges of three nodes; `at` (k,) is 0 at edge ends, 1 in the middle. The lengths are linear in x.
+    """
+    out[:] = 0.0
+    for i in range(at.shape[0]):
+        if at[i] == 1:
+            for n in range(3):
+                row = LENGTHS[n]
+                out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
+
+
+@compiled
+def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts that each node stands for.
+
+    That is its `tributary` length, less what `rubs` not.
+    """
+    out[:] = 0.0
+    for i in range(at.shape[0]):
+        if at[i] == 1:
+            for n in range(3):
+                if rubs(state, i, i - 1 + n, mu):
+                    row = LENGTHS[n]
+                    out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
+
+
+@compiled
+def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts: that of `rubbed`, and what is fixed."""
+    rubbed(x, skin.middle, state, mu, out)
+    for i in range(out.shape[0]):
+        out[i] += skin.fixed_length[i]
+
+
+@compiled
+def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
+    """Return whether a bound acts on the part of an edge, judged at its middle, that one of its nodes stands for.
+
+    Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
+    an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however
+    little that is. Where friction is not, pressure limits it there, and contact may end anywhere.
+    """
+    other = 2 * node - edge
+    return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
 
 
 @compiled

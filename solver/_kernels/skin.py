@@ -1,65 +1,9 @@
-"""The deformed skin as a line: what each node of it stands for, how far it is squeezed, whether it crosses itself."""
+"""The deformed skin as a line: how far it is squeezed, whether it crosses itself."""
 
 import numpy as np
 
-from solver._kernels.arguments import Skin
 from solver._kernels.compiling import OPEN, compiled
 from solver.arrays import Array, Flags, Indices, Narrow
-
-# how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
-LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
-
-STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
-
-
-@compiled
-def tributary(x: Array, at: Narrow, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
-
-    Simpson's rule on edges of three nodes; `at` (k,) is 0 at edge ends, 1 in the middle. The lengths are linear in x.
-    """
-    out[:] = 0.0
-    for i in range(at.shape[0]):
-        if at[i] == 1:
-            for n in range(3):
-                row = LENGTHS[n]
-                out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
-
-
-@compiled
-def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which a bound acts that each node stands for.
-
-    That is its `tributary` length, less what `rubs` not.
-    """
-    out[:] = 0.0
-    for i in range(at.shape[0]):
-        if at[i] == 1:
-            for n in range(3):
-                if rubs(state, i, i - 1 + n, mu):
-                    row = LENGTHS[n]
-                    out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
-
-
-@compiled
-def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which a bound acts: that of `rubbed`, and what is fixed."""
-    rubbed(x, skin.middle, state, mu, out)
-    for i in range(out.shape[0]):
-        out[i] += skin.fixed_length[i]
-
-
-@compiled
-def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
-    """Return whether a bound acts on the part of an edge, judged at its middle, that one of its nodes stands for.
-
-    Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
-    an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however
-    little that is. Where friction is not, pressure limits it there, and contact may end anywhere.
-    """
-    other = 2 * node - edge
-    return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
-
 
 SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 

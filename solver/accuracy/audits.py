@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import SHEAR_LIMITED
+from solver._kernels.contact_system import bounded_length
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import FrictionLaw
@@ -53,7 +53,7 @@ def audits(
     push = max(float(state.normal.max(initial=0.0)), np.finfo(float).tiny)
     length = np.empty(len(state.state))
     x = np.ascontiguousarray(state.place(condensed)[:, 0])
-    skin_loops.bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
+    bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
     # Open skin may hang over, its length along the surface negative: no limit of it is meant.
     limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
     return {

@@ -17,8 +17,9 @@ from solver.accuracy.adaptivity import MARGIN
 from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import FiniteFinger, LinearFinger, load_of, relaxing_laws
+from solver.equilibrium.finger import FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, Way, way_of
+from solver.equilibrium.load_stepping import load_of
 from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing

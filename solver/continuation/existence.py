@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
-from solver._kernels.skin import STEEP
+from solver._kernels.contact_system import STEEP
 from solver.arrays import Array
 from solver.continuation.arc_length import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
 from solver.equilibrium.finger import FiniteFinger, finite_laws

@@ -14,9 +14,9 @@ from solver.continuation.arc_length import LARGEST_MU, continue_branch, folds_at
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium import load_stepping
-from solver.equilibrium.finger import FiniteFinger, sliding_load
+from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march
-from solver.equilibrium.load_stepping import balanced
+from solver.equilibrium.load_stepping import balanced, sliding_load
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress

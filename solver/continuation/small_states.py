@@ -17,10 +17,11 @@ from numpy.linalg import LinAlgError
 from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
-from solver.equilibrium.finger import LinearFinger, forces_of, settled_moduli, sliding_load
+from solver.equilibrium.finger import LinearFinger, settled_moduli
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
 from solver.equilibrium.load_path import march
+from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.failures import ContactLost, NoSteadyState, NotConverged, beyond_friction
 from solver.mesh.mesher import Sizing, finger_mesh

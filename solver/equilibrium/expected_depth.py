@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
-from solver.equilibrium.finger import LinearFinger, sliding_load
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.full_slip import slide_under
+from solver.equilibrium.load_stepping import sliding_load
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing

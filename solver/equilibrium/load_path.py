@@ -12,8 +12,8 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, STICK
 from solver.body.receptor import Patches
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, load_of, relaxing_laws
-from solver.equilibrium.load_stepping import StepControl, advance, balanced, never
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
+from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of, never
 from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, followed_to

@@ -19,6 +19,7 @@ from solver.body.validation import check_loads
 from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
 from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import Cancelled, report_progress
+from solver.scene.scene import Scene
 from solver.tolerances import UNMET
 
 
@@ -67,6 +68,27 @@ def advance(
                 raise refusal(done, part, reason) from reason
         else:
             done, part = aim, control.growth * part
+
+
+def load_of(scene: Scene) -> LoadState:
+    """Return depth, friction and bound of a scene as what the surface does; a bound of zero is no friction."""
+    bound = scene.friction.cap
+    depth = scene.loading.depth if scene.normal_force is None else 0.0  # found, where a force is given
+    return LoadState(depth, float(scene.friction.mu) if bound > 0.0 else 0.0, bound)
+
+
+def sliding_load(scene: Scene) -> LoadState:
+    """Return what the surface does while it slides as a scene has it, or along +x where that does not matter."""
+    return load_of(scene)._replace(sense=-(scene.loading.direction or 1))
+
+
+def forces_of(scene: Scene, load: LoadState) -> Given | None:
+    """Return the forces that a scene gives to a state under `load`, None where it gives a depth."""
+    force, drag = scene.normal_force, scene.tangential_force
+    if force is None:
+        return None
+    held = None if drag is None or not load.path_dependent else -scene.loading.direction * drag
+    return Given(force, held, load.travel)
 
 
 def press_and_slide(

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver._kernels import skin as skin_loops
+from solver._kernels.contact_system import tributary
 from solver.accuracy.audits import rounding
 from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
@@ -87,7 +87,7 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
     """Return the skin that may touch in a state of contact."""
     condensed, touching = finger.newton.condensed, state.touching
     place, length = state.place(condensed), np.empty(len(state.state))
-    skin_loops.tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
+    tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
     length = np.where(touching, length + condensed.fixed_length, 1.0)
     return Skin(
         x=place[:, 0],

@@ -20,8 +20,9 @@ from solver.continuation.existence import doubts
 from solver.continuation.finite_states import settled
 from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined
 from solver.equilibrium.expected_depth import within_reach
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, forces_of
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_path import Instant, RelaxingWay, end, march
+from solver.equilibrium.load_stepping import forces_of
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure

@@ -13,19 +13,18 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from solver._kernels import contact_system
-from solver._kernels import skin as skin_loops
 from solver._kernels.arguments import ContactStates, SkinPosition
 from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.contact_system import assemble_contact_system, bounded_length, tributary
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
 from solver.continuation.arc_length import jumped_branch
 from solver.continuation.existence import sound
 from solver.equilibrium import full_slip
-from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, sliding_load
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.load_stepping import balanced
+from solver.equilibrium.load_stepping import balanced, sliding_load
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton, load_arguments
 from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
@@ -93,8 +92,8 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     position = SkinPosition(x, np.zeros(size), x)  # on the surface, and nowhere else than where it sticks
     system = newton.system
-    skin_loops.bounded_length(x, newton.skin, state.state, load.mu, system.length)
-    count = contact_system.assemble_contact_system(
+    bounded_length(x, newton.skin, state.state, load.mu, system.length)
+    count = assemble_contact_system(
         newton.arrays(), newton.skin, ContactStates(state.state, state.sense, state.reaction), load_arguments(load),
         position, system,
     )  # fmt: skip
@@ -249,7 +248,7 @@ def _met_again(finger: FiniteFinger, found: Prediction) -> EquilibriumState:
     """Return the settled slide of `found` at finite strain. Raises NotConverged where it is not met."""
     scene, skin, sense = found.scene, found.skin, -found.scene.loading.direction
     length = np.empty(len(skin.x))
-    skin_loops.tributary(skin.x, finger.body.middle, length)
+    tributary(skin.x, finger.body.middle, length)
     load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
     state = states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]

@@ -18,9 +18,9 @@ from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import WIDE, direct, nearest
 from solver.equilibrium.expected_depth import expected_depth
-from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, forces_of, settled_moduli
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
-from solver.equilibrium.load_stepping import never
+from solver.equilibrium.load_stepping import forces_of, never
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing

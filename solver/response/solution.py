@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 
-from solver._kernels.skin import STEEP
+from solver._kernels.contact_system import STEEP
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
 from solver.accuracy.residual_overstress import with_held

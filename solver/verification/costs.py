@@ -24,13 +24,12 @@ from solver.verification.truth import KINEMATICS, cases
 PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
-    "accuracy": "audits", "body.receptor": "receptor", "equilibrium.mesh_transfer": "carrying states",
+    "accuracy": "audits", "body.receptor": "receptor", "equilibrium.finger": "carrying states",
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "accuracy.adaptivity": "iteration",
     "_kernels.elements": "assembly", "_kernels.elements.energies": "receptor", "_kernels.hooke": "assembly",
     "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
-    "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "contact",
-    "_kernels.skin.pinched": "proof of existence", "_kernels.skin.crosses": "proof of existence",
+    "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
 }  # fmt: skip
 WHOLE = {"on_nested": "error estimate", "with_held": "evidence"}  # all that these do, on whatever mesh
 OTHER = "the rest"

@@ -14,8 +14,8 @@ from solver.body.linear import LinearBody
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
-from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli, sliding_load
-from solver.equilibrium.load_stepping import never
+from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
+from solver.equilibrium.load_stepping import never, sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing

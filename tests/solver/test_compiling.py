@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from solver._kernels import compiling
-from solver._kernels import skin as skin_loops
+from solver._kernels import contact_system as skin_loops
 from solver._kernels.compiling import bind_arguments
 from solver.progress import listening, report_progress
 
 SCRIPT = """
 import numpy as np
-from solver._kernels import skin as skin_loops
+from solver._kernels import contact_system as skin_loops
 from solver._kernels.compiling import bind_arguments
 from solver.progress import listening
 out = np.zeros(3)

@@ -134,7 +134,7 @@ def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
 def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
     x = np.cumsum(np.random.default_rng(0).uniform(0.1, 0.3, 9))
     length = np.empty(9)
-    skin_loops.tributary(x, (np.arange(9) % 2).astype(np.int32), length)
+    contact_system.tributary(x, (np.arange(9) % 2).astype(np.int32), length)
     np.testing.assert_allclose(length, oracle.tributary(x), rtol=1e-13)
     assert length.sum() == pytest.approx(x[-1] - x[0])
 
@@ -250,7 +250,7 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
         "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
         "from solver._kernels.arguments import ContactStates, LoadArguments\n"
         "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
-        "skin_loops.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
+        "contact_system.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
         "contact_system.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
         "states = ContactStates(states, states.copy(), np.zeros((3, 2)))\n"
         "active_set.update_contact_states(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1))\n"

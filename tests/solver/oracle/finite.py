@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 
-from solver._kernels.skin import STEEP
+from solver._kernels.contact_system import STEEP
 from solver.arrays import Array, Flags, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import shape, slopes
