@@ -145,8 +145,8 @@ class _Repeats:
         n = settings.repeats
         self._step = float(np.median(np.diff(curve.time)))
         accuracy = (settings.gain_error, settings.cross_talk)
-        lean, pressed = (settings.tilt, settings.tilt_error), settings.tilt_from_presses
-        self._shared = SystematicDraws(n, settings.seed, accuracy, *lean, from_presses=pressed)
+        lean = settings.tilt, settings.tilt_error
+        self._shared = SystematicDraws(n, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
         self._gain_t, self._gain_n = self._shared.gain_t, self._shared.gain_n
         self._noise_t, self._noise_n = curve.noise
         # The zero's drift was seen as one length of three axes; within it the zero may lie anywhere.

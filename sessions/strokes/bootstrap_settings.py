@@ -23,7 +23,7 @@ class BootstrapSettings:
     tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is not levelled [degrees]
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
     tilt_origin: str = "assumed: since too few presses measure it"
-    tilt_from_presses: bool = False  # then the lean holds the cross-talk from N into the drag, too
+    tilt_presses: int = 0  # that measured it: its error then follows Student's law, and holds cross-talk from N, too
     confidence: float = 0.95
     fewest_blocks: int = 4  # from which a spread is estimated
     fewest_quiet: int = 10  # readings before the onset from which noise is estimated ...
@@ -58,10 +58,9 @@ class BootstrapSettings:
             prior = settings.systematic.tilt_prior
             return replace(bootstrap, tilt_error=(prior, prior))
         rest = (tilt.lean[0] - settings.tilt[0], tilt.lean[1] - settings.tilt[1])
-        origin = f"by {len(tilt.presses)} presses"
-        return replace(
-            bootstrap, tilt=rest, tilt_error=tilt.error(settings.confidence), tilt_origin=origin, tilt_from_presses=True
-        )
+        presses = len(tilt.presses)
+        origin = f"by {presses} presses"
+        return replace(bootstrap, tilt=rest, tilt_error=tilt.error, tilt_origin=origin, tilt_presses=presses)
 
     @property
     def kind(self) -> str:

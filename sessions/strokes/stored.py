@@ -17,7 +17,7 @@ from sessions.toml_file import SettingsError, from_table
 # What documents of older programs lack: before 2026-11-23 the first four were not drawn, before 2026-11-25 the others
 # were not stored. Once no such document is read, this goes.
 _NEWER = (
-    *("cross_talk", "tilt", "tilt_error", "tilt_origin", "tilt_from_presses"),
+    *("cross_talk", "tilt", "tilt_error", "tilt_origin", "tilt_presses"),
     *("top_alike", "most_alike", "least_free", "climb_ends", "detector", "climb"),
     *("onset_fewest", "onset_most", "onset_steep", "onset_reach"),
 )

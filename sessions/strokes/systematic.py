@@ -17,20 +17,22 @@ _OF_SESSION = 2**32 - 1  # in the seed, where a stroke has its number
 class SystematicDraws:
     """Errors of one session, (repeats,) of each; the same for each of its strokes."""
 
-    def __init__(
-        self, repeats: int, seed: int, accuracy: Pair, lean: Pair, lean_error: Pair, *, from_presses: bool
-    ) -> None:
+    def __init__(self, repeats: int, seed: int, accuracy: Pair, lean: Pair, lean_error: Pair, *, presses: int) -> None:
         """Draw gains and cross-talk, whose standard uncertainties are `accuracy` [-], and the face's lean [degrees].
 
         `lean` is that of the normal towards +x and +y which nobody levelled, `lean_error` its standard uncertainty.
-        A press shows a sideways force by lean and by cross-talk, and tells their sum: a lean `from_presses` is that.
+        A press shows a sideways force by lean and by cross-talk, and tells their sum: a lean from `presses` is that.
+        The mean of so few follows Student's law (JCGM 101:2008, 6.4.9).
         """
         draw = np.random.default_rng([seed, _OF_SESSION])
         gain, cross_talk = accuracy
         self.gain_t, self.gain_n, self.gain_torque = 1.0 + gain * draw.standard_normal((3, repeats))
         into_drag, into_normal = (cross_talk * draw.standard_normal((repeats, 2)) for _ in range(2))
-        leaning: Array = np.radians(np.array(lean) + np.array(lean_error) * draw.standard_normal((repeats, 2)))
-        if from_presses:
+        off = draw.standard_normal((repeats, 2))
+        if presses:
+            off /= np.sqrt(draw.chisquare(presses - 1, (repeats, 2)) / (presses - 1))
+        leaning: Array = np.radians(np.array(lean) + np.array(lean_error) * off)
+        if presses:
             leaning -= into_drag
         self._of_normal: Array = into_drag + leaning
         self._of_drag: Array = into_normal - leaning

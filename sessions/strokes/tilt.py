@@ -7,7 +7,6 @@ weight in place of a finger, tell the face from the hand.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -43,10 +42,10 @@ class Tilt:
     presses: tuple[Press, ...]
     kind: str  # what the intervals hold, for people
 
-    def error(self, confidence: float) -> Pair:
-        """Return the standard uncertainty [degrees] of a normal lean whose intervals of a `confidence` are these."""
-        wide = 2.0 * NormalDist().inv_cdf(0.5 + confidence / 2)
-        return (self.x_interval[1] - self.x_interval[0]) / wide, (self.y_interval[1] - self.y_interval[0]) / wide
+    @property
+    def error(self) -> Pair:
+        """The standard uncertainty [degrees] of the mean of two presses or more, from how they scatter."""
+        return _mean_error(self.presses)
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
@@ -89,6 +88,11 @@ def press_of(
     )
 
 
+def _mean_error(presses: Sequence[Press]) -> Pair:
+    x, y = np.array([press.lean for press in presses]).std(axis=0, ddof=1) / np.sqrt(len(presses))
+    return float(x), float(y)
+
+
 def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:
     """Return the tilt that presses tell, with intervals; None without any."""
     if not presses:
@@ -99,8 +103,7 @@ def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None
     mean = leans.mean(axis=0)
     per_cent = f"{100 * settings.confidence:g} %"
     if len(presses) >= settings.press.press_fewest:
-        error = leans.std(axis=0, ddof=1) / np.sqrt(len(presses))
-        half = stdtrit(len(presses) - 1, 0.5 + settings.confidence / 2) * error
+        half = stdtrit(len(presses) - 1, 0.5 + settings.confidence / 2) * np.array(_mean_error(presses))
         kind = f"{per_cent} t interval of the mean of {len(presses)} presses"
     else:
         errors = np.array([press.error for press in presses])

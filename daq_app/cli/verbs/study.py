@@ -9,8 +9,6 @@ With --synthetic a study of ten simulated subjects is made first, and what was p
 
 import argparse
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, fields
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,10 +22,10 @@ from daq_app.cli.options import (
     add_quantity,
     add_tau,
     add_workers,
-    numbers_by_key,
     within,
 )
-from daq_app.console import DONE, FLAWED, Console, WrongValue, table
+from daq_app.cli.study_power import add_power, print_power
+from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.atomic_file import json_text
 from sessions.file_access import read_limited
 from sessions.prediction import BY_NAME, SED, PredictionOptions
@@ -38,12 +36,10 @@ from sessions.statistics.pooling.findings import UNITS, StudyFindings
 from sessions.statistics.pooling.ground_truth import checked_planted
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import VisitOptions
-from sessions.statistics.power import Planted, power
 from sessions.strokes.contact_area import FIXED
 
 EXAMPLE = "daq-app study recordings --out results"
 PLANTED = "planted.json"
-SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # designs whose power is told
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,33 +73,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what the uncertainty of friction makes of each SED (usual at small strain, not at finite strain, where "
         "it takes longer)",
     )
-    parser.add_argument(
-        "--power",
-        nargs="*",
-        metavar="NAME=VALUE",
-        help="how many subjects and surfaces a study needs, by simulation; what is planted may be set: "
-        f"{', '.join(f'{one.name}={one.default:g}' for one in fields(Planted))}",
-    )
-    parser.add_argument(
-        "--studies",
-        type=within("--studies", int, 20, 100_000),
-        default=400,
-        metavar="N",
-        help="with --power: simulated per design (400)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=within("--seed", int, 0, LARGEST_SEED),
-        default=0,
-        help="with --power: of the simulated studies (0)",
-    )
+    add_power(parser)
     add_analysis(parser, "fixed for all sessions, however each was analysed before")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Pool the study, write page, table and numbers, and print what it says in short; or print the power of designs."""
     if options.power is not None:
-        return _power(options, console)
+        return print_power(options, console)
     folder, out = _places(options, console)
     sessions = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
     if not sessions:
@@ -128,51 +105,6 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _print(study, files, console)
     flawed = any(row.flaws for visit in study.visits for row in visit.rows) or any(v.losses for v in study.visits)
     return FLAWED if failed or flawed else DONE
-
-
-def _power(options: argparse.Namespace, console: Console) -> int:
-    """Print the power of designs of so many subjects and surfaces."""
-    if options.folder is not None or options.synthetic is not None:
-        raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
-    planted = _set(options.power)
-    found = power(
-        planted,
-        SUBJECTS,
-        SURFACES,
-        options.studies,
-        options.seed,
-        lambda part: console.progress(part, f"{part:.0%} of the designs"),
-    )
-    console.result({"planted": asdict(planted), "designs": [{**asdict(one), "power": one.share} for one in found]})
-    rows = [
-        [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in found if one.subjects == people)]
-        for people in SUBJECTS
-    ]
-    told = ", ".join(f"{one.name} = {getattr(planted, one.name):g}" for one in fields(planted))
-    console.say(f"Planted: {told}. The usual values are assumed, not measured.")
-    console.say(table(rows, head=["subjects", *(f"{count} surfaces" for count in SURFACES)]))
-    console.say(
-        "Share of simulated studies whose correlation within subjects has p < 0.05 for other people on the same "
-        f"surfaces, of {options.studies} each. They speak of these surfaces, not of others."
-    )
-    console.say(
-        "To tell which quantity scores follow, stroke the same surfaces at three depths: at one depth the "
-        "strain-energy density goes with its own parts."
-    )
-    return DONE
-
-
-def _set(texts: Sequence[str]) -> Planted:
-    """Return what is planted, with the values that were set. Raises WrongValue."""
-    names = [field.name for field in fields(Planted)]
-    changes = numbers_by_key(texts, "--power", "effect=20")
-    for name, value in changes.items():
-        if name not in names:
-            raise WrongValue(f"--power {name}={value:g} is not allowed: one of {', '.join(names)}")
-        least = -100.0 if name == "effect" else 0.0
-        if not least <= value <= 100.0:
-            raise WrongValue(f"--power {name}={value:g} is not allowed: {least:g} to 100")
-    return Planted(**changes)
 
 
 def _planted(folder: Path) -> dict[str, Any] | None:

@@ -1,0 +1,52 @@
+"""Whether simulated studies prefer the quantity that was planted, on strokes whose quantities are known numbers."""
+
+import json
+
+import numpy as np
+import pytest
+
+from daq_app.cli.main import run
+from sessions.statistics.recovery import Judgement, recovery, twins
+
+DEPTHS = (1.0, 2.0)
+
+
+def strokes(seed, likeness):
+    """Return two quantities of 12 people on four surfaces at two depths, correlated by `likeness`, and a bystander."""
+    one, other, bystander = np.random.default_rng(seed).standard_normal((3, 12, 8))
+    return {"sed": one, "shear": likeness * one + np.sqrt(1.0 - likeness**2) * other, "mu": bystander}
+
+
+@pytest.mark.parametrize("planted", ["sed", "shear", "mu"])
+def test_a_planted_quantity_that_scores_follow_closely_is_preferred_in_every_study(planted):
+    close = Judgement(rise=20.0, noise=4.0, level_sd=10.0)
+    found = recovery(strokes(1, 0.5), 10, DEPTHS, planted, close, 20, np.random.default_rng(2))
+    assert (found.preferred, found.family, found.twins, found.surfaces) == (1.0, 1.0, (), 4)
+
+
+def test_scores_that_follow_nothing_prefer_each_of_three_about_equally_often():
+    nothing = Judgement(rise=0.0, noise=4.0, level_sd=10.0)
+    found = recovery(strokes(1, 0.0), 10, DEPTHS, "sed", nothing, 90, np.random.default_rng(2))
+    assert found.preferred == pytest.approx(1.0 / 3.0, abs=0.15)
+
+
+def test_a_twin_is_what_goes_with_the_planted_quantity_in_either_sense():
+    alike = strokes(1, 0.999)
+    alike["pressure"] = -alike["sed"]
+    assert twins(alike, "sed") == {"sed", "shear", "pressure"}
+    assert twins(alike, "mu") == {"mu"}
+
+
+def test_the_verb_simulates_studies_at_the_depths_asked_for(capsys, monkeypatch):
+    for name, value in (("SUBJECTS", (4,)), ("SURFACES", (3,)), ("RIVAL_SUBJECTS", (4,)), ("RIVAL_SURFACES", (3,))):
+        monkeypatch.setattr(f"daq_app.cli.study_power.{name}", value)
+    monkeypatch.setattr("daq_app.cli.study_power.RIVAL_STUDIES", 5)
+    easy = ["study", "--power", "effect=80", "noise=1", "slope_sd=0", "--studies", "20", "--depths", "1.25", "1.75"]
+    assert run([*easy, "--quantity", "shear_along_skin", "--json"]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["recovery"]
+    assert (told["people"], told["surfaces"], told["depths"]) == (4, 3, [1.25, 1.75])
+    assert (told["planted"], told["preferred"]) == ("shear_along_skin", 1.0)
+    assert run(easy) == 0
+    assert "4 × 3 × 2" in capsys.readouterr().out
+    assert run([*easy, "9"]) == 2
+    assert "--depths" in capsys.readouterr().err
