@@ -45,18 +45,20 @@ def test_with_lapses_and_scatter_the_function_is_the_one_that_psignifit_finds(le
     assert found.correlation.value == pytest.approx(correlation, abs=2e-5)
 
 
-def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelihood_greatest():
-    def lost(at, levels):
-        pse, slope, lapse, correlation = at
-        if not (0.0 <= lapse <= 0.5 and 0.0 < correlation < 0.5):
-            return 1e9
-        beta = (1.0 - correlation) / correlation
-        total = 0.0
-        for one in levels:
-            p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (one.log_ratio - pse))
-            total -= stats.betabinom.logpmf(one.chosen, one.presented, p * beta, (1.0 - p) * beta)
-        return total
+def lost(at, levels):
+    """Return what another likelihood of beta-binomial answers falls short of 0 by."""
+    pse, slope, lapse, correlation = at
+    if not (0.0 <= lapse <= 0.5 and 0.0 < correlation < 0.5):
+        return 1e9
+    beta = (1.0 - correlation) / correlation
+    total = 0.0
+    for one in levels:
+        p = lapse / 2.0 + (1.0 - lapse) * stats.norm.cdf(slope * (one.log_ratio - pse))
+        total -= stats.betabinom.logpmf(one.chosen, one.presented, p * beta, (1.0 - p) * beta)
+    return total
 
+
+def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelihood_greatest():
     found = psychometric(scattered())
     best = optimize.minimize(
         lost, [0.0, 3.0, 0.05, 0.01], (scattered(),), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-11}
@@ -66,12 +68,22 @@ def test_the_estimate_is_where_another_maximiser_finds_the_beta_binomial_likelih
     ] == pytest.approx(best.x, rel=1e-4)  # fmt: skip
     coefficient = sum(math.log(math.comb(one.presented, one.chosen)) for one in scattered())
     assert found.log_likelihood + coefficient == pytest.approx(-best.fun, abs=1e-7)
-    # An end of the interval: with the PSE held there, the greatest log likelihood is half of F's quantile less.
-    held = optimize.minimize(
-        lambda at: lost([found.pse.high, *at], scattered()), best.x[1:], method="Nelder-Mead",
-        options={"xatol": 1e-7, "fatol": 1e-10},
-    )  # fmt: skip
-    assert held.fun - best.fun == pytest.approx(stats.f.ppf(0.95, 1, 8) / 2.0, abs=5e-3)
+
+
+def test_an_end_of_an_interval_is_where_the_likelihood_adjusted_for_three_fitted_parameters_has_dropped():
+    def adjusted(at):  # of cells of 20 answers: correlated answers tell less by 1 + 19 times their correlation
+        return lost(at, scattered()) - 1.5 * math.log(1.0 + 19.0 * at[3])
+
+    def least(held=()):
+        rest = optimize.minimize(
+            lambda at: adjusted([*held, *at]), [0.0, 3.0, 0.05, 0.02][len(held) :], method="Nelder-Mead",
+            options={"xatol": 1e-8, "fatol": 1e-11, "maxiter": 4000},
+        )  # fmt: skip
+        return rest.fun
+
+    # Five cells are left: Student's interval of a mean is where n ln(1 + t^2 / n) has been lost.
+    dropped = 2.5 * math.log(1.0 + stats.t.ppf(0.975, 5) ** 2 / 5.0)
+    assert least([psychometric(scattered()).pse.high]) - least() == pytest.approx(dropped, abs=5e-3)
 
 
 def observer(rng, ratios, each, planted, correlation=0.0):
@@ -146,7 +158,8 @@ def test_answers_that_step_between_two_levels_bound_the_jnd_above_and_the_pse_on
         p = stats.norm.cdf(slope * np.array(SIX[3:]))
         return -2.0 * np.sum(special.gammaln(p + 10) - special.gammaln(p) - special.gammaln(11))
 
-    slope = optimize.brentq(lambda at: loss(at) - stats.f.ppf(0.95, 1, 6) / 2.0, 1.0, 50.0)
+    dropped = 1.5 * math.log(1.0 + stats.f.ppf(0.95, 1, 3) / 3.0)  # six levels, three parameters
+    slope = optimize.brentq(lambda at: loss(at) - dropped, 1.0, 50.0)
     assert found.jnd.high == pytest.approx(QUARTILE / slope, rel=0.01)
     assert -0.3 < found.pse.low < -0.14 < 0.14 < found.pse.high < 0.3
 

@@ -5,8 +5,13 @@ magnitudes, o is 1 where the comparison came second and -1 where it came first, 
 (Wichmann and Hill 2001, Percept. Psychophys. 63, 1293). Answers to one pair may scatter more than a binomial law: they
 follow a beta-binomial one (Schütt et al. 2016, Vision Res. 122, 105). Fitted by maximum likelihood; intervals are of
 the profile likelihood, which needs no symmetry and holds at the edge where there is no lapse (Venzon and Moolgavkar
-1988, Appl. Stat. 37, 87). Their quantile is F's, with as many degrees of freedom as there are levels in either order.
-Chi squared's held 88 to 94 % of planted observers with 80 to 120 answers; F's less the parameters up to 99.8 %.
+1988, Appl. Stat. 37, 87).
+
+The greatest likelihood takes the scatter of few levels for too small, since the function has been fitted to them. The
+intervals' likelihood is therefore adjusted for that by half the logarithm of the function's information (Cox and Reid
+1987, J. R. Stat. Soc. B 49, 1), which restricted maximum likelihood does for variances. With n levels in either order
+and p parameters of the function, it has dropped at an end by half of (n - p) ln(1 + F(1, n - p) / (n - p)): what it
+drops by where a normal law of unknown variance has Student's interval.
 """
 
 import math
@@ -29,6 +34,7 @@ STEEPEST = 100.0  # slope by the spread of levels, beyond which any function is 
 _PSE, _SLOPE, _ORDER, _LAPSE, _SCATTER = range(5)
 _SAME = 1e-6  # difference of log likelihoods that makes none
 _PRECISE, _ENOUGH = 1e-15, 1e-9  # relative change of the likelihood that ends a search: estimate, end of an interval
+_SOME_SCATTER = 0.05  # theta from which a second search begins, since it may not leave an edge
 _DOUBLINGS = 12  # of a step away from the estimate, until the likelihood has dropped enough
 
 
@@ -80,7 +86,6 @@ def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychom
     if task.flat:
         return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
     slope = task.profile(_SLOPE)
-    freedom = len(held) - sum(low < high for low, high in task.bounds[:_SCATTER])
     return replace(
         none,
         pse=task.profile(_PSE),
@@ -91,7 +96,7 @@ def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychom
         rises=slope.value > 0.0,
         log_likelihood=task.likelihood,
         deviance=task.deviance(),
-        freedom=freedom,
+        freedom=len(held) - task.parameters,
     )
 
 
@@ -115,8 +120,6 @@ class _Task:
         self.yes = np.array([row[1] for row in rows])
         self.before, self.place = (np.array([float(row[n]) for row in rows]) for n in (2, 3))
         self.spread = float(np.std(self.x))
-        # Root of what the log likelihood falls by at an end. Answers of one level hang together, so levels are counted.
-        self.drop = math.sqrt(float(special.fdtri(1, len(levels), CONFIDENCE)) / 2.0)
         self.steepest = STEEPEST / self.spread
         self.ordered = len(set(self.side.tolist())) > 1
         self.reach = far = float(np.ptp(self.x))
@@ -130,7 +133,14 @@ class _Task:
             scatter,
         )
         self.scale = np.array([self.spread, 1.0 / self.spread, self.spread, 0.1, 0.1])
+        self.parameters = sum(low < high for low, high in self.bounds[:_SCATTER])
+        free = max(len(levels) - self.parameters, 1)
+        # Root of what the adjusted log likelihood falls by at an end.
+        self.drop = math.sqrt(free / 2.0 * math.log1p(float(special.fdtri(1, free, CONFIDENCE)) / free))
         self.best, self.likelihood = self._search()
+        scattered = np.append(self.best[:_SCATTER], _SOME_SCATTER)
+        tops = [self._at({}, start, _PRECISE, adjusted=True) for start in (self.best, scattered)]
+        self.top, self.adjusted = max(tops, key=lambda one: one[1])
 
     @property
     def flat(self) -> bool:
@@ -140,7 +150,8 @@ class _Task:
     def profile(self, which: int) -> Profile:
         """Return a parameter with its interval of the profile likelihood."""
         value = float(self.best[which])
-        return Profile(value, self._end(which, -1.0), self._end(which, 1.0))
+        low, high = self._end(which, -1.0), self._end(which, 1.0)
+        return Profile(value, None if low is None else min(low, value), None if high is None else max(high, value))
 
     def deviance(self) -> float:
         """Return the binomial deviance of the chances that were fitted."""
@@ -166,9 +177,9 @@ class _Task:
         return step if step[1] > likelihood - _SAME else (best, likelihood)
 
     def _end(self, which: int, sense: float) -> float | None:
-        """Return where the likelihood has dropped to an end of the interval; the edge of what may be; None beyond."""
+        """Return where the adjusted likelihood has dropped to an end; the edge of what may be; None beyond."""
         edge = self.bounds[which][1 if sense > 0.0 else 0]
-        value, near = float(self.best[which]), self.best
+        value, near = float(self.top[which]), self.top
         if value == edge:
             return edge
         drops = {value: -self.drop}
@@ -176,8 +187,8 @@ class _Task:
         def drop(at: float) -> float:
             nonlocal near
             if at not in drops:
-                there, likelihood = self._at({which: at}, near)
-                drops[at] = math.sqrt(max(self.likelihood - likelihood, 0.0)) - self.drop  # nearly a straight line
+                there, likelihood = self._at({which: at}, near, adjusted=True)
+                drops[at] = math.sqrt(max(self.adjusted - likelihood, 0.0)) - self.drop  # nearly a straight line
                 near = there if drops[at] < 0.0 else near  # beyond the interval a fit may lie far off
             return drops[at]
 
@@ -191,15 +202,21 @@ class _Task:
             inner, step = outer, 2.0 * step
         return None if which in (_PSE, _ORDER) else edge
 
-    def _at(self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH) -> tuple[Array, float]:
-        """Return the best parameters with some held, and their log likelihood."""
+    def _at(
+        self, fixed: dict[int, float], start: Array, precision: float = _ENOUGH, *, adjusted: bool = False
+    ) -> tuple[Array, float]:
+        """Return the best parameters with some held, and their log likelihood, or their adjusted one."""
         bounds = [(fixed[n], fixed[n]) if n in fixed else ends for n, ends in enumerate(self.bounds)]
         low, high = np.array(bounds).T / self.scale
         begin = np.clip(start / self.scale, low, high)
 
         def lost(scaled: Array) -> tuple[float, Array]:
             value, slope = self._log_likelihood(scaled * self.scale)
-            return -value, -slope * self.scale
+            more, by_theta = (
+                self._adjustment(float(scaled[_SCATTER] * self.scale[_SCATTER])) if adjusted else (0.0, 0.0)
+            )
+            slope[_SCATTER] += by_theta
+            return -value - more, -slope * self.scale
 
         ends = list(zip(low, high, strict=True))
         found = optimize.minimize(
@@ -231,6 +248,17 @@ class _Task:
         by_p = np.bincount(self.level, pull, len(p)) @ slopes
         by_theta = (self.before / parts).sum() - (self.place / wholes).sum()
         return float(np.log(parts).sum() - np.log(wholes).sum()), np.append(by_p, by_theta)
+
+    def _adjustment(self, theta: float) -> tuple[float, float]:
+        """Return what is added to the log likelihood for the parameters that were fitted, and its derivative by theta.
+
+        Answers to a level of n tell of the function as n (1 + theta) / (1 + n theta) independent ones.
+        """
+        wide = 1.0 + self.n * theta
+        free = self.n * (1.0 + theta) / wide
+        by_theta = self.n * (1.0 - self.n) / wide**2
+        half = self.parameters / 2.0
+        return -half * math.log(float(free.sum() / self.n.sum())), -half * float(by_theta.sum() / free.sum())
 
 
 def _jnd(slope: Profile, steepest: float, reach: float) -> Profile:
