@@ -1,28 +1,17 @@
-"""The list of drivers: which name opens what."""
+"""The list of drivers: which name opens what. It reads itself from the folders."""
 
-from collections.abc import Callable, Iterable
+import pkgutil
+from collections.abc import Iterable
 from dataclasses import dataclass
+from importlib import import_module
 
+import drivers
 from drivers.address import Address, AddressError, parse_address
 from drivers.clock import Clock
 from drivers.deadline import Deadline
-from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
-from drivers.labjack_u6.device import identify_labjack_u6, open_labjack_u6
-from drivers.net_ft.handshake import identify_net_ft, open_net_ft
-from drivers.nidaq.device import identify_nidaq, open_nidaq
-from drivers.serial_ft.device import identify_serial_ft, open_serial_ft
+from drivers.driver import Driver
 from drivers.tool import TransducerWithTool, with_tool, without_tool
 from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
-
-
-@dataclass(frozen=True, slots=True)
-class Driver:
-    """One way to reach a transducer."""
-
-    name: str  # the scheme of its addresses
-    open: Callable[[Address, Clock, Deadline], Transducer]
-    identify: Callable[[Address, Deadline], TransducerInfo]  # who answers; changes nothing
-    usual: tuple[str, ...]  # addresses where such a device stands unless somebody moved it
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +23,9 @@ class Found:
     problem: str | None
 
 
-DRIVERS: tuple[Driver, ...] = (
-    Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",)),
-    Driver("serial-ft", open_serial_ft, identify_serial_ft, ()),
-    Driver("digital-ft", open_digital_ft, identify_digital_ft, ()),
-    Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",)),
-    Driver("nidaq", open_nidaq, identify_nidaq, ()),
+# Each folder of this package is a driver.
+DRIVERS: tuple[Driver, ...] = tuple(
+    import_module(f"drivers.{module.name}").DRIVER for module in pkgutil.iter_modules(drivers.__path__) if module.ispkg
 )
 
 

@@ -15,6 +15,7 @@ from simulators.faults import Faults
 from simulators.gauges import FT32831
 from simulators.line_box import LineBox
 from simulators.pseudo_terminal import ROOM, PseudoTerminal
+from simulators.simulator import Simulator, served
 
 Array = NDArray[np.float64]
 
@@ -179,3 +180,13 @@ def _crc(frame: bytes) -> bytes:
         for _ in range(8):
             crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
     return crc.to_bytes(2, "little")
+
+
+SIMULATOR = Simulator(
+    "digital-ft",
+    served(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
+    factor=0.4,
+    statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
+    serial_line=True,
+    at_start=True,
+)

@@ -16,6 +16,7 @@ from simulators.faults import Faults
 from simulators.net_ft_electronics import Electronics
 from simulators.net_ft_pages import AXIA, NET_FT, Product
 from simulators.served_box import ServedBox
+from simulators.simulator import LINE_FAULTS, Simulator, served
 
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader
@@ -47,27 +48,24 @@ class NetFtBox(ServedBox):
         clock: Clock,
         *,
         rate: int = 200,
-        rdt_port: int = 0,
-        tcp_port: int = 0,
-        http_port: int = 0,
+        ports: tuple[int, int, int] = (0, 0, 0),
         rate_error: float = 0.0,
         faults: Faults | None = None,
-        first_tick: int = 0,
-        first_record: int = 1,
+        first: tuple[int, int] = (0, 1),
         product: Product = NET_FT,
     ) -> None:
-        """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-]. Port 0 is a free one.
+        """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-].
 
-        `product` says which box it is. `first_tick` is its counter when it starts, as if it had run for long;
-        `first_record` the first number of the first stream. Both serve to see them wrap.
+        `ports` are those of UDP, TCP and HTTP, 0 for a free one. `first` holds its counter when it starts, as if it
+        had run for long, and the first number of the first stream. `product` says which box it is.
         """
         super().__init__(clock, faults)
+        first_tick, self._first_record = first
         self._inside = Electronics(
             bench, self.faults, rate=rate, rate_error=rate_error, first_tick=first_tick, product=product
         )
-        self._wanted = ((socket.SOCK_DGRAM, "rdt", rdt_port), (socket.SOCK_STREAM, "tcp", tcp_port))
-        self._wanted += ((socket.SOCK_STREAM, "http", http_port),)
-        self._first_record = first_record
+        kinds = socket.SOCK_DGRAM, socket.SOCK_STREAM, socket.SOCK_STREAM
+        self._wanted = tuple(zip(kinds, ("rdt", "tcp", "http"), ports, strict=True))
         self._on = True
         self._stream: _Stream | None = None
         self._selector = selectors.SelectSelector()  # the one whose waits are finer than a millisecond
@@ -250,3 +248,14 @@ def _open_port(kind: socket.SocketKind, option: str, port: int) -> socket.socket
         ) from None
     bound.setblocking(False)
     return bound
+
+
+_ERROR = 1 << 31  # set beside any other bit
+SIMULATOR = Simulator(
+    "net-ft",
+    served(lambda bench, clock, faults: NetFtBox(bench, clock, faults=faults, first=(10_000_000, 1))),  # on for long
+    factor=10.0,
+    tells=("repeat", "reorder", "delay", "stall", *LINE_FAULTS),
+    hides=(),
+    statuses=tuple(_ERROR | 1 << n for n in (*range(1, 15), *range(16, 31))),
+)

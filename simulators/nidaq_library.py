@@ -4,6 +4,7 @@ Names and behaviour are those of the public package nidaqmx; the device's clock 
 """
 
 import sys
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.gauges import FT32831
+from simulators.gauges import FT32831, calibration_file
+from simulators.simulator import Simulated, Simulator, unplug
 
 ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]
 OVERFLOW = "The application is not able to keep up with the hardware acquisition.\n\nTask Name: _unnamedTask<0>"
@@ -127,3 +129,13 @@ class _Task:
     def _refuse_without_device(self) -> None:
         if any(self._library.faults.active(kind, self._library.now()) for kind in ("unplug", "reboot")):
             raise DaqError(ABSENT)
+
+
+def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulated:
+    library = SimulatedNidaqmx(bench, clock, faults)
+    library.install()
+    uri = f"nidaq://Dev1?cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
+    return Simulated(uri, bench, library.now, unplug(faults), lambda: library.open, library.remove)
+
+
+SIMULATOR = Simulator("nidaq", _start, factor=1.0, tells=("lose", "saturate", "unplug", "reboot", "slow"))

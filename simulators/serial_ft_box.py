@@ -14,6 +14,7 @@ from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.line_box import LineBox
 from simulators.pseudo_terminal import PseudoTerminal
+from simulators.simulator import Simulator, served
 
 Array = NDArray[np.float64]
 
@@ -183,3 +184,12 @@ class SerialFtBox(LineBox):
             else:
                 packed.append((f"{error}" + "".join(f",{value:6d}" for value in values) + "\r\n").encode())
         return packed
+
+
+SIMULATOR = Simulator(
+    "serial-ft",
+    served(lambda bench, clock, faults: SerialFtBox(bench, clock, faults=faults)),
+    factor=2.0,
+    statuses=tuple(range(1, 10)),
+    serial_line=True,
+)

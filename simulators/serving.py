@@ -33,9 +33,7 @@ def serve_net_ft(
             ScriptedBench(seed, timetable),
             clock_at(factor),
             rate=rate,
-            rdt_port=rdt_port,
-            tcp_port=tcp_port,
-            http_port=port,
+            ports=(rdt_port, tcp_port, port),
             faults=_faults(timetable, seed),
         )
 

@@ -2,13 +2,20 @@
 
 import errno
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import usb.backend  # pyright: ignore[reportMissingTypeStubs]
 import usb.core  # pyright: ignore[reportMissingTypeStubs]
 
+from drivers import usb_link
+from drivers.clock import Clock
+from simulators.bench import Bench
+from simulators.faults import Faults
+from simulators.gauges import calibration_file
 from simulators.labjack_u6_box import LabJackU6Box
+from simulators.simulator import Simulated, Simulator, unplug
 
 _core: Any = usb.core
 _Backend: Any = usb.backend.IBackend
@@ -155,3 +162,17 @@ class SimulatedBus(_Backend):
             self.close_device(dev_handle)
             raise _core.USBError("No such device (it may have been disconnected)", -4, errno.ENODEV)
         return box
+
+
+def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulated:
+    box = LabJackU6Box(bench, clock, faults=faults)
+    bus = usb_link.BACKEND = SimulatedBus([box])
+    uri = f"labjack-u6://?rate=300&cal={calibration_file(folder, f'SIM{bench.seed:05d}')}"
+
+    def forget() -> None:
+        usb_link.BACKEND = None
+
+    return Simulated(uri, bench, box.now, unplug(faults), bus.held, forget)
+
+
+SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63))  # codes in a stream

@@ -1,1 +1,257 @@
-"""The transducer with its own converter on an RS-485 line."""
+"""The RS-485 transducer: finding out who answers, and what is said around a stream."""
+
+import contextlib
+import math
+import struct
+import time
+from dataclasses import dataclass
+from functools import partial
+
+from drivers.address import Address, check_options
+from drivers.clock import Clock
+from drivers.clock_recovery import GAP, ClockRecovery
+from drivers.deadline import Deadline
+from drivers.digital_ft import wire
+from drivers.driver import Driver
+from drivers.link import Link
+from drivers.records import RecordDecoder
+from drivers.serial_link import Parity, SerialLink, port_of
+from drivers.streaming import StreamingTransducer, measured_rate
+from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
+
+# All in real seconds.
+_ANSWER = 0.15  # for one answer
+_PATIENCE = (1.0, 2.0, 4.0, 8.0)  # times that, for the answers to one request asked again
+_REST = 0.4  # for the transducer to come to itself after a jam; a published driver waits 0.5 to 1 s
+_END = 0.08  # for a jammed stream to fall silent
+_SILENT = 0.02
+_TRIES = 4  # with a rest after each, within the time for opening
+_MEASURED = 0.5  # for how long the stream is watched to learn its rate [real s]
+_AS_STATED = 0.03  # a measured rate this near to the stated one is that [-]
+_OPTIONS = frozenset({"baud", "parity", "calibration"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Where:
+    """What an address says."""
+
+    address: Address
+    port: str
+    baud: int
+    parity: Parity
+    number: int  # of the calibration, 1 to 16
+
+
+def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
+    """Return the transducer at `address`, its calibration in force, not streaming.
+
+    Raises SetupError, LinkLost or DeviceFault with the reason.
+    """
+    place = _where(address)
+    link = _line(place, deadline)
+    try:
+        bound = deadline.bound(link)
+        word = hold(bound)
+        stored = _stored(place, bound)
+        conversation = DigitalConversation(place.number, stored)
+        rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{address.uri}: {error}") from None
+    finally:
+        link.close()
+    info = _info(place, stored, word, rate)
+    return StreamingTransducer(info, partial(_line, place), conversation, clock, opening=deadline)
+
+
+def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
+    place = _where(address)
+    link = deadline.bound(_line(place, deadline))
+    try:
+        word = status_word(link)
+        if word is None:
+            streams = link.receive(0.05) is not None
+            raise LinkLost("it streams, and nobody reads; open it to end that" if streams else "no transducer answers")
+        return _info(place, _stored(place, link), word, math.nan)
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{address.uri}: {error}") from None
+    finally:
+        link.close()
+
+
+def _line(place: _Where, _deadline: Deadline) -> SerialLink:
+    """Return the line, open."""
+    return SerialLink(place.port, place.baud, place.parity)
+
+
+def _stored(place: _Where, link: Link) -> wire.StoredCalibration:
+    registers = read(link, wire.calibration_address(place.number), wire.CALIBRATION_SIZE)
+    try:
+        return wire.parse_calibration(registers)
+    except SetupError as error:
+        raise SetupError(f"{place.address.uri}: calibration {place.number} {error}") from None
+
+
+def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, measured: float) -> TransducerInfo:
+    as_stated = math.isnan(measured) or abs(measured / wire.STREAM_RATE - 1.0) < _AS_STATED
+    day = stored.calibrated or "on a day not stated"
+    settings = {
+        "line": f"{place.baud} baud, 8 data bits, parity {place.parity}, 1 stop bit",
+        "calibration": f"number {place.number}, {stored.part_number}, calibrated {day}",
+        "gauge gains and offsets": stored.gains_and_offsets.hex(" ", 2),
+        "bias": "none in the transducer",
+        "filter": "none",
+        "time": "host arrival at the stated rate; packets carry no clock or number, "
+        f"and a loss shorter than {GAP:g} s that leaves no broken bytes is not noticed",
+    }
+    if status is not None:
+        settings["status at opening"] = "; ".join(wire.status_words(status)) or "healthy"
+    if not math.isnan(measured):
+        how = "as stated by the maker to 0.5 %" if as_stated else "as measured, not as stated by the maker"
+        settings["rate"] = f"{how}; {measured:.0f} Hz measured at opening"
+    return TransducerInfo(
+        uri=place.address.uri,
+        driver="digital-ft",
+        model=f"Digital F/T {stored.part_number}".strip(),
+        serial=stored.calibration.serial,
+        simulated="SIMULATED" in stored.part_number.upper(),
+        rate=wire.STREAM_RATE if as_stated else measured,
+        counter_rate=math.nan,
+        calibration=stored.calibration,
+        settings=settings,
+        status=wire.STATUS_BITS,
+    )
+
+
+def _where(address: Address) -> _Where:
+    """Return what a digital-ft address says. Raises SetupError when it is not one."""
+    check_options(address, _OPTIONS)
+    parity = address.options.get("parity", "even")
+    if parity not in ("even", "none"):
+        raise SetupError(f"{address.uri}: parity={parity} must be even, as the transducer's, or none")
+    return _Where(
+        address,
+        port_of(address),
+        address.number("baud", 1_250_000, 300, 4_000_000),
+        parity,
+        address.number("calibration", 1, 1, wire.CALIBRATIONS),
+    )
+
+
+class DigitalConversation:
+    """Requests, answers and streams of one transducer with one of its calibrations."""
+
+    def __init__(self, number: int, stored: wire.StoredCalibration) -> None:
+        """Take a transducer whose calibration `number`, 1 to 16, was read as `stored`."""
+        self._number = number
+        self._stored = stored
+        self._word = 0  # the status word, which can only be read while nothing streams
+
+    def decoder(self) -> RecordDecoder:
+        """Return a decoder for a stream about to begin."""
+        return wire.StreamDecoder(self._word)
+
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
+        """Return what numbers the stream: its records carry neither number nor time."""
+        return ClockRecovery(rate, factor)
+
+    def begin(self, link: Link) -> bytes:
+        """Put the calibration's gains and offsets in force, prove it, and let the transducer stream.
+
+        Raises LinkLost when it does not answer, DeviceFault when another transducer does or it refuses.
+        """
+        self._word = hold(link)
+        first = wire.calibration_address(self._number)
+        stored = read(link, first, wire.CALIBRATION_SIZE)
+        serial = stored[:8].split(b"\0")[0].decode("ascii", "replace").strip()
+        expected = self._stored.calibration.serial
+        if serial != expected:
+            raise DeviceFault(f"transducer {serial or 'without a name'} answers where {expected} was; open it anew")
+        wanted = self._stored.gains_and_offsets
+        _done(link, wire.request(wire.UNLOCK, bytes([wire.UNLOCK_KEY])), "to be unlocked")
+        _done(link, wire.write_registers(wire.GAINS_AND_OFFSETS, wanted), "its gains and offsets")
+        _done(link, wire.request(wire.UNLOCK, bytes([wire.LOCK_KEY])), "to be locked")
+        if read(link, wire.GAINS_AND_OFFSETS, len(wanted) // 2) != wanted:
+            raise DeviceFault(
+                "the transducer did not take the gains and offsets of its calibration; switch it off and on"
+            )
+        start, started = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
+        heard = _heard(link, start, started, _PATIENCE[-1] * _ANSWER)
+        if started not in heard:
+            raise LinkLost("the transducer does not begin to stream; switch it off and on")
+        return heard.partition(started)[2]
+
+    def end(self, link: Link) -> None:
+        """Let the stream end by sending into it."""
+        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
+            link.send(wire.JAM)
+            deadline = time.monotonic() + _END
+            while time.monotonic() < deadline and link.receive(_SILENT) is not None:
+                pass
+
+
+def hold(link: Link) -> int:
+    """Return the status word, after ending a stream left over from before. Raises LinkLost when nobody answers."""
+    for _ in range(_TRIES):
+        if (word := status_word(link)) is not None:
+            return word
+        if link.receive(_SILENT) is not None:
+            link.send(wire.JAM)
+        link.receive(_REST)
+    raise LinkLost("the transducer does not answer; check its power, the cable, the baud rate and the parity")
+
+
+def status_word(link: Link) -> int | None:
+    """Return the status word, or None when there is no answer: it is not there, or it streams."""
+    asked = wire.read_registers(wire.STATUS, 1)
+    answer = wire.answer_in(_heard(link, asked, b""), asked)
+    return struct.unpack(">H", answer)[0] if isinstance(answer, bytes) else None
+
+
+def read(link: Link, first: int, count: int) -> bytes:
+    """Return `count` registers from `first`, two bytes each. Raises LinkLost or DeviceFault."""
+    read_so_far = b""
+    while len(read_so_far) < 2 * count:
+        done = len(read_so_far) // 2
+        asked = wire.read_registers(first + done, min(count - done, wire.MOST_REGISTERS))
+        read_so_far += _answer(link, asked, f"for register {first + done}")
+    return read_so_far
+
+
+def _done(link: Link, asked: bytes, what: str) -> None:
+    """Carry out a request that is answered with success or a repetition of what was written."""
+    answer = _answer(link, asked, what)
+    if asked[1] == wire.UNLOCK and answer != b"\x01":
+        raise DeviceFault(f"the transducer was asked {what} and refused; switch it off and on")
+
+
+def _answer(link: Link, asked: bytes, what: str) -> bytes:
+    """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
+    for times in _PATIENCE:
+        answer = wire.answer_in(_heard(link, asked, b"", times * _ANSWER), asked)
+        if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
+            while link.receive(_ANSWER) is not None:
+                pass
+        if isinstance(answer, wire.Refused):
+            raise DeviceFault(f"the transducer was asked {what} and refused: {answer.reason}")
+        if answer is not None:
+            return answer
+    raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")
+
+
+def _heard(link: Link, asked: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
+    """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
+    deadline = time.monotonic() + _ANSWER
+    while link.receive(0.0) and time.monotonic() < deadline:
+        pass  # left over from before
+    link.send(asked)
+    heard = b""
+    deadline = time.monotonic() + patience
+    while True:
+        left = deadline - time.monotonic()
+        heard += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
+        if left <= 0.0 or (expected in heard if expected else wire.answer_in(heard, asked) is not None):
+            return heard
+
+
+DRIVER = Driver("digital-ft", open_digital_ft, identify_digital_ft)

@@ -1,1 +1,212 @@
-"""The LabJack U6: six gauge voltages over USB."""
+"""The LabJack U6: finding the one an address names, and what is said around a stream of six gauge voltages."""
+
+import contextlib
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from drivers.address import Address, AddressError, check_options
+from drivers.calibration_file import CalibrationFile, read_calibration_file
+from drivers.clock import Clock
+from drivers.deadline import Deadline
+from drivers.driver import Driver
+from drivers.labjack_u6 import wire
+from drivers.link import Link
+from drivers.records import RecordDecoder
+from drivers.scan_count import ScanCount
+from drivers.streaming import StreamingTransducer
+from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
+from drivers.usb_link import Endpoints, UsbLink, found
+
+_ANSWER = 1.0  # for an answer [real s], as in the maker's own driver
+_WRAP = 256 * wire.SCANS  # scans after which the packet counter begins anew
+_VENDOR, _PRODUCT = 0x0CD5, 0x0006
+_ENDPOINTS = Endpoints(0x01, 0x82, 0x83)
+_OPTIONS = frozenset({"serial", "cal", "rate"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Where:
+    """What an address says."""
+
+    uri: str
+    serial: int  # of the converter; 0: whichever is alone
+    rate: int  # scans a second
+    calibration: CalibrationFile | None
+
+
+def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
+    """Return the transducer at `address`, identified, not streaming. Raises SetupError, LinkLost, DeviceFault."""
+    place = _where(address)
+    if place.calibration is None:
+        raise AddressError(f"{place.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
+    link, identity = _linked(place, deadline)
+    try:
+        constants = _constants(deadline.bound(link))
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{place.uri}: {error}") from None
+    finally:
+        link.close()
+    scans = wire.scan_clock(place.rate)
+    conversation = GaugeConversation(identity.serial, constants, scans)
+    info = _info(place, place.calibration, identity, constants, scans)
+    return StreamingTransducer(info, partial(_again, place, identity.serial), conversation, clock, opening=deadline)
+
+
+def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
+    place = _where(address)
+    link, identity = _linked(place, deadline)
+    try:
+        if place.calibration is None:
+            raise SetupError(
+                f"{place.uri}: LabJack U6 {identity.serial} is there; add cal=FILE, the transducer's own .cal file"
+            )
+        constants = _constants(deadline.bound(link))
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{place.uri}: {error}") from None
+    finally:
+        link.close()
+    return _info(place, place.calibration, identity, constants, wire.scan_clock(place.rate))
+
+
+def _linked(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
+    """Return the one converter that is meant, open, and who it is."""
+    fitting: dict[int, Any] = {}
+    refused: list[SetupError] = []
+    for one in found(_VENDOR, _PRODUCT):
+        try:
+            link = UsbLink(one, _ENDPOINTS, place.uri)
+        except SetupError as error:
+            refused.append(error)
+            continue
+        try:
+            serial = _identity(deadline.bound(link)).serial
+        except (LinkLost, DeviceFault) as error:
+            refused.append(SetupError(f"{place.uri}: {error}"))
+            continue
+        finally:
+            link.close()
+        if place.serial in (0, serial):
+            fitting[serial] = one
+    if len(fitting) > 1:
+        raise SetupError(f"{place.uri}: several are plugged in; add serial= one of {', '.join(map(str, fitting))}")
+    if not fitting:
+        if refused:
+            raise refused[0]
+        which = f"LabJack U6 {place.serial}" if place.serial else "LabJack U6"
+        raise LinkLost(f"{place.uri}: no {which} is plugged in; check its USB cable")
+    (one,) = fitting.values()
+    link = UsbLink(one, _ENDPOINTS, place.uri)
+    try:
+        return link, _identity(deadline.bound(link))
+    except BaseException:
+        link.close()
+        raise
+
+
+def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:
+    """Open the same converter anew, wherever it is plugged in now."""
+    return _linked(_Where(place.uri, serial, place.rate, place.calibration), deadline)[0]
+
+
+def _info(
+    place: _Where,
+    file: CalibrationFile,
+    identity: wire.Identity,
+    constants: wire.Constants,
+    scans: wire.ScanClock,
+) -> TransducerInfo:
+    return TransducerInfo(
+        uri=place.uri,
+        driver="labjack-u6",
+        model=f"{file.body} {file.part_number} on LabJack U6{'-Pro' if identity.pro else ''}".strip(),
+        serial=file.calibration.serial,
+        simulated="SIMULATED" in file.part_number.upper(),
+        rate=scans.rate,
+        counter_rate=scans.rate,
+        calibration=file.calibration,
+        status=wire.STATUS_BITS,
+        settings={
+            "converter": f"serial number {identity.serial}, firmware {identity.firmware}",
+            "calibration": f"{file.calibration.source}, SHA-256 {file.sha256}",
+            "constants": f"{constants.positive_slope!r} V above and {constants.negative_slope!r} V below "
+            f"code {constants.centre!r}, as the converter states them",
+            "gauges": "differential pairs 0-1 to 10-11, +-10 V, resolution index 1, settling time its own choice; "
+            "accepted when a stream begins, and not to be read back",
+            "bias": "none in the device",
+            "filter": "none",
+            "time": "the converter's own clock; gauges of one reading are converted one after the other",
+        },
+    )
+
+
+def _where(address: Address) -> _Where:
+    check_options(address, _OPTIONS)
+    if address.host:
+        raise AddressError(f"{address.uri}: a USB device has no host; write labjack-u6://?serial=...&cal=FILE")
+    file = address.options.get("cal")
+    return _Where(
+        address.uri,
+        address.number("serial", 0, 0, 999_999_999),
+        address.number("rate", 1000, 3, wire.HIGHEST_RATE),
+        None if file is None else read_calibration_file(Path(file)),
+    )
+
+
+class GaugeConversation:
+    """Requests and streams of one converter. Each request is answered before anything else comes."""
+
+    def __init__(self, serial: int, constants: wire.Constants, clock: wire.ScanClock) -> None:
+        """Take the converter of that serial number, whose constants were read, to scan by `clock`."""
+        self._serial = serial
+        self._constants = constants
+        self._scan_clock = clock
+
+    def decoder(self) -> RecordDecoder:
+        """Return a decoder for a stream about to begin."""
+        return wire.StreamDecoder(self._constants)
+
+    def numbering(self, rate: float, factor: float) -> ScanCount:
+        """Return what numbers the scans: the converter's own clock."""
+        return ScanCount(rate, factor, wrap=_WRAP)
+
+    def begin(self, link: Link) -> bytes:
+        """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""
+        self.end(link)
+        found = _identity(link)
+        if found.serial != self._serial:
+            raise DeviceFault(f"converter {found.serial} answers where {self._serial} was; open it anew")
+        wire.check_configured(_said(link, wire.configure_stream(self._scan_clock)))
+        if code := wire.normal_error(_said(link, wire.START), 0xA9):
+            raise DeviceFault(f"the converter does not stream: {wire.meaning(code)}; pull its plug and put it in again")
+        return b""
+
+    def end(self, link: Link) -> None:
+        """Let the stream end and drop what it had still sent."""
+        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
+            code = wire.normal_error(_said(link, wire.STOP), 0xB1)
+            if code not in (0, wire.STREAM_IS_OFF):
+                raise DeviceFault(f"the converter does not stop: {wire.meaning(code)}; pull its plug")
+            while link.receive(0.002):
+                pass
+
+
+def _identity(link: Link) -> wire.Identity:
+    """Return who answers. Raises LinkLost or DeviceFault when nobody does."""
+    return wire.parse_identity(_said(link, wire.read_identity()))
+
+
+def _constants(link: Link) -> wire.Constants:
+    """Return the converter's own calibration. Raises LinkLost or DeviceFault when it has none."""
+    return wire.parse_constants(_said(link, wire.read_memory(0)), _said(link, wire.read_memory(2)))
+
+
+def _said(link: Link, request: bytes) -> bytes | None:
+    """Return the answer to a request, or None."""
+    link.send(request)
+    return link.receive(_ANSWER)
+
+
+DRIVER = Driver("labjack-u6", open_labjack_u6, identify_labjack_u6, ("labjack-u6://",))

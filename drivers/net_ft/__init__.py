@@ -1,1 +1,189 @@
-"""The networked force/torque box."""
+"""Finding out who answers at a net-ft address, and setting what the address asks for: web pages and command port."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.address import Address, AddressError, check_options
+from drivers.clock import Clock
+from drivers.deadline import Deadline
+from drivers.driver import Driver
+from drivers.links import UdpLink, http_get, tcp_answer
+from drivers.net_ft import wire
+from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate
+from drivers.net_ft.device import NetFtTransducer
+from drivers.net_ft.wire import COUNTER_RATE
+from drivers.transducer import LinkLost, SetupError, TransducerInfo
+
+_AT_ONCE = 0.18  # for one web page while a stream is silent, and so for a stop [real s]
+_SETTLING = 0.05  # after a bias was asked for [real s]
+_OPTIONS = frozenset({"rdt", "tcp", "http", "rate", "mode", "bias", "latch"})
+_WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("keep", "reset")}  # the first: untold
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """Where a box is, and the rate asked of it."""
+
+    address: Address
+    http_port: int
+    rdt_port: int
+    tcp_port: int
+    rate: int | None  # asked for in the address [Hz]; None leaves the box as it is
+    buffered: bool = False  # several records a datagram: fewer datagrams, later
+    set_bias: bool = False  # what is felt at opening reads as zero from then on
+    reset_latch: bool = False  # of the monitor condition
+
+
+def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
+    """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
+    place = where(address)
+    return NetFtTransducer(
+        prepare(place, deadline),
+        connect=lambda limit: UdpLink(address.host, place.rdt_port, limit),
+        who=lambda: who(place),
+        clock=clock,
+        opening=deadline,
+        request=start_request(place),
+    )
+
+
+def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
+    return identify(where(address), deadline)
+
+
+def where(address: Address) -> Where:
+    """Return what a net-ft address says. Raises SetupError when it is not one."""
+    check_options(address, _OPTIONS)
+    if not address.host:
+        raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")
+    chosen = {name: address.options.get(name, words[0]) for name, words in _WORDS.items()}
+    for name, word in chosen.items():
+        if word not in _WORDS[name]:
+            raise AddressError(f"{address.uri}: {name}={word} must be {' or '.join(_WORDS[name])}")
+    return Where(
+        address,
+        http_port=address.number("http", 80, 1, 65535),
+        rdt_port=address.number("rdt", 49152, 1, 65535),
+        tcp_port=address.number("tcp", 49151, 1, 65535),
+        rate=address.number("rate", 0, 1, int(COUNTER_RATE)) or None,
+        buffered=chosen["mode"] == "buffered",
+        set_bias=chosen["bias"] == "set",
+        reset_latch=chosen["latch"] == "reset",
+    )
+
+
+def identify(place: Where, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
+    return _info(place, _configuration(place, deadline))
+
+
+def prepare(place: Where, deadline: Deadline) -> TransducerInfo:
+    """Set what the address asks for, and return who answers, as read back afterwards."""
+    found = _configuration(place, deadline)
+    if not found.streams:
+        raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
+    if place.rate is not None and not _is_rate(found, place.rate):
+        path = f"/comm.cgi?comrdtrate={place.rate}"
+        answer = http_get(place.address.host, place.http_port, path, deadline)
+        if answer.status not in (200, 302) or not _is_rate(found := _configuration(place, deadline), place.rate):
+            shown = "shows no rate at all" if math.isnan(found.rate) else f"stays at {found.rate:g} Hz"
+            raise SetupError(
+                f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
+                "set the rate on its Communications page"
+            )
+    done = _commanded(place, found, deadline) if place.set_bias or place.reset_latch else {}
+    if place.buffered:
+        done["streaming"] = "buffered"
+    info = _info(place, found)
+    return replace(info, settings={**info.settings, **done})
+
+
+def start_request(place: Where) -> bytes:
+    """Return what asks for the stream that the address wants."""
+    return wire.START_BUFFERED if place.buffered else wire.START
+
+
+def _commanded(place: Where, found: Configuration, deadline: Deadline) -> dict[str, str]:
+    """Carry out over the command port what the address asks for; return what came of it, for the record."""
+    units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
+    if units is None or (units.counts_per_force, units.counts_per_torque) != (
+        found.counts_per_force,
+        found.counts_per_torque,
+    ):
+        raise SetupError(
+            f"{place.address.uri}: the box's command port does not count as its web page says; check the tcp port"
+        )
+    done: dict[str, str] = {}
+    if place.reset_latch:
+        _wrench(place, wire.RESET_LATCH, deadline)
+        still = wire.is_latched(_tcp(place, wire.READ_WRENCH, 16, deadline))
+        read_back = "and latched again: its condition holds" if still else "and read back as not latched"
+        done["monitor condition latch"] = f"reset at opening, as the address asks, {read_back}"
+    if place.set_bias:
+        _wrench(place, wire.SET_BIAS, deadline)
+        time.sleep(_SETTLING)
+        counts = np.array(_wrench(place, wire.READ_WRENCH, deadline)) * np.array(units.scales)
+        left = np.abs(found.calibration().matrix @ counts)
+        done["software bias"] = (
+            f"set at opening, as the address asks; at most {left[:3].max():.3g} N and {left[3:].max():.3g} N mm left"
+        )
+    return done
+
+
+def _wrench(place: Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:
+    counts = wire.parse_wrench(_tcp(place, command, 16, deadline))
+    if counts is None:
+        raise SetupError(f"{place.address.uri}: its command port gives no answer that can be read; check the tcp port")
+    return counts
+
+
+def _tcp(place: Where, command: bytes, size: int, deadline: Deadline) -> bytes:
+    return tcp_answer(place.address.host, place.tcp_port, command, size, deadline)
+
+
+def who(place: Where) -> TransducerInfo | None:
+    """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
+    try:
+        return identify(place, Deadline(_AT_ONCE))
+    except LinkLost:
+        return None
+
+
+def _info(place: Where, found: Configuration) -> TransducerInfo:
+    return TransducerInfo(
+        uri=place.address.uri,
+        driver="net-ft",
+        model=" ".join(filter(None, (found.product, found.model))),
+        serial=found.serial,
+        simulated="SIMULATED" in found.product.upper(),
+        rate=found.rate,
+        counter_rate=found.ticks,
+        calibration=found.calibration(),
+        settings=found.settings,
+        status=found.family.status,
+    )
+
+
+def _is_rate(found: Configuration, asked: int) -> bool:
+    return math.isclose(found.rate, true_rate(asked, found.ticks))
+
+
+def _configuration(place: Where, deadline: Deadline) -> Configuration:
+    answer = http_get(place.address.host, place.http_port, "/netftapi2.xml", deadline)
+    if answer.status != 200:
+        raise SetupError(
+            f"{place.address.uri}: its web page answers {answer.status} instead of a configuration; "
+            "check that the address is that of a Net F/T box or an Ethernet Axia"
+        )
+    try:
+        found = parse_configuration(answer.body)
+    except SetupError as error:
+        raise SetupError(f"{place.address.uri}: {error}") from None
+    return found
+
+
+DRIVER = Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",))

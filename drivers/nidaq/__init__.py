@@ -1,1 +1,213 @@
-"""Six gauge voltages through NI-DAQmx."""
+"""Six gauges on a data-acquisition device of National Instruments, through its maker's library.
+
+The library (`nidaqmx`, an optional extra) brings its own codec: volts come as numbers. It times the readings by the
+device's clock and numbers nothing; when its buffer overflows it ends the acquisition, which begins anew behind a gap.
+"""
+
+import importlib
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from drivers.address import Address, AddressError, check_options
+from drivers.calibration_file import read_calibration_file
+from drivers.clock import Clock
+from drivers.deadline import Deadline
+from drivers.driver import Driver
+from drivers.link import Link
+from drivers.records import RecordDecoder, Records
+from drivers.scan_count import ScanCount
+from drivers.status import StatusTable, bit
+from drivers.streaming import StreamingTransducer
+from drivers.transducer import LinkLost, SetupError, TransducerInfo
+
+GAUGES = 6
+RANGE = 10.0  # [V]
+LIMIT = 9.9  # of a gauge's voltage [V]; a converter of 16 bits clips slightly outside of 10 V
+# Bit 8 + i of a status says that gauge i is at its limit.
+STATUS_BITS = StatusTable(tuple(bit(8 + gauge, f"gauge {gauge} at its limit", "saturated") for gauge in range(GAUGES)))
+_BUFFER = 10.0  # readings that the library keeps for a computer that is late [s]
+_NAP = 0.005  # between two looks for readings [real s]
+_OPTIONS = frozenset({"cal", "rate"})
+_DEFAULT_RATE = 1000  # [Hz]
+
+
+def library() -> Any:  # noqa: ANN401 - it is not always there
+    """Return NI's library. Raises SetupError with what to install."""
+    try:
+        importlib.import_module("nidaqmx.constants")
+        importlib.import_module("nidaqmx.system")
+        return importlib.import_module("nidaqmx")
+    except ImportError:
+        raise SetupError(
+            "nidaq:// needs NI's library: pip install 'daq-app[nidaq]', and the NI-DAQmx driver from NI"
+        ) from None
+
+
+def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
+    """Return the transducer at `address`, not streaming. Raises SetupError with the reason."""
+    check_options(address, _OPTIONS)
+    api = library()
+    device, info = _found(api, address)
+    rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
+    link = TaskLink(api, device, rate)
+    link.close()
+    return StreamingTransducer(
+        replace(info, rate=link.rate, counter_rate=link.rate, settings={**info.settings, "gauges": link.gauges}),
+        lambda _: TaskLink(api, device, rate),
+        TaskConversation(),
+        clock,
+        opening=deadline,
+    )
+
+
+def identify_nidaq(address: Address, _deadline: Deadline) -> TransducerInfo:
+    """Return who is there; nothing is acquired. Raises SetupError with the reason."""
+    check_options(address, _OPTIONS)
+    return _found(library(), address)[1]
+
+
+def _found(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
+    """Return the device's name as NI-DAQmx spells it, and who the transducer on it is."""
+    file = address.options.get("cal")
+    if not address.host or file is None:
+        raise AddressError(f"{address.uri}: write nidaq://Dev1?cal=FILE, with the transducer's own .cal file")
+    calibration = read_calibration_file(Path(file))
+    try:
+        devices = {device.name.lower(): device for device in api.system.System.local().devices}
+    except Exception as error:  # noqa: BLE001 - without NI's driver the library raises errors of several kinds
+        raise SetupError(f"{address.uri}: NI-DAQmx does not answer ({error}); install its driver from NI") from None
+    device = devices.get(address.host.lower())
+    if device is None:
+        known = ", ".join(sorted(device.name for device in devices.values())) or "none"
+        raise SetupError(f"{address.uri}: there is no device {address.host}; NI-DAQmx knows {known}")
+    simulated = bool(device.is_simulated)
+    info = TransducerInfo(
+        uri=address.uri,
+        driver="nidaq",
+        model=f"{calibration.body} {calibration.part_number} on NI {device.product_type}",
+        serial=calibration.calibration.serial,
+        simulated=simulated or "SIMULATED" in calibration.part_number.upper(),
+        rate=float("nan"),
+        counter_rate=float("nan"),
+        calibration=calibration.calibration,
+        status=STATUS_BITS,
+        settings={
+            "converter": f"{device.product_type}, serial number {device.serial_num:X}",
+            "calibration": f"{calibration.calibration.source}, SHA-256 {calibration.sha256}",
+            "gauges": "six differential pairs from ai0 on, +-10 V",
+            "bias": "none in the device",
+            "filter": "none",
+            "time": "the device's own clock; gauges of one reading may be converted one after the other",
+        },
+    )
+    return str(device.name), info
+
+
+class TaskLink:
+    """One acquisition as a link: what is received are volts of whole readings, as bytes of float64."""
+
+    def __init__(self, library: Any, device: str, rate: float) -> None:  # noqa: ANN401 - nidaqmx is not always there
+        """Acquire the six differential pairs from ai0 on, at `rate` [Hz]. Raises SetupError when the device refuses."""
+        self._library = library
+        self._where = device
+        self._task: Any = None
+        try:
+            self._task = library.Task()
+            differential = library.constants.TerminalConfiguration.DIFF
+            channels = self._task.ai_channels.add_ai_voltage_chan(
+                f"{device}/ai0:{GAUGES - 1}",
+                terminal_config=differential,
+                min_val=-RANGE,
+                max_val=RANGE,
+            )
+            low, high = float(channels.ai_min), float(channels.ai_max)
+            if low > -RANGE or high < RANGE or channels.ai_term_cfg != differential:
+                self.close()
+                raise SetupError(
+                    f"-{RANGE:g} to {RANGE:g} V was asked of {device} and it took {low:g} to {high:g} V, "
+                    f"{channels.ai_term_cfg}; use a device with six differential inputs of that range"
+                )
+            self.gauges = f"six differential pairs from ai0 on, {low:g} to {high:g} V, as read back"
+            self._task.timing.cfg_samp_clk_timing(
+                rate,
+                sample_mode=library.constants.AcquisitionType.CONTINUOUS,
+                samps_per_chan=max(round(_BUFFER * rate), 1000),
+            )
+            self.rate = float(self._task.timing.samp_clk_rate)  # as read back [Hz]
+        except library.DaqError as error:
+            self.close()
+            raise SetupError(f"{device} cannot be set: {_sentence(error)}") from None
+
+    def send(self, data: bytes) -> None:
+        """Begin or end the acquisition: b"start" or b"stop". Raises LinkLost when the device is gone."""
+        try:
+            self._task.start() if data == b"start" else self._task.stop()
+        except self._library.DaqError as error:
+            raise LinkLost(f"{self._where}: {_sentence(error)}") from None
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return what has arrived, or None when nothing came within `timeout` real seconds."""
+        deadline = time.monotonic() + timeout
+        while True:
+            try:
+                volts = self._task.read(number_of_samples_per_channel=self._library.constants.READ_ALL_AVAILABLE)
+            except self._library.DaqError as error:
+                raise LinkLost(f"{self._where}: {_sentence(error)}") from None
+            readings = np.asarray(volts, np.float64).reshape(GAUGES, -1).T
+            if len(readings):
+                return readings.tobytes()
+            if time.monotonic() >= deadline:
+                return None
+            time.sleep(_NAP)
+
+    def close(self) -> None:
+        """Give the device back. Harmless when repeated."""
+        if self._task is not None:
+            task, self._task = self._task, None
+            task.close()
+
+
+class VoltsDecoder:
+    """Turns volts into records; nothing is ever broken or numbered."""
+
+    malformed = 0
+
+    def feed(self, data: bytes) -> Records:
+        """Take whole readings as bytes of float64 and return them with the status of their gauges."""
+        volts = np.frombuffer(data, np.float64).reshape(-1, GAUGES)
+        status = ((np.abs(volts) >= LIMIT) * (1 << np.arange(8, 8 + GAUGES))).sum(axis=1)
+        return Records(volts, status.astype(np.int64), np.zeros(len(volts), np.int64))
+
+
+class TaskConversation:
+    """Begins and ends acquisitions."""
+
+    def decoder(self) -> RecordDecoder:
+        """Return a decoder for a stream about to begin."""
+        return VoltsDecoder()
+
+    def numbering(self, rate: float, factor: float) -> ScanCount:
+        """Return what numbers the readings: the device's own clock."""
+        return ScanCount(rate, factor)
+
+    def begin(self, link: Link) -> bytes:
+        """Let readings come."""
+        link.send(b"start")
+        return b""
+
+    def end(self, link: Link) -> None:
+        """Let them end."""
+        link.send(b"stop")
+
+
+def _sentence(error: Exception) -> str:
+    """Return the first line of the library's explanation."""
+    lines = str(error).splitlines()
+    return (lines[0] if lines else type(error).__name__).rstrip(".")
+
+
+DRIVER = Driver("nidaq", open_nidaq, identify_nidaq)

@@ -1,1 +1,268 @@
-"""The stand-alone force/torque controller on a serial line."""
+"""The stand-alone controller: finding out who answers, how fast it streams, and what is said around a stream."""
+
+import contextlib
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.address import Address, check_options
+from drivers.calibration import Calibration
+from drivers.clock import Clock
+from drivers.clock_recovery import GAP, ClockRecovery
+from drivers.deadline import Deadline
+from drivers.driver import Driver
+from drivers.link import Link
+from drivers.records import RecordDecoder
+from drivers.serial_ft import wire
+from drivers.serial_link import SerialLink, port_of
+from drivers.streaming import StreamingTransducer, measured_rate
+from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
+
+# All in real seconds.
+_SETTLED = 0.05  # of silence behind a prompt that show it is one, and no byte of a record
+_BETWEEN = 0.02  # between two commands
+_ANSWER = 0.6  # for the answer to a command
+_BANNER = 6.0  # for all the controller says when it starts
+_SILENT = 0.02  # behind the prompt after a stream
+_END = 0.08  # for the prompt after a stream
+_TRIES = 3
+BAUDS = (38400, 9600, 115200, 19200, 57600, 4800)  # tried in this order; published drivers disagree on the usual one
+_MEASURED = 0.6  # for how long the stream is watched to learn its rate [real s]
+_OPTIONS = frozenset({"baud", "format", "counts_per_N", "counts_per_Nm", "range_N", "range_Nm", "serial", "simulated"})
+
+
+@dataclass(frozen=True, slots=True)
+class _Where:
+    """What an address says."""
+
+    address: Address
+    port: str
+    bauds: tuple[int, ...]
+    binary: bool
+    calibration: Calibration
+
+
+def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> StreamingTransducer:
+    """Return the controller at `address`, set and watched for its rate, not streaming.
+
+    Raises SetupError, LinkLost or DeviceFault with the reason.
+    """
+    place = _where(address)
+    conversation = ControllerConversation(binary=place.binary)
+    try:
+        link, baud = _answering(place, deadline)
+        try:
+            said = banner(deadline.bound(link))
+            rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
+        finally:
+            link.close()
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{address.uri}: {error}") from None
+    info = _info(place, baud, said, rate)
+    return StreamingTransducer(info, lambda _: SerialLink(place.port, baud), conversation, clock, opening=deadline)
+
+
+def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
+    """Return who answers, changing no setting (a stream nobody reads is ended)."""
+    place = _where(address)
+    try:
+        link, baud = _answering(place, deadline)
+        link.close()
+    except LinkLost as error:
+        raise LinkLost(f"{address.uri}: {error}") from None
+    return _info(place, baud, "", math.nan)
+
+
+def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
+    """Return an open line on which a controller answers, and its baud rate."""
+    tried: list[int] = []
+    for baud in place.bauds:
+        if deadline.left <= 0.0:
+            break
+        tried.append(baud)
+        link = SerialLink(place.port, baud)
+        try:
+            if prompted(deadline.bound(link), tries=2):
+                return link, baud
+        except LinkLost:
+            if deadline.left > 0.0:
+                link.close()
+                raise
+        except BaseException:
+            link.close()
+            raise
+        link.close()
+    rates = ", ".join(map(str, tried))
+    raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
+
+
+def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
+    address = place.address
+    settings = {
+        "baud": f"{baud}, {'as the address says' if len(place.bauds) == 1 else 'found by trying'}",
+        "output": "binary, without checksum" if place.binary else "ASCII, without checksum",
+        "bias": "all biases of the controller dropped when a stream begins",
+        "filter": "no moving average; set, answered with a prompt, and not to be read back",
+        "units": "counts per N and N-m as the address says; the controller cannot be asked",
+        "time": "host arrival at the measured rate; the controller has no clock or record number, "
+        f"and a loss shorter than {GAP:g} s that leaves no broken bytes is not noticed",
+    }
+    if said:
+        settings |= {"banner": said, "rate": "measured at opening; the controller cannot be asked"}
+    return TransducerInfo(
+        uri=address.uri,
+        driver="serial-ft",
+        model="SIMULATED F/T Controller" if _is_simulated(address, said) else "F/T Controller",
+        serial=place.calibration.serial,
+        simulated=_is_simulated(address, said),
+        rate=rate,
+        counter_rate=math.nan,
+        calibration=place.calibration,
+        settings=settings,
+        status=wire.STATUS_BITS,
+    )
+
+
+def _is_simulated(address: Address, said: str) -> bool:
+    return "SIMULATED" in said.upper() or "simulated" in address.options
+
+
+def _where(address: Address) -> _Where:
+    """Return what a serial-ft address says. Raises SetupError when it is not one."""
+    check_options(address, _OPTIONS)
+    port = port_of(address)
+    form = address.options.get("format", "binary")
+    if form not in ("binary", "ascii"):
+        raise SetupError(f"{address.uri}: format={form} must be binary or ascii")
+    baud = address.number("baud", 0, 300, 921600)
+    counts = [_above_zero(address, option) for option in ("counts_per_N", "counts_per_Nm")]
+    if not all(math.isfinite(value) for value in counts):
+        raise SetupError(
+            f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
+            "as they stand in the calibration sheet"
+        )
+    ranges = np.repeat([_above_zero(address, "range_N"), 1000.0 * _above_zero(address, "range_Nm")], 3)
+    calibration = Calibration(
+        address.options.get("serial", ""),
+        "counts",
+        np.diag(np.repeat([1.0 / counts[0], 1000.0 / counts[1]], 3)),
+        ranges,
+        "counts per unit as the address says",
+    )
+    return _Where(address, port, (baud,) if baud else BAUDS, form == "binary", calibration)
+
+
+def _above_zero(address: Address, option: str) -> float:
+    """Return a number option, nan where it is not given. Raises SetupError where it is no number above 0."""
+    text = address.options.get(option)
+    if text is None:
+        return math.nan
+    try:
+        value = float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and 1e-9 < value < 1e9):
+        raise SetupError(f"{address.uri}: {option}={text[:40]} must be a number above 0")
+    return value
+
+
+class ControllerConversation:
+    """Prompts, settings and streams of one controller."""
+
+    def __init__(self, *, binary: bool) -> None:
+        """Take records as bytes, or as text."""
+        self._binary = binary
+
+    def decoder(self) -> RecordDecoder:
+        """Return a decoder for the records asked for."""
+        return wire.BinaryDecoder() if self._binary else wire.AsciiDecoder()
+
+    def numbering(self, rate: float, factor: float) -> ClockRecovery:
+        """Return what numbers the stream: its records carry neither number nor time."""
+        return ClockRecovery(rate, factor)
+
+    def begin(self, link: Link) -> bytes:
+        """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""
+        if not prompted(link):
+            raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
+        output = wire.BINARY_OUTPUT if self._binary else wire.ASCII_OUTPUT
+        for command in (output, *wire.SETTINGS):
+            if not _said(link, command + wire.RETURN, _ANSWER, settled=False).rstrip().endswith(wire.PROMPT):
+                raise LinkLost(f"the controller does not answer to {command.decode()}; switch it off and on")
+        for _ in range(_TRIES):
+            if wire.answered_record(_said(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self._binary):
+                break
+        else:
+            form = "binary" if self._binary else "ASCII"
+            raise DeviceFault(
+                f"the controller answers, but not with a record of six axes in {form} output; "
+                "check that a transducer is connected to it, and try the other format"
+            )
+        return self._streaming(link)
+
+    def end(self, link: Link) -> None:
+        """Let the stream end: any carriage return does it."""
+        with contextlib.suppress(LinkLost):  # whoever is gone streams no more
+            link.send(wire.RETURN)
+            deadline = time.monotonic() + _END
+            heard = b""
+            while time.monotonic() < deadline:
+                data = link.receive(_SILENT)
+                if data is None and heard.endswith(wire.PROMPT):
+                    break
+                heard = data or heard
+
+    def _streaming(self, link: Link) -> bytes:
+        """Ask for the stream, and return what follows the echo of the request."""
+        link.send(wire.STREAM + wire.RETURN)
+        heard = b""
+        deadline = time.monotonic() + _ANSWER
+        while time.monotonic() < deadline:
+            heard += link.receive(_SETTLED) or b""
+            _, echo, rest = heard.partition(wire.STREAM)
+            _, line_end, first = rest.partition(b"\n")
+            if echo and line_end:
+                return first
+        raise LinkLost("the controller does not begin to stream; switch it off and on")
+
+
+def prompted(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
+    """Tell whether a controller answers with its prompt; a stream it was sending ends by this."""
+    return any(_said(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
+
+
+def banner(link: Link) -> str:
+    """Start the controller afresh and return what it says then, for people.
+
+    Raises DeviceFault when no prompt follows: a controller that lost its memory waits for a Y.
+    """
+    said = _said(link, wire.WARM_START, _BANNER)
+    if not said.rstrip().endswith(wire.PROMPT):
+        raise DeviceFault(
+            "the controller started but gave no prompt; it may have lost its settings and wait for a Y: "
+            "answer it from a terminal program once"
+        )
+    text = said.rstrip().removesuffix(wire.PROMPT).decode("ascii", "replace")
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
+def _said(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
+    """Return what the controller says to `request`, up to a prompt, or within `patience`.
+
+    With `settled` only a prompt that nothing follows is one: in a binary record its byte means something else.
+    """
+    link.receive(_BETWEEN)
+    link.send(request)
+    said = b""
+    deadline = time.monotonic() + patience
+    while True:
+        over = time.monotonic() >= deadline
+        data = link.receive(_SETTLED)  # once more where this computer was busy until now
+        said += data or b""
+        if over or (said.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
+            return said
+
+
+DRIVER = Driver("serial-ft", open_serial_ft, identify_serial_ft)

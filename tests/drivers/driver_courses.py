@@ -11,20 +11,19 @@ import pytest
 
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connected
-from drivers import deadline, rate, streaming
+from drivers import deadline, digital_ft, rate, serial_ft, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS
 from drivers.clock import PacedClock
 from drivers.deadline import Deadline
-from drivers.digital_ft import device as digital_ft
 from drivers.net_ft import device as net_ft
 from drivers.readings import ReadingBlock
-from drivers.serial_ft import device as serial_ft
 from drivers.transducer import Health, LinkLost, SetupError
 from simulators.bench import Bench
-from simulators.boxes import SIMULATORS, Simulated
+from simulators.boxes import SIMULATORS
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
+from simulators.simulator import Simulated
 from simulators.stroke import Stroke
 from simulators.surface import paper_surfaces
 

@@ -10,6 +10,8 @@ import time
 from drivers import usb_link
 from drivers.clock import RealClock
 from simulators.bench import Bench
+from simulators.boxes import SIMULATORS
+from simulators.faults import Faults
 from simulators.gauges import calibration_file
 from simulators.labjack_u6_box import LabJackU6Box
 from simulators.pseudo_terminal import PseudoTerminal
@@ -140,14 +142,29 @@ def labjack_u6(folder):
     return hostile
 
 
+def any_line(name, data):
+    """Return a line at the address of a driver's own simulated device on which these bytes come without end."""
+
+    def start(folder):
+        device = SIMULATORS[name].start(Bench(3), RealClock(), Faults(), folder)
+        device.close()
+        return line(name, device.uri.partition("?")[2], data)
+
+    return start
+
+
 SERIAL = "baud=38400&counts_per_N=20&counts_per_Nm=333.33"
 HOSTILE = {
     **{f"net-ft, {name}": (lambda _, d=datagram: net_ft(d)) for name, datagram in UDP.items()},
     "net-ft, a page that drips": lambda _: net_ft(STUCK, page_drip=0.5),
-    "serial-ft, zeros": lambda _: line("serial-ft", SERIAL, bytes(50)),
     "serial-ft, prompts": lambda _: line("serial-ft", SERIAL, b">"),
     "serial-ft, at any baud rate": lambda _: line("serial-ft", SERIAL.partition("&")[2], b"\xff" * 9),
-    "digital-ft, zeros": lambda _: line("digital-ft", "parity=none", b"\x55" * 26),
-    "digital-ft, random bytes": lambda _: line("digital-ft", "parity=none", lambda: os.urandom(30)),
+    "digital-ft, one packet": lambda _: line("digital-ft", "parity=none", b"\x55" * 26),
     "labjack-u6, zeros": labjack_u6,
+    **{
+        f"{name}, {what}": any_line(name, data)
+        for name, simulator in SIMULATORS.items()
+        for what, data in (("zeros", bytes(50)), ("random bytes", lambda: os.urandom(30)))
+        if simulator.serial_line
+    },
 }

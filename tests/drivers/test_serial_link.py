@@ -6,14 +6,12 @@ from types import SimpleNamespace
 import pytest
 import serial
 
-from drivers import serial_link
+from drivers import digital_ft, serial_link
 from drivers.address import parse_address
 from drivers.clock import RealClock
 from drivers.deadline import Deadline
-from drivers.digital_ft import device as digital_ft
-from drivers.digital_ft import wire
-from drivers.digital_ft.device import open_digital_ft
-from drivers.serial_ft.device import open_serial_ft
+from drivers.digital_ft import open_digital_ft, wire
+from drivers.serial_ft import open_serial_ft
 from drivers.serial_link import SerialLink, port_of
 from drivers.transducer import LinkLost, SetupError
 from simulators.pseudo_terminal import PseudoTerminal

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers import digital_ft as digital_ft_device
+from drivers import serial_ft as serial_ft_device
 from drivers.address import parse_address
 from drivers.clock import Clock, PacedClock
 from drivers.deadline import Deadline
-from drivers.digital_ft import device as digital_ft_device
-from drivers.digital_ft.device import identify_digital_ft, open_digital_ft
+from drivers.digital_ft import identify_digital_ft, open_digital_ft
 from drivers.readings import ReadingBlock
-from drivers.serial_ft import device as serial_ft_device
-from drivers.serial_ft.device import identify_serial_ft, open_serial_ft
+from drivers.serial_ft import identify_serial_ft, open_serial_ft
 from drivers.serial_link import port_of
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from simulators.bench import Bench

@@ -17,8 +17,9 @@ from drivers.catalog import open_transducer
 from drivers.clock import Clock, PacedClock, RealClock
 from drivers.transducer import LinkLost, SetupError, Transducer
 from simulators.bench import Bench
-from simulators.boxes import SIMULATORS, Simulated, Simulator
+from simulators.boxes import SIMULATORS
 from simulators.faults import Fault, Faults
+from simulators.simulator import Simulated, Simulator
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")]
 

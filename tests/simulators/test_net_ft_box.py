@@ -202,7 +202,7 @@ def test_what_is_no_request_is_ignored(box, request_bytes):
 
 
 def test_both_counters_wrap(box):
-    with client(box(first_tick=2**32 - 200, first_record=2**32 - 3)) as udp:
+    with client(box(first=(2**32 - 200, 2**32 - 3))) as udp:
         udp.send(START)
         got = records(udp, 50)
     assert np.diff(np.array([r[:2] for r in got]).astype(np.uint32), axis=0).tolist() == [[1, 35]] * 49

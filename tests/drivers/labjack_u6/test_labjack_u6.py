@@ -12,8 +12,7 @@ from drivers.address import parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import PacedClock, RealClock
 from drivers.deadline import Deadline
-from drivers.labjack_u6 import wire
-from drivers.labjack_u6.device import identify_labjack_u6
+from drivers.labjack_u6 import identify_labjack_u6, wire
 from drivers.readings import ReadingBlock
 from drivers.scan_count import ScanCount
 from drivers.transducer import DeviceFault, LinkLost, SetupError

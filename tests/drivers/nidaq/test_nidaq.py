@@ -9,7 +9,7 @@ import pytest
 from drivers.address import parse_address
 from drivers.clock import RealClock
 from drivers.deadline import Deadline
-from drivers.nidaq.device import identify_nidaq, open_nidaq
+from drivers.nidaq import identify_nidaq, open_nidaq
 from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError
 from simulators.bench import Bench
