@@ -60,7 +60,7 @@ def harmless(text: str) -> str:
     >>> print(harmless("a\x1b[31mb"))
     a\x1b[31mb
     """
-    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: f"\\x{ord(found[0]):02x}", text)
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda match: f"\\x{ord(match[0]):02x}", text)
 
 
 class Console:
@@ -159,7 +159,7 @@ class Console:
         begun, over = time.monotonic(), threading.Event()
         at = Underway(text)
 
-        def told(done: float) -> bool:
+        def reach(done: float) -> bool:
             at.reach(done)
             return True
 
@@ -175,7 +175,7 @@ class Console:
         shower.start()
         try:
             with listening(at.hear):
-                yield told
+                yield reach
         finally:
             over.set()
             shower.join()

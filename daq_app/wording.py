@@ -38,11 +38,11 @@ def tr(text: str, /, **values: object) -> str:
     >>> tr("Trial {number} of {count}", number=3, count=10)
     'Trial 3 of 10'
     """
-    found = translations(EXPERIMENTER, os.environ.get(VARIABLE, ENGLISH)).get(text, text)
+    translation = translations(EXPERIMENTER, os.environ.get(VARIABLE, ENGLISH)).get(text, text)
     if not values:
-        return found
+        return translation
     try:
-        return found.format(**values)
+        return translation.format(**values)
     except (LookupError, ValueError, AttributeError):
         return text.format(**values)
 

@@ -87,22 +87,22 @@ class _Unusable(Exception):
 
 
 def _parsed(data: bytes, name: str) -> CalibrationFile:
-    found = _elements(data)
-    sensor, body = _only(found, _ROOT), _only(found, _BODY)
-    _refuse_what_is_not_known(sensor, body, found)
+    elements = _elements(data)
+    sensor, body = _only(elements, _ROOT), _only(elements, _BODY)
+    _refuse_what_is_not_known(sensor, body, elements)
     force = _unit(body, "ForceUnits", _FORCE)
     torque = _unit(body, "TorqueUnits", _TORQUE)
     units = np.repeat([force, torque], 3)  # N, N mm in one of the file's units
-    axes = _by_name(found, "Axis")
+    axes = _by_name(elements, "Axis")
     if len(axes) != 6:
         raise _Unusable(f"it has {len(axes)} of the six Axis elements {', '.join(AXES)}")
     scale = np.array([_above_zero(f"scale of {axis}", axes[axis].get("scale", "1")) for axis in AXES])
     rated = np.array([_above_zero(f"max of {axis}", axes[axis].get("max", "")) for axis in AXES]) * units
-    transform = _transform(found, body)
+    transform = _transform(elements, body)
     matrix = transform @ (_rows(axes) * (units / scale)[:, None])
     if not np.all(np.isfinite(matrix)) or np.linalg.matrix_rank(matrix) < 6:
         raise _Unusable("its six Axis rows do not make a matrix that tells forces and torques apart")
-    user = _by_name(found, "UserAxis")
+    user = _by_name(elements, "UserAxis")
     if len(user) == 6:
         rounding = _ROUNDING * (units[:, None] + np.abs(transform) @ (units / scale)[:, None])
         _check(matrix, _rows(user) * units[:, None], rounding)
@@ -122,14 +122,14 @@ def _elements(data: bytes) -> list[tuple[tuple[str, ...], _Attributes]]:
     """Return path and attributes of every element, in order. Declarations and entities are refused."""
     if len(data) > LONGEST:
         raise _Unusable(f"it is longer than {LONGEST} bytes, which no calibration file is")
-    found: list[tuple[tuple[str, ...], _Attributes]] = []
+    elements: list[tuple[tuple[str, ...], _Attributes]] = []
     path: list[str] = []
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         path.append(tag)
         if len(path) > 8:
             raise _Unusable("its elements lie deeper in each other than in any calibration file")
-        found.append((tuple(path), attributes))
+        elements.append((tuple(path), attributes))
 
     def end(_: str) -> None:
         path.pop()
@@ -148,11 +148,11 @@ def _elements(data: bytes) -> list[tuple[tuple[str, ...], _Attributes]]:
         raise _Unusable(f"it is not sound XML ({expat.ErrorString(error.code)}, line {error.lineno})") from None
     except (LookupError, ValueError):  # what expat raises for an encoding it does not know
         raise _Unusable("it is in an unknown encoding") from None
-    return found
+    return elements
 
 
 def _refuse_what_is_not_known(
-    sensor: _Attributes, body: _Attributes, found: list[tuple[tuple[str, ...], _Attributes]]
+    sensor: _Attributes, body: _Attributes, elements: list[tuple[tuple[str, ...], _Attributes]]
 ) -> None:
     """Raise where the file asks for a computation that is not done here: its wrench would not be true."""
     for attributes, key, known in (
@@ -164,22 +164,22 @@ def _refuse_what_is_not_known(
         value = attributes.get(key, known[0]).strip()
         if value not in known:
             raise _Unusable(f"its {key} is {value[:20]!r}, and only {' or '.join(known)} can be read")
-    for path, _ in found:
+    for path, _ in elements:
         if path[-1] in ("BiasSlope", "GainSlope", "Thermistor"):
             raise _Unusable(f"its {path[-1]} asks for temperature compensation in software, which is not done here")
 
 
-def _only(found: list[tuple[tuple[str, ...], _Attributes]], path: tuple[str, ...]) -> _Attributes:
-    matching = [attributes for at, attributes in found if at == path]
+def _only(elements: list[tuple[tuple[str, ...], _Attributes]], path: tuple[str, ...]) -> _Attributes:
+    matching = [attributes for at, attributes in elements if at == path]
     if len(matching) != 1:
         raise _Unusable(f"it has {len(matching)} {path[-1]} elements where a calibration file has one")
     return matching[0]
 
 
-def _by_name(found: list[tuple[tuple[str, ...], _Attributes]], tag: str) -> dict[str, _Attributes]:
+def _by_name(elements: list[tuple[tuple[str, ...], _Attributes]], tag: str) -> dict[str, _Attributes]:
     """Return the elements `tag` of the calibration by their axis."""
     axes: dict[str, _Attributes] = {}
-    for path, attributes in found:
+    for path, attributes in elements:
         if path == (*_BODY, tag):
             axis = attributes.get("Name", "").strip()
             if axis not in AXES or axis in axes:
@@ -197,9 +197,9 @@ def _rows(axes: Mapping[str, _Attributes]) -> Array:
     return np.array(rows)
 
 
-def _transform(found: list[tuple[tuple[str, ...], _Attributes]], body: _Attributes) -> Array:
+def _transform(elements: list[tuple[tuple[str, ...], _Attributes]], body: _Attributes) -> Array:
     """Return the matrix (6, 6) that moves a wrench [N, N mm] to the origin and axes that BasicTransform names."""
-    placed = [attributes for path, attributes in found if path == (*_BODY, "BasicTransform")]
+    placed = [attributes for path, attributes in elements if path == (*_BODY, "BasicTransform")]
     if not placed:
         return np.eye(6)
     if len(placed) > 1:

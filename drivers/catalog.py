@@ -15,7 +15,7 @@ from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, Tr
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Probe:
     """What answered at one address: either who, or why nobody did."""
 
     uri: str
@@ -39,21 +39,21 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
     return TransducerWithTool(transducer, tool) if tool else transducer
 
 
-def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Found, ...]:
+def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:
     """Return what answers now at the usual addresses and at those `named`, within `patience` real seconds each.
 
     Only reads who is there: a device in use is not disturbed.
     """
     usual = [uri for driver in DRIVERS for uri in driver.usual]
-    return tuple(_found(uri, patience) for uri in dict.fromkeys([*usual, *named]))
+    return tuple(_probe(uri, patience) for uri in dict.fromkeys([*usual, *named]))
 
 
-def _found(uri: str, patience: float) -> Found:
+def _probe(uri: str, patience: float) -> Probe:
     try:
         address, tool = without_tool(parse_address(uri))
-        return Found(uri, with_tool(_driver(address).identify(address, Deadline(patience)), tool), None)
+        return Probe(uri, with_tool(_driver(address).identify(address, Deadline(patience)), tool), None)
     except (SetupError, LinkLost, DeviceFault) as error:
-        return Found(uri, None, str(error))
+        return Probe(uri, None, str(error))
 
 
 def _driver(address: Address) -> Driver:

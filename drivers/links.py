@@ -181,19 +181,19 @@ def _stated_length(head: bytes) -> int | None:
 
 def _resolved(host: str, deadline: Deadline) -> str:
     """Return the IPv4 address of a host's name. Raises SetupError when it has none, or none is found in time."""
-    found: list[str] = []
+    hosts: list[str] = []
 
     def look() -> None:
         with contextlib.suppress(OSError, UnicodeError):
-            found.append(socket.gethostbyname(host))
+            hosts.append(socket.gethostbyname(host))
 
     looking = threading.Thread(target=look, name=f"looking for {host}", daemon=True)  # the system's search has no limit
     looking.start()
     while looking.is_alive() and (left := deadline.left) > 0.0:
         looking.join(min(left, TICK))
-    if not found:
+    if not hosts:
         raise SetupError(f"the host {host!r} cannot be found; give its IP address, for example 192.168.1.1")
-    return found[0]
+    return hosts[0]
 
 
 def _reason(error: OSError) -> str:

@@ -19,8 +19,8 @@ class RateWatch:
         `rate` was only measured for a moment where it is `vague`, by up to that share [-]: what is found first is it.
         """
         self.rate = rate  # as found last [Hz]
-        self.found = 0  # how often it was found to be another than before
-        self.asked = rate  # as set [Hz]
+        self.changes = 0  # of the rate, so far
+        self.nominal = rate  # as set [Hz]
         self._vague = vague
         self._window = WINDOW * factor
         self._silence = silence
@@ -71,13 +71,13 @@ class RateWatch:
                 self._vague = 0.0  # it is as it was measured
         return False
 
-    def _find(self, found: float, most: float) -> None:
+    def _find(self, rate: float, most: float) -> None:
         """Take another rate for true."""
-        if abs(found / self.asked - 1.0) < self._vague:
-            self.rate = self.asked = found
+        if abs(rate / self.nominal - 1.0) < self._vague:
+            self.rate = self.nominal = rate
         else:
-            self.rate = self.asked if abs(found / self.asked - 1.0) < most else found
-            self.found += 1
+            self.rate = self.nominal if abs(rate / self.nominal - 1.0) < most else rate
+            self.changes += 1
         self._vague = 0.0
 
 
@@ -108,13 +108,15 @@ def _turns_down(first: tuple[int, int], middle: tuple[int, int], last: tuple[int
     return (middle[1] - first[1]) * (last[0] - first[0]) >= (last[1] - first[1]) * (middle[0] - first[0])
 
 
-def rate_words(what: str, found: float, asked: float) -> str:
+def rate_words(what: str, rate: float, nominal: float) -> str:
     """Return what is the matter with a rate, or that it no longer is.
 
     >>> rate_words("readings come", 147.5, 295.0), rate_words("readings come", 295.0, 295.0)
     ('readings come at 147.5 Hz, not at 295 Hz', 'readings come at 295 Hz again')
     """
-    return f"{what} at {asked:.6g} Hz again" if found == asked else f"{what} at {found:.4g} Hz, not at {asked:.6g} Hz"
+    return (
+        f"{what} at {nominal:.6g} Hz again" if rate == nominal else f"{what} at {rate:.4g} Hz, not at {nominal:.6g} Hz"
+    )
 
 
 def _rate(first: tuple[int, float], last: tuple[int, float]) -> float:

@@ -91,7 +91,7 @@ def measured_rate(
     """
     decoder = conversation.decoder()
     came: list[tuple[int, int]] = []  # how many records so far, and when the last of them came [ns]
-    found, count = math.nan, 0
+    rate, count = math.nan, 0
     try:
         data: bytes | None = conversation.begin(deadline.bound(link))
         for look in range(_LOOKS):
@@ -104,15 +104,15 @@ def measured_rate(
                 data = link.receive(TICK)
                 if part.left <= 0.0:
                     break
-            before, found = found, rate_of_least_late(came)
-            alike = look and (abs(found / stated - 1.0) < _ALIKE or abs(found / before - 1.0) < _ALIKE)
+            before, rate = rate, rate_of_least_late(came)
+            alike = look and (abs(rate / stated - 1.0) < _ALIKE or abs(rate / before - 1.0) < _ALIKE)
             if alike or deadline.left <= 0.0:
                 break
     finally:
         conversation.end(Deadline(ENDING).bound(link))
-    if math.isnan(found):
+    if math.isnan(rate):
         raise LinkLost("it sends no readings when asked to stream; switch it off and on, and check the cable")
-    return found
+    return rate
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,8 +164,8 @@ class StreamingTransducer(ThreadedTransducer):
                 lost=self._numbering.lost,
                 malformed=self._malformed_before + self._decoder.malformed,
                 restarted=self._restarted,
-                off_rate=watch.found,
-                rate_words=rate_words("readings come", watch.rate, watch.asked) if watch.found else "",
+                off_rate=watch.changes,
+                rate_words=rate_words("readings come", watch.rate, watch.nominal) if watch.changes else "",
             )
 
     def has_come(self) -> bool:

@@ -36,7 +36,7 @@ class UsbLink:
         self._device = device
         self._endpoints = endpoints
         self._where = where
-        self._asked = False
+        self._awaits_answer = False
         try:
             try:
                 device.get_active_configuration()
@@ -53,18 +53,18 @@ class UsbLink:
             self._device.write(self._endpoints.requests, data, _WRITE_MS)
         except _core.USBError as error:
             raise LinkLost(f"{self._where} takes no bytes any more: {_reason(error)}") from None
-        self._asked = True
+        self._awaits_answer = True
 
     def receive(self, timeout: float) -> bytes | None:
         """Return the answer to the request before, or what the stream brings; None when nothing came in `timeout` s."""
-        asked = self._asked
-        endpoint = self._endpoints.answers if asked else self._endpoints.stream
+        awaited = self._awaits_answer
+        endpoint = self._endpoints.answers if awaited else self._endpoints.stream
         parts: list[bytes] = []
         wait_ms = max(round(timeout * 1000), 1)
-        while len(parts) < (1 if asked else _PACKETS):
+        while len(parts) < (1 if awaited else _PACKETS):
             try:
                 parts.append(bytes(self._device.read(endpoint, _LARGEST, wait_ms)))
-                self._asked = False  # only now: who waits in short turns must still find the answer
+                self._awaits_answer = False  # only now: who waits in short turns must still find the answer
             except _core.USBTimeoutError:
                 break
             except _core.USBError as error:
@@ -79,7 +79,7 @@ class UsbLink:
         _util.dispose_resources(self._device)
 
 
-def found(vendor: int, product: int) -> Sequence[Any]:
+def devices(vendor: int, product: int) -> Sequence[Any]:
     """Return the devices of a kind that are plugged in. Raises SetupError where USB cannot be used."""
     try:
         devices: Any = _core.find(find_all=True, idVendor=vendor, idProduct=product, backend=BACKEND)

@@ -116,9 +116,9 @@ class Bench:
     def wrench(self, times: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the transducer feels at `times` (n,) [s], noise and drift too."""
         settings = self.settings
-        felt = self.exerted(times) * np.array(settings.gains) + np.array(settings.offset)
-        felt += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
-        return felt + white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
+        wrench = self.exerted(times) * np.array(settings.gains) + np.array(settings.offset)
+        wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
+        return wrench + white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
     def _planted(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
         """Return the truth of a stroke, its times on the bench's axis."""

@@ -118,8 +118,8 @@ class DigitalFtBox(LineBox):
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
-        felt = self.faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
-        gauges = np.rint(felt @ self._gauges.T)
+        wrench = self.faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
+        gauges = np.rint(wrench @ self._gauges.T)
         forced = np.array([self.faults.active("saturate", time) for time in times.tolist()], bool)
         gauges[forced] = 32767
         over = np.any(np.abs(gauges) >= 32767, axis=1)

@@ -78,8 +78,8 @@ class DirectTransducer:
         kept = numbers[~self._within(numbers / RATE, self._hurt.lost)]
         self._lost += len(numbers) - len(kept)
         time = kept / RATE
-        felt = np.where(self._within(time, self._hurt.frozen)[:, None], self._frozen_at(time), time[:, None])[:, 0]
-        counts = np.rint(self._bench.wrench(felt) / _SCALE)
+        instants = np.where(self._within(time, self._hurt.frozen)[:, None], self._frozen_at(time), time[:, None])[:, 0]
+        counts = np.rint(self._bench.wrench(instants) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
         return ReadingBlock(kept, kept, np.zeros_like(kept), time, received, counts)
 

@@ -79,7 +79,7 @@ class Faults:
         self._clock = _device_clock([fault for fault in self._timetable if fault.kind == "slow"], repeat)
         self._swapped: bytes | None = None
         self._delayed: list[tuple[float, bytes]] = []  # when each leaves
-        self.made: list[bytes] | None = [] if remember else None  # every datagram the box made
+        self.datagrams: list[bytes] | None = [] if remember else None  # every datagram the box made
         self.delivered: list[bytes] | None = [] if remember else None  # every datagram that left, in that order
 
     def put(self, *timetable: Fault) -> None:
@@ -110,7 +110,7 @@ class Faults:
         """Return when (n,) [s] the device's own clock has come as far as `ages` (n,) [s]."""
         return ages if self._clock is None else _through(ages, *reversed(self._clock))
 
-    def felt(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
+    def sensed(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
         """Return what a device that drifts or is wrongly calibrated feels of a wrench (n, 6) at `times` (n,) [s]."""
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
@@ -129,8 +129,8 @@ class Faults:
         """
         leaving: list[bytes] = []
         for time, datagram in datagrams:
-            if self.made is not None:
-                self.made.append(datagram)
+            if self.datagrams is not None:
+                self.datagrams.append(datagram)
             leaving += self._overdue(time)
             hurt = self._hurt(time, datagram)
             leaving += [] if self.active("unplug", time) else hurt
@@ -199,8 +199,8 @@ def _device_clock(slow: Sequence[Fault], repeat: float) -> tuple[Array, Array] |
     return times, np.concatenate([[0.0], np.cumsum(speed * np.diff(times))])
 
 
-def _through(values: Array, given: Array, sought: Array) -> Array:
+def _through(values: Array, nodes: Array, sought: Array) -> Array:
     """Return where (n,) the line through the knots lies, which is begun anew at its end as often as needed."""
-    rounds = np.floor(values / given[-1])
-    within = np.array(np.interp(values - rounds * given[-1], given, sought), np.float64)
+    rounds = np.floor(values / nodes[-1])
+    within = np.array(np.interp(values - rounds * nodes[-1], nodes, sought), np.float64)
     return within + rounds * float(sought[-1])

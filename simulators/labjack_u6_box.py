@@ -174,13 +174,13 @@ class LabJackU6Box:
         if self._leaving or self._scan is None or len(self._buffer) < (samples := self._scan[1]):
             return
         codes, self._buffer = self._buffer[:samples], self._buffer[samples:]
-        told, error = 0, 59 if self._missed else 0
+        missed, error = 0, 59 if self._missed else 0
         if self._report is not None:
             at, missing = self._report
             self._report = (at - samples, missing) if at >= samples else None
-            told, error = (0, 59) if at >= samples else (missing, 60)
+            missed, error = (0, 59) if at >= samples else (missing, 60)
         error = error or self._faults.status(self.now()) & 0xFF
-        data = told.to_bytes(4, "little") + bytes([self._sent % 256, error])
+        data = missed.to_bytes(4, "little") + bytes([self._sent % 256, error])
         data += b"".join(code.to_bytes(2, "little") for code in codes) + bytes([min(len(self._buffer) // 4, 255), 0])
         self._sent += 1
         self._leaving += self._faults.route(self.now(), [(self.now(), _long(0xC0, data, 0xF9))])
@@ -188,7 +188,7 @@ class LabJackU6Box:
     def _codes(self, times: Array) -> NDArray[np.int64]:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
         volts = (
-            self._faults.felt(self.bench.wrench(times), times, self.bench.settings.rated) @ self._gauges.T + _OFFSETS
+            self._faults.sensed(self.bench.wrench(times), times, self.bench.settings.rated) @ self._gauges.T + _OFFSETS
         )
         forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
         volts[forced, 2] = 11.0

@@ -65,7 +65,7 @@ class Electronics:
             return []
         ages = self._age(self._powered) + (np.array(ticks) - self._first_tick) / self._ticks_a_second
         times = self._faults.instants(ages)
-        status, counts = self._felt(times)
+        status, counts = self._status_and_counts(times)
         packed: list[bytes] = []
         for tick, time, word, six in zip(ticks, times.tolist(), status, counts.tolist(), strict=True):
             if not self._faults.active("stall", time):
@@ -83,7 +83,7 @@ class Electronics:
         if request[0] == 0:  # READFT: counts in 16 bits, and system commands in the last two bytes
             if request[19] & 1:
                 self.set_bias(now)
-            status, counts = self._felt(np.array([now]))
+            status, counts = self._status_and_counts(np.array([now]))
             small = np.clip(np.rint(counts[0] / np.array(self.pages.scales)), -32768, 32767).astype(int).tolist()
             return struct.pack(">HH6h", 0x1234, status[0] >> 16, *small)
         if request[0] == 1:  # READCALINFO
@@ -98,15 +98,15 @@ class Electronics:
         if target.startswith("/rundata.cgi") and "cmd=bias" in target:
             self.set_bias(now)
         self.pages.counting = self._faults.counting(now)
-        status, counts = self._felt(np.array([now]))
+        status, counts = self._status_and_counts(np.array([now]))
         code, page = self.pages.answer(target, status[0], counts[0].tolist())
         body = page.encode()
         head = f"HTTP/1.0 {code} {_REASONS[code]}\r\nContent-Type: text/xml\r\nContent-Length: {len(body)}\r\n"
         return (head + ("Location: /index.htm\r\n" if code == 302 else "") + "\r\n").encode() + body
 
-    def _felt(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
+    def _status_and_counts(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
-        wrench = self._faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
+        wrench = self._faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
         forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
         wrench[forced] = self._rated  # what a clipped converter shows
         over = forced | np.any(np.abs(wrench) > self._rated, axis=1)
@@ -114,5 +114,5 @@ class Electronics:
         counts *= np.array([self._faults.counting(time) for time in times.tolist()])[:, None]
         whole = np.clip(np.rint(counts), -(2**31), 2**31 - 1).astype(np.int64)
         saturated = self.pages.product.saturated
-        told = zip(over.tolist(), times.tolist(), strict=True)
-        return [(saturated if above else 0) | self._faults.status(time) for above, time in told], whole
+        flags = zip(over.tolist(), times.tolist(), strict=True)
+        return [(saturated if above else 0) | self._faults.status(time) for above, time in flags], whole

@@ -159,9 +159,9 @@ class Pages:
         elif name in self._kept and 0 <= value <= 12:
             self._kept[name] = text
 
-    def _set_rate(self, asked: int) -> None:
+    def _set_rate(self, rate: int) -> None:
         """Send every so-many-th tick, at `asked` readings a second or the next higher rate that divides the ticks."""
-        self.step = int(self.product.ticks // asked)
+        self.step = int(self.product.ticks // rate)
 
 
 def _listed(values: list[int] | list[str]) -> str:

@@ -48,7 +48,7 @@ class SimulatedNidaqmx(ModuleType):
         self.open = 0  # tasks not closed
         self.begun: list[float] = []  # when acquisitions began [s]
         self.range = (-10.0, 10.0)  # that the device takes, whatever is asked [V]
-        self.asked: list[tuple[Any, ...]] = []  # channels, terminals and limits
+        self.requests: list[tuple[Any, ...]] = []  # channels, terminals and limits
         self._clock = clock
         self._origin_ns = clock.now_ns()
         self._before: dict[str, ModuleType | None] = {}
@@ -81,7 +81,7 @@ class _Task:
     def __init__(self, library: SimulatedNidaqmx) -> None:
         self._library = library
         self._begun: float | None = None
-        self._given = 0
+        self._delivered = 0
         self._last = np.zeros(6)
         library.open += 1
         self.ai_channels = SimpleNamespace(add_ai_voltage_chan=self._channels)
@@ -89,7 +89,7 @@ class _Task:
 
     def _channels(self, name: str, terminal_config: str, min_val: float, max_val: float) -> SimpleNamespace:
         self._refuse_without_device()
-        self._library.asked.append((name, terminal_config, min_val, max_val))
+        self._library.requests.append((name, terminal_config, min_val, max_val))
         low, high = self._library.range
         return SimpleNamespace(ai_min=low, ai_max=high, ai_term_cfg=terminal_config)
 
@@ -98,7 +98,7 @@ class _Task:
 
     def start(self) -> None:
         self._refuse_without_device()
-        self._begun, self._given = self._library.now(), 0
+        self._begun, self._delivered = self._library.now(), 0
         self._library.begun.append(self._begun)
 
     def stop(self) -> None:
@@ -115,9 +115,9 @@ class _Task:
             raise DaqError(OVERFLOW)
         since, age = faults.aged(np.array([self._begun, library.now()])).tolist()
         due = int((age - since) * self.timing.samp_clk_rate)
-        times = faults.instants(since + np.arange(self._given, due) / self.timing.samp_clk_rate)
-        self._given = due
-        volts = faults.felt(library.bench.wrench(times), times, library.bench.settings.rated) @ library.gauges.T
+        times = faults.instants(since + np.arange(self._delivered, due) / self.timing.samp_clk_rate)
+        self._delivered = due
+        volts = faults.sensed(library.bench.wrench(times), times, library.bench.settings.rated) @ library.gauges.T
         for time, six in zip(times.tolist(), volts, strict=True):
             if faults.active("stall", time):
                 six[:] = self._last

@@ -169,7 +169,7 @@ class SerialFtBox(LineBox):
         """Return a record as bytes for each of `times` (n,) [s]."""
         if not len(times):
             return []
-        wrench = self.faults.felt(self._bench.wrench(times), times, self._bench.settings.rated)
+        wrench = self.faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
         packed: list[bytes] = []
         over = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)

@@ -43,7 +43,7 @@ class SimulatedSubject:
         self._slant = float(draw.normal(0.0, 1.5))
         self._moisture = float(np.exp(draw.normal(0.0, self.settings.moisture)))
 
-    def felt(self, surface: Surface) -> Surface:
+    def perceived(self, surface: Surface) -> Surface:
         """Return the surface as this subject's finger rubs on it: the same forces press, others drag."""
         return replace(surface, mu=surface.mu * self._moisture, tau_max=surface.tau_max * self._moisture)
 
@@ -79,8 +79,8 @@ class SimulatedSubject:
         settings = self.settings
         # Friction between the paper's extremes, as a score: stickier is more, slipperier is less.
         rubbing = 100.0 * (surface.mu - SLIPPERIEST) / (STICKIEST - SLIPPERIEST)
-        felt = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
-        judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * felt
+        judgement = rubbing if surface.descriptor == "stickiness" else 100.0 - rubbing
+        judged = (1.0 - settings.friction_weight) * surface.index + settings.friction_weight * judgement
         carried = 0.0 if before is None else settings.carry_over * (before - 50)
         return 50.0 + self._gain * (judged - 50.0) + self._offset + settings.drift * place + carried
 

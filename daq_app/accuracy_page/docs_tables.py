@@ -15,11 +15,11 @@ PAGES: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def fill(docs: Path, made: Mapping[str, Table]) -> None:
+def fill(docs: Path, tables: Mapping[str, Table]) -> None:
     """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
     for page, names in PAGES.items():
         text = (docs / page).read_text(encoding="utf-8")
         for name in names:
-            if name in made:
-                text = filled(text, name, f"{made[name].caption}\n\n{made[name].markdown()}")
+            if name in tables:
+                text = filled(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
         (docs / page).write_text(text, encoding="utf-8")

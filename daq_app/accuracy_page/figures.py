@@ -36,25 +36,25 @@ MARKS = {"small": "o", "finite": "s"}
 WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
 
 
-def plates(found: Measured) -> dict[str, Plate]:
+def plates(measured: Measured) -> dict[str, Plate]:
     """Return the figures that there are numbers for, by name."""
-    made: tuple[Callable[[Measured], Plate], ...] = (
+    drawings: tuple[Callable[[Measured], Plate], ...] = (
         speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate
     )  # fmt: skip
     with look():
-        drawn = [make(found) for make in made]
+        drawn = [make(measured) for make in drawings]
     return {plate.name: plate for plate in drawn if plate.panels}
 
 
-def speed_plate(found: Measured) -> Plate:
+def speed_plate(measured: Measured) -> Plate:
     """Draw time against true error, one curve a way of solving."""
-    rows: list[Speed] = found.of(Speed)
-    truths: list[Truth] = [truth for truth in found.of(Truth) if truth.case in JUDGED]
+    rows: list[Speed] = measured.of(Speed)
+    truths: list[Truth] = [truth for truth in measured.of(Truth) if truth.case in JUDGED]
     doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
     panels = [
         _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
         _speed_panel(rows, doubt, "next_s", "each further surface"),
-        _guaranteed_panel(found.of(Guaranteed)),
+        _guaranteed_panel(measured.of(Guaranteed)),
     ]
     caption = (
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
@@ -137,9 +137,9 @@ def _guaranteed_panel(rows: Sequence[Guaranteed]) -> Panel | None:
     return Panel(name, words, svg(drawn, name, words, simulated=False), header, table)
 
 
-def benchmark_plate(found: Measured) -> Plate:
+def benchmark_plate(measured: Measured) -> Plate:
     """Draw time against true error on the published problems."""
-    panel = _order_panel(found.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
+    panel = _order_panel(measured.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
     caption = (
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
         "half-plane under a round body, and the finger at its ending. The table of orders names every point."
@@ -147,9 +147,9 @@ def benchmark_plate(found: Measured) -> Plate:
     return Plate("benchmarks", caption, () if panel is None else (panel,))
 
 
-def order_plate(found: Measured) -> Plate:
+def order_plate(measured: Measured) -> Plate:
     """Draw errors against element size."""
-    panel = _order_panel(found.of(Order), "orders", "error [–]", None)
+    panel = _order_panel(measured.of(Order), "orders", "error [–]", None)
     caption = (
         "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
         "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size."
@@ -200,9 +200,9 @@ def _mark(problem: str) -> str:
     return marks.get(problem.split(",")[0], "x")
 
 
-def estimate_plate(found: Measured) -> Plate:
+def estimate_plate(measured: Measured) -> Plate:
     """Draw estimates against true errors, a panel a number."""
-    rows: list[Estimate] = found.of(Estimate)
+    rows: list[Estimate] = measured.of(Estimate)
     panels = [_estimate_panel([r for r in rows if r.number == number], number) for number in NUMBERS]
     caption = (
         "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
@@ -243,9 +243,9 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
     return Panel(name, title, svg(drawn, name, title, simulated=False), header, table)
 
 
-def cost_plate(found: Measured) -> Plate:
+def cost_plate(measured: Measured) -> Plate:
     """Draw where the time of one solve goes."""
-    rows: list[Cost] = found.of(Cost)
+    rows: list[Cost] = measured.of(Cost)
     caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
     if not rows:
         return Plate("costs", caption, ())
@@ -280,9 +280,9 @@ def _distinct(count: int) -> list[str]:
     return [base[n % len(base)] for n in range(count)]
 
 
-def growth_plate(found: Measured) -> Plate:
+def growth_plate(measured: Measured) -> Plate:
     """Draw the time of one linear system against its unknowns."""
-    rows: list[Growth] = found.of(Growth)
+    rows: list[Growth] = measured.of(Growth)
     caption = (
         "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
         f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5."

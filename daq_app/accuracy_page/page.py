@@ -29,9 +29,9 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 
 
-def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
+def page(measured: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
-    figures, listed = plates(found) if figures is None else figures, tables(found)
+    figures, listed = plates(measured) if figures is None else figures, tables(measured)
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("daq_app.accuracy_page", "."), PackageLoader("sessions.report", ".")]),
         autoescape=select_autoescape(default=True, default_for_string=True),
@@ -41,7 +41,7 @@ def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     )
     there = [section for section in SECTIONS if any(part in figures or part in listed for part in section[2])]
     return environment.get_template("accuracy.html.jinja").render(
-        found=found,
+        found=measured,
         figures=figures,
         tables=listed,
         sections=[(name, words) for name, words, _ in there],
@@ -52,16 +52,16 @@ def page(found: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     )
 
 
-def write(found: Measured, folder: Path) -> tuple[Path, ...]:
+def write(measured: Measured, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError where that cannot be done."""
     data = folder / DATA
-    swap_in(data, json.dumps(found.to_dict(), indent=1, allow_nan=False) + "\n")
+    swap_in(data, json.dumps(measured.to_dict(), indent=1, allow_nan=False) + "\n")
     written = [data]
-    figures = plates(found)
+    figures = plates(measured)
     for plate in figures.values():
         for panel in plate.panels:
             path = folder / FIGURES / f"{panel.name}.svg"
             swap_in(path, panel.svg)
             written.append(path)
-    swap_in(folder / PAGE, page(found, figures))
+    swap_in(folder / PAGE, page(measured, figures))
     return (folder / PAGE, *written)

@@ -42,34 +42,34 @@ def _cell(text: str) -> str:
     return " ".join(words if len(words) <= CELL_WORDS else [*words[: CELL_WORDS - 1], "…"])
 
 
-def tables(found: Measured) -> dict[str, Table]:
+def tables(measured: Measured) -> dict[str, Table]:
     """Return the tables that there are rows for, by name."""
-    made: tuple[Callable[[Measured], Table], ...] = (
+    builders: tuple[Callable[[Measured], Table], ...] = (
         machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems, hard_small,
         hard_finite,
     )  # fmt: skip
-    return {table.name: table for table in (make(found) for make in made) if table.rows}
+    return {table.name: table for table in (make(measured) for make in builders) if table.rows}
 
 
-def machine(found: Measured) -> Table:
+def machine(measured: Measured) -> Table:
     """Return what the run was made on."""
     rows: list[tuple[str, str]] = []
-    for row in found.of(Machine):
+    for row in measured.of(Machine):
         assert isinstance(row, Machine)
         rows += [
-            ("begun", f"{found.begun} UTC"), ("system", row.system),
+            ("begun", f"{measured.begun} UTC"), ("system", row.system),
             ("processor", f"{row.processor}, {row.cores} cores"),
             ("threads of linear algebra", row.threads),
             ("processes wanting a core before it began", "not told" if row.load is None else f"{row.load:.2f}"),
-            ("took", f"{sum(found.took_s.values()):.0f} s" + (", stopped by hand" if found.stopped else "")),
+            ("took", f"{sum(measured.took_s.values()):.0f} s" + (", stopped by hand" if measured.stopped else "")),
             *row.versions.items(),
         ]  # fmt: skip
     return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
 
 
-def targets(found: Measured) -> Table:
+def targets(measured: Measured) -> Table:
     """Return what was asked of the speed."""
-    rows: list[Target] = found.of(Target)
+    rows: list[Target] = measured.of(Target)
     cells = [
         (
             row.work, row.at_error, _limit(row.reach, row.unit), _limit(row.aim, row.unit),
@@ -86,9 +86,9 @@ def targets(found: Measured) -> Table:
     return Table("targets", caption, header, tuple(cells))
 
 
-def truths(found: Measured) -> Table:
+def truths(measured: Measured) -> Table:
     """Return the reference cases."""
-    rows: list[Truth] = found.of(Truth)
+    rows: list[Truth] = measured.of(Truth)
     cells: list[tuple[str, ...]] = []
     for row in rows:
         if row.numbers:
@@ -104,9 +104,9 @@ def truths(found: Measured) -> Table:
     return Table("truths", caption, header, tuple(cells))
 
 
-def speeds(found: Measured) -> Table:
+def speeds(measured: Measured) -> Table:
     """Return time against error, mesh by mesh."""
-    rows: list[Speed] = sorted(found.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
+    rows: list[Speed] = sorted(measured.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
     cells = [
         (
             row.kinematics, f"{row.dofs:,}", _ms(row.setup_s), _ms(row.floor_s), _ms(row.first_s), _ms(row.next_s),
@@ -126,9 +126,9 @@ def speeds(found: Measured) -> Table:
     return Table("speeds", caption, header, tuple(cells))
 
 
-def estimates(found: Measured) -> Table:
+def estimates(measured: Measured) -> Table:
     """Return how often estimates are above and near, by kinematics and number."""
-    rows: list[Estimate] = found.of(Estimate)
+    rows: list[Estimate] = measured.of(Estimate)
     cells: list[tuple[str, ...]] = []
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
         for name in NUMBERS:
@@ -148,13 +148,13 @@ def estimates(found: Measured) -> Table:
 
 
 def _share(answers: Sequence[bool | None]) -> str:
-    told = [answer for answer in answers if answer is not None]
-    return f"{sum(told)} of {len(told)}" if told else "–"
+    verdicts = [answer for answer in answers if answer is not None]
+    return f"{sum(verdicts)} of {len(verdicts)}" if verdicts else "–"
 
 
-def warm(found: Measured) -> Table:
+def warm(measured: Measured) -> Table:
     """Return the warm stepper's rows."""
-    rows: list[Warm] = found.of(Warm)
+    rows: list[Warm] = measured.of(Warm)
     cells = [
         (
             f"{row.kinematics} strain", row.case, str(row.readings), _ms(row.median_s), _ms(row.p99_s),
@@ -167,9 +167,9 @@ def warm(found: Measured) -> Table:
     return Table("warm", caption, header, tuple(cells))
 
 
-def histories(found: Measured) -> Table:
+def histories(measured: Measured) -> Table:
     """Return courses against direct states."""
-    rows: list[Marched] = found.of(Marched)
+    rows: list[Marched] = measured.of(Marched)
     cells = [
         (
             f"{row.kinematics} strain", row.case, str(row.dofs), _ms(row.direct_s), _ms(row.marched_s),
@@ -181,9 +181,9 @@ def histories(found: Measured) -> Table:
     return Table("histories", "A course of 200 substeps against the state found directly.", header, tuple(cells))
 
 
-def costs(found: Measured) -> Table:
+def costs(measured: Measured) -> Table:
     """Return where the time goes."""
-    rows: list[Cost] = found.of(Cost)
+    rows: list[Cost] = measured.of(Cost)
     cells = [
         (
             f"{row.kinematics} strain", percent(row.tolerance), f"{row.dofs:,}", _ms(row.took_s), _ms(row.setup_s),
@@ -200,9 +200,9 @@ def costs(found: Measured) -> Table:
     return Table("costs", caption, header, tuple(cells))
 
 
-def starts(found: Measured) -> Table:
+def starts(measured: Measured) -> Table:
     """Return cold starts."""
-    rows: list[Cold] = found.of(Cold)
+    rows: list[Cold] = measured.of(Cold)
     cells = [(row.what, str(row.runs), _ms(row.took_s), _ms(row.passed_s)) for row in rows]
     header = ("process", "runs", "processor time [ms]", "time that passed [ms]")
     caption = (
@@ -211,9 +211,9 @@ def starts(found: Measured) -> Table:
     return Table("starts", caption, header, tuple(cells))
 
 
-def orders(found: Measured) -> Table:
+def orders(measured: Measured) -> Table:
     """Return observed orders of convergence."""
-    rows: list[Order] = found.of(Order)
+    rows: list[Order] = measured.of(Order)
     cells = [
         (
             row.problem, row.quantity, row.kinematics, " / ".join(f"{error:.1e}" for error in row.errors),
@@ -226,9 +226,9 @@ def orders(found: Measured) -> Table:
     return Table("orders", caption, header, tuple(cells))
 
 
-def problems(found: Measured) -> Table:
+def problems(measured: Measured) -> Table:
     """Return the published problems."""
-    rows: list[Problem] = found.of(Problem)
+    rows: list[Problem] = measured.of(Problem)
     cells = [
         (
             row.problem, row.source, row.quantity, number(row.expected, 5), number(row.obtained, 5), percent(row.off),
@@ -240,18 +240,18 @@ def problems(found: Measured) -> Table:
     return Table("problems", "Published problems, run through the same code as the finger.", header, tuple(cells))
 
 
-def hard_small(found: Measured) -> Table:
+def hard_small(measured: Measured) -> Table:
     """Return the hard cases at small strain."""
-    return _hard(found, "small")
+    return _hard(measured, "small")
 
 
-def hard_finite(found: Measured) -> Table:
+def hard_finite(measured: Measured) -> Table:
     """Return the hard cases at finite strain."""
-    return _hard(found, "finite")
+    return _hard(measured, "finite")
 
 
-def _hard(found: Measured, kinematics: str) -> Table:
-    rows: list[HardCase] = [row for row in found.of(HardCase) if row.kinematics == kinematics]
+def _hard(measured: Measured, kinematics: str) -> Table:
+    rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
     cells = [(row.case, row.must, f"FAILED, {row.flaw}: {row.told}" if row.flaw else row.told) for row in rows]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."

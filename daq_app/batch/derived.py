@@ -113,8 +113,8 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
             settings_of(document)
             _afferent_of(document)
     except RecordingError as damaged:
-        told = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
-        raise RecordingError(told) from damaged
+        sentence = str(damaged).replace("make it anew from the recording", f"'daq-app {verb}' makes it anew")
+        raise RecordingError(sentence) from damaged
     except (ValueError, AttributeError, TypeError) as damaged:
         why = damaged if isinstance(damaged, ValueError) else "its parts are not of the kinds that this program writes"
         raise RecordingError(f"{folder / name} is damaged ({why}); 'daq-app {verb}' makes it anew") from damaged
@@ -152,8 +152,8 @@ def predict_session(
 
 
 def _with_firing(prediction: SessionPrediction, afferent: AfferentSettings | None) -> dict[str, Any]:
-    told = {} if afferent is None else {"afferent": firing_document(prediction, afferent)}
-    return {**prediction.to_dict(), **told}
+    firing = {} if afferent is None else {"afferent": firing_document(prediction, afferent)}
+    return {**prediction.to_dict(), **firing}
 
 
 def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
@@ -187,8 +187,8 @@ def repeat(
 
 def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each number of a document that came out otherwise when repeated, and why that may be."""
-    found = first_sentences(list(differences(stored, json.loads(json.dumps(fresh)), name)))
-    return [*found, why(name, stored, software_versions())] if found else []
+    sentences = first_sentences(list(differences(stored, json.loads(json.dumps(fresh)), name)))
+    return [*sentences, why(name, stored, software_versions())] if sentences else []
 
 
 def _predict(

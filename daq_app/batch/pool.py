@@ -29,18 +29,18 @@ class Shelf:
     def __init__(self, folder: Path, options: VisitOptions) -> None:
         """Keep results in `folder`, which is made when the first comes."""
         self._folder = folder
-        made = {"form": FORM, "options": asdict(options), "versions": software_versions()}
-        self._made = json.dumps(made, sort_keys=True, default=str).encode()
+        recipe = {"form": FORM, "options": asdict(options), "versions": software_versions()}
+        self._recipe = json.dumps(recipe, sort_keys=True, default=str).encode()
 
     def key(self, session: Path) -> str:
         """Return the SHA-256 over all that a session's result comes from. Raises OSError."""
-        digest = hashlib.sha256(self._made)
+        digest = hashlib.sha256(self._recipe)
         digest.update(session.name.encode())
         for name, content in content_of(session).items():
             digest.update(f"\0{name}\0{len(content)}\0".encode() + content)
         return digest.hexdigest()
 
-    def found(self, key: str) -> Visit | None:
+    def stored(self, key: str) -> Visit | None:
         """Return what was kept under a key; None where nothing was, or it is not what was written."""
         with suppress(OSError, ValueError, KeyError, TypeError):
             kept = json.loads(self.file(key).read_bytes())
@@ -82,7 +82,7 @@ def visits(
     RecordingError where the shelf cannot be written.
     """
     keys = {folder: shelf.key(folder) for folder in folders}
-    kept = {folder: shelf.found(key) for folder, key in keys.items()}
+    kept = {folder: shelf.stored(key) for folder, key in keys.items()}
     done = [visit for visit in kept.values() if visit is not None]
     missing = [folder for folder, visit in kept.items() if visit is None]
     for folder in missing:
@@ -106,8 +106,8 @@ def visits(
                 shelf.keep(named[name], answer)
                 done.append(Visit.from_dict(answer))
             left = (time.monotonic() - begun) / count * (len(missing) - count)
-            told = "" if console.at_terminal else f", {left:.0f} s left"
-            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{told}")
+            remaining = "" if console.at_terminal else f", {left:.0f} s left"
+            console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{remaining}")
     except KeyboardInterrupt:
         console.note(f"{len(done)} of {len(folders)} sessions are computed and kept; the next run goes on from there")
         raise

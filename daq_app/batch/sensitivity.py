@@ -90,20 +90,20 @@ def left_as_it_is(scene: Scene, design: Design) -> tuple[str, ...]:
 
 def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
     """Return a design read from a file. Raises SettingsError for a key or a range that cannot be varied."""
-    found: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     for name, span in design.items():
         if _value(scene, name) is None:
             raise SettingsError(f"{where}: {name} is no number of this scene; a dotted key such as friction.mu is one")
-        given: object = span
+        ends: object = span
         pair: list[Any] = cast("list[Any]", span) if isinstance(span, list) else []
         numbers = [float(end) for end in pair if isinstance(end, int | float) and abs(end) <= sys.float_info.max]
         if len(pair) != 2 or len(numbers) != 2 or not numbers[0] < numbers[1]:
             allowed = "[least, greatest], least below greatest"
-            raise SettingsError(f"{where}: {name} = {toml_value(given)} is not allowed: {allowed}")
-        found[name] = (numbers[0], numbers[1])
-    if len(found) < 2:
+            raise SettingsError(f"{where}: {name} = {toml_value(ends)} is not allowed: {allowed}")
+        ranges[name] = (numbers[0], numbers[1])
+    if len(ranges) < 2:
         raise SettingsError(f"{where}: a design needs two numbers at least")
-    return found
+    return ranges
 
 
 def sensitivity(
@@ -122,11 +122,11 @@ def sensitivity(
     points = saltelli_points(design, samples, seed)
     answer = sed or _settled
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
-    found = np.empty(len(points))
+    responses = np.empty(len(points))
     failed: list[str] = []
     for i, drawn in enumerate(scenes):
         try:
-            found[i] = answer(drawn)
+            responses[i] = answer(drawn)
         except SolveFailure as failure:
             failed.append(" ".join(str(failure).split()))
         progress((i + 1) / len(points))
@@ -135,7 +135,7 @@ def sensitivity(
             f"{len(failed)} of {len(points)} scenes of the design have no settled state; narrow its ranges (the first: "
             f"{failed[0]})"
         )
-    return sobol_indices(design, found, seed, lambda name: _one_sided(scene, name, design[name])), found
+    return sobol_indices(design, responses, seed, lambda name: _one_sided(scene, name, design[name])), responses
 
 
 def saltelli_points(design: Design, samples: int, seed: int) -> NDArray[np.float64]:
@@ -169,23 +169,23 @@ def _problem(design: Design) -> dict[str, Any]:
 
 def doubts(indices: Sequence[Index], samples: int) -> tuple[str, ...]:
     """Return what to doubt in the indices of a design of so many samples: one-sided ranges, impossible shares."""
-    told: list[str] = []
-    beside = [one.name for one in indices if one.one_sided]
-    if beside:
-        told.append(
-            f"Varied to one side of the scene's own value only: {', '.join(beside)}; their shares, and those of all "
+    sentences: list[str] = []
+    one_sided = [one.name for one in indices if one.one_sided]
+    if one_sided:
+        sentences.append(
+            f"Varied to one side of the scene's own value only: {', '.join(one_sided)}; their shares, and those of all "
             "others, are of these ranges."
         )
     wrong = [one for one in indices if one.impossible]
     if wrong:
         widest = max(max(one.first_error, one.total_error) for one in indices)
         enough = 2 ** math.ceil(math.log2(max(samples * (widest / _NARROW) ** 2, 2.0 * samples)))
-        told.append(
+        sentences.append(
             f"Noise of too few samples: {', '.join(one.name for one in wrong)} (a share below 0 or above 1, or alone "
             f"above that with others). As intervals narrow with the root of the samples, about {enough} would bring "
             f"each to ±{_NARROW:g}."
         )
-    return tuple(told)
+    return tuple(sentences)
 
 
 def _one_sided(scene: Scene, name: str, span: tuple[float, float]) -> bool:
@@ -209,8 +209,8 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
 
 
 def _settled(scene: Scene) -> float:
-    asked = replace(scene.solve, course="steady", evidence="quick")
-    return solve(replace(scene, solve=asked)).sed_ending
+    settings = replace(scene.solve, course="steady", evidence="quick")
+    return solve(replace(scene, solve=settings)).sed_ending
 
 
 def _value(scene: Any, name: str) -> float | None:  # noqa: ANN401  the scene or a table of it

@@ -59,8 +59,8 @@ class Trial:
 
     def key(self, versions: Mapping[str, str]) -> str:
         """Return what its answer is kept under: all that it comes from, and the `versions` that computed it."""
-        told = json.dumps([asdict(self), versions], sort_keys=True, default=str)
-        return hashlib.sha256(told.encode()).hexdigest()
+        document = json.dumps([asdict(self), versions], sort_keys=True, default=str)
+        return hashlib.sha256(document.encode()).hexdigest()
 
 
 # For each series the correlation with the index (r, q), then the change over the range of mu (r, q), both by place
@@ -149,12 +149,12 @@ def _stiffened(scene: Scene, factors: Mapping[str, float]) -> Scene:
 
 def answered(trial: Trial) -> Answer | str:
     """Return what one finger answers, or why it cannot be asked."""
-    found = series_slopes(trial.finger, trial.press, trial.arcs)
-    if isinstance(found, str):
-        return found
+    by_quantity = series_slopes(trial.finger, trial.press, trial.arcs)
+    if isinstance(by_quantity, str):
+        return by_quantity
     return {
         name: [[_plain(one.with_index) for one in slopes], [_plain(one.change) for one in slopes]]
-        for name, slopes in found.items()
+        for name, slopes in by_quantity.items()
     }
 
 
@@ -256,7 +256,7 @@ def shares_by_thirds(kept: Array, values: Array) -> list[tuple[float, float, flo
     ends = [low + third * (high - low) / 3.0 for third in range(4)]
     place = np.clip(np.searchsorted(ends, values, side="left") - 1, 0, 2)
     shares = [share(kept[place == third]) for third in range(3)]
-    return [(*pair, None if found is None else found[0]) for pair, found in zip(pairwise(ends), shares, strict=True)]
+    return [(*pair, None if share is None else share[0]) for pair, share in zip(pairwise(ends), shares, strict=True)]
 
 
 def slope_indices(

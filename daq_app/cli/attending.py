@@ -46,13 +46,13 @@ def open_device(recorder: Recorder, uri: str) -> m.Device:
                 raise KeyboardInterrupt
 
 
-def attend_session(recorder: Recorder, asked: m.StartSession | m.ResumeSession, console: Console) -> Outcome:
+def attend_session(recorder: Recorder, request: m.StartSession | m.ResumeSession, console: Console) -> Outcome:
     """Attend a session until it is sealed, or cut short; people answer at this terminal unless they are simulated.
 
     A stop is passed on at once; a second one no longer waits: for the sealing, which the recorder finishes alone, or
     for a recorder that does not answer (KeyboardInterrupt). Raises as a driver does, RecordingError, WrongValue.
     """
-    recorder.send(asked)
+    recorder.send(request)
     with interruptions() as interrupted:
         return _Attendance(recorder, console, interrupted).to_the_end()
 

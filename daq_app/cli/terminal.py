@@ -25,7 +25,7 @@ class Terminal:
         """Talk on stderr and listen on stdin; `forces` is False where no transducer tells when a stroke is done."""
         self._forces = forces
         self._out = out or sys.stderr
-        self._asked: steps.Command | None = None
+        self._command: steps.Command | None = None
         self._lines: deque[str] = deque()
         self.closed = False  # nobody can type any more
         # A daemon: a blocked read of stdin must not keep the program alive.
@@ -34,10 +34,10 @@ class Terminal:
 
     def show(self, command: steps.Command) -> None:
         """Print what is to be done, and remember what was asked."""
-        asked = self._question(command)
-        if asked is not None:
-            self._asked = command
-            self._print(asked)
+        question = self._question(command)
+        if question is not None:
+            self._command = command
+            self._print(question)
             return
         match command:
             case steps.ShowInstruction(block):
@@ -102,7 +102,7 @@ class Terminal:
 
     def _done(self) -> steps.Event | None:
         """Return what Enter alone means."""
-        match self._asked:
+        match self._command:
             case steps.AskBegin():
                 return steps.Begin()
             case steps.AskMount(trial):
@@ -121,7 +121,7 @@ class Terminal:
         number = float(line) if line.replace(".", "", 1).isdecimal() else None
         if number is None and line != "-":
             return None
-        match self._asked:
+        match self._command:
             case steps.AskScore():
                 return steps.Scored(number, input_device=KEYBOARD)
             case steps.AskNumber():

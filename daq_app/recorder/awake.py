@@ -50,8 +50,8 @@ def holder(pid: int, system: str) -> Sequence[str] | None:
     if system == "darwin":
         return "caffeinate", "-i", "-w", str(pid)
     if system == "linux":  # tail ends with the process it watches: nothing is left behind by a crash
-        asked = ("--what=sleep:idle", "--who=daq-app", f"--why={WHY}", "--mode=block")
-        return "systemd-inhibit", *asked, "tail", f"--pid={pid}", "-f", "/dev/null"
+        options = ("--what=sleep:idle", "--who=daq-app", f"--why={WHY}", "--mode=block")
+        return "systemd-inhibit", *options, "tail", f"--pid={pid}", "-f", "/dev/null"
     return None
 
 

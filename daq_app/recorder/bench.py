@@ -183,10 +183,10 @@ class Bench:
         self._display.take(block)
         if self._tare is not None and self._tare.feed(block):
             tare, self._tare = self._tare, None
-            told = tare.result(self._connected.transducer.info)
-            self._display.zeroed(told.mean)
-            remember_zero(self._connected.transducer.info, told.mean, told.spread)
-            self._send(told)
+            tared = tare.result(self._connected.transducer.info)
+            self._display.zeroed(tared.mean)
+            remember_zero(self._connected.transducer.info, tared.mean, tared.spread)
+            self._send(tared)
 
     def _start(self) -> None:
         """Let the open transducer stream for the display."""

@@ -10,7 +10,7 @@
                 case LoggedEvent(): ...                    # written down and safe: the course so far
                 case Status(safe=safe): ...                # the recording lamp: what the disk has acknowledged
                 case SessionEnded(folder, end): ...        # its end is written; Sealing and Sealed follow
-                case Gone(asked, sentence): ...            # always the last report
+                case Gone(requested, sentence): ...            # always the last report
         recorder.send(StimulusMounted("K31"))              # an event of sessions.run.steps: what somebody did
 
 Requests and reports are the dataclasses of `messages.py`, the events and commands of `run.steps`, `LoggedEvent`
@@ -147,10 +147,10 @@ class Recorder:
         said = ""
         try:
             while data := os.read(self._process.stdout.fileno(), CHUNK):
-                found = [self._reports.unpacked(body) for body in splitter.feed(data)]
+                reports = [self._reports.unpacked(body) for body in splitter.feed(data)]
                 self._heard = time.monotonic()
-                self._arrived.extend(found)
-                if found:
+                self._arrived.extend(reports)
+                if reports:
                     self._news.set()
                     self._wake()
         except BrokenMessage as error:

@@ -89,8 +89,8 @@ class Display:
         if info is None or not len(block):
             return
         calibration = info.calibration
-        felt = calibration.wrench(block.raw, np.zeros(6))
-        load = loads(calibration.own(felt), calibration.rated).max(axis=0)
+        wrench = calibration.wrench(block.raw, np.zeros(6))
+        load = loads(calibration.own(wrench), calibration.rated).max(axis=0)
         self._load, self._peak = np.fmax(self._load, load), np.fmax(self._peak, load)
         if level(self._peak) == "alarm" and not self._overload_told:
             self._overload_told = True
@@ -101,7 +101,7 @@ class Display:
                 block.sequence,
                 block.time,
                 block.received_ns,
-                felt - calibration.wrench(np.array([self._zero]), np.zeros(6)),
+                wrench - calibration.wrench(np.array([self._zero]), np.zeros(6)),
                 np.where(info.status.doubtful(block.status), block.status, 0),
                 self._zero,
             )

@@ -219,7 +219,7 @@ class LinkBack:
 class Gone:
     """The recorder's process has ended; said by the client itself, once, as the last message."""
 
-    asked: bool  # by us
+    requested: bool  # by us
     sentence: str
 
 

@@ -57,7 +57,7 @@ class Recorder:
             self._attempt("Tare", self._bench.look)
             self._display.look(self._bench.health)
             for request in self._inbox.take_requests():
-                self._attempt(type(request).__name__, lambda asked=request: self._do(asked))
+                self._attempt(type(request).__name__, lambda request=request: self._do(request))
         self._bench.disconnect()
 
     def _do(self, request: m.Request) -> None:

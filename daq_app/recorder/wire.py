@@ -48,7 +48,7 @@ class Splitter:
     def feed(self, data: bytes) -> list[bytes]:
         """Take what arrived and return every body it completes. Raises BrokenMessage for a length beyond LONGEST."""
         self._buffer += data
-        found: list[bytes] = []
+        messages: list[bytes] = []
         start = 0
         while len(self._buffer) - start >= LENGTH.size:
             (length,) = LENGTH.unpack_from(self._buffer, start)
@@ -57,10 +57,10 @@ class Splitter:
             stop = start + LENGTH.size + length
             if len(self._buffer) < stop:
                 break
-            found.append(bytes(self._buffer[start + LENGTH.size : stop]))
+            messages.append(bytes(self._buffer[start + LENGTH.size : stop]))
             start = stop
         del self._buffer[:start]
-        return found
+        return messages
 
 
 def _array_out(value: object) -> object:

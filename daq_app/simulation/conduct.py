@@ -43,11 +43,11 @@ def conduct(
     came_from = provenance(clock, settings)
     writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock, durable=durable)
 
-    def told(status: Status) -> None:
+    def show(status: Status) -> None:
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
         console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
-    end = run_session(plan, writer, operator, transducer, clock, settings=run, progress=told)
+    end = run_session(plan, writer, operator, transducer, clock, settings=run, progress=show)
     if end.cause not in RESUMABLE:
         seal(writer.folder)
     return end

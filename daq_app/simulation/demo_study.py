@@ -44,7 +44,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         folder = out / f"{subject}-scores"
         people = SimulatedPeople(_seed(seed, number), clock)
         planned = plan(chosen, subject, _seed(seed, number), forces=False)
-        end = conduct(planned, folder, Participants(people, None, clock), console, settings=[_told(seed)])
+        end = conduct(planned, folder, Participants(people, None, clock), console, settings=[_study_seed(seed)])
         _check(end, folder)
         scored.append(folder)
     subject = f"S{STROKING:02d}"
@@ -53,7 +53,7 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
         people = SimulatedPeople(_seed(seed, STROKING), clock, bench)
         planned = plan(chosen, subject, _seed(seed, STROKING) + 1, setting=VisitSetting(frame=bench.frame))
         taking_part = Participants(people, bench.transducer, clock)
-        end = conduct(planned, folder, taking_part, console, settings=[_told(seed)])
+        end = conduct(planned, folder, taking_part, console, settings=[_study_seed(seed)])
         _check(end, folder)
         planted = _planted(bench, Recording.open(folder))
     return Study(tuple(scored), folder, planted, end.readings, end.health.lost)
@@ -69,7 +69,7 @@ def _seed(study: int, subject: int) -> int:
     return study * 100 + subject
 
 
-def _told(seed: int) -> Setting:
+def _study_seed(seed: int) -> Setting:
     return Setting("study seed", seed, "", "set")
 
 

@@ -46,19 +46,19 @@ def planted_relations(
     """
     if options.kinematics == "finite" or area != FIXED:
         return {}
-    found = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
-    return {descriptor: asdict(relation) for descriptor, relation in found.items()}
+    planted = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
+    return {descriptor: asdict(relation) for descriptor, relation in planted.items()}
 
 
 def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PlantedRelation]:
     """Return the relation for each descriptor; none where a surface has no settled slide."""
-    found: dict[str, PlantedRelation] = {}
+    by_descriptor: dict[str, PlantedRelation] = {}
     for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
         surfaces = [planted_surface(trial) for trial in block.trials]
         at = _seds_of_fingers(surfaces, block, people.moisture, seds)
         if at is not None:
-            found[surfaces[0].descriptor] = _relation(people, surfaces, at)
-    return found
+            by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, at)
+    return by_descriptor
 
 
 def _seds_of_fingers(
@@ -86,12 +86,12 @@ def _relation(
     draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
     for seed in range(_FIRST, _FIRST + DRAWN):
         person, order = SimulatedSubject(seed, people), [int(one) for one in draw.permutation(len(surfaces))]
-        felt = [person.felt(surface) for surface in surfaces]
-        own = seds(felt[0].mu / surfaces[0].mu)
+        perceived = [person.perceived(surface) for surface in surfaces]
+        own = seds(perceived[0].mu / surfaces[0].mu)
         before: list[int | None] = [None, *(indices[one] for one in order[:-1])]
         rows = np.array(
             [
-                (own[one], place, 0 if last is None else last - 50, person.meant(felt[one], place, last))
+                (own[one], place, 0 if last is None else last - 50, person.meant(perceived[one], place, last))
                 for place, (one, last) in enumerate(zip(order, before, strict=True))
             ]
         )

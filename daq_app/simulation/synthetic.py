@@ -103,9 +103,9 @@ def synthetic_study(out: Path, seed: int, console: Console, subjects: int = SUBJ
 
 def planted_slopes(people: SubjectSettings) -> dict[str, Any]:
     """Return the slopes of these people's scores on index, µ by descriptor, trials before and index before."""
-    felt = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
+    judgements = {name: SimulatedSubject(0, people).by_friction(name) for name in ("stickiness", "slipperiness")}
     by_index = people.gain * (1.0 - people.friction_weight)
-    return {"gain": by_index, "friction": felt, "drift": people.drift, "carry_over": people.carry_over}
+    return {"gain": by_index, "friction": judgements, "drift": people.drift, "carry_over": people.carry_over}
 
 
 def _decisions() -> str:
@@ -129,9 +129,11 @@ def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
     planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
     people = SyntheticPeople(SimulatedSubject(own, settings), bench, transducer, clock, planned, spoilt)
-    told = [Setting("study seed", seed, "", "set")]
+    provenance = [Setting("study seed", seed, "", "set")]
     taking_part = Participants(people, transducer, clock)
-    conduct(planned, out / subject, taking_part, console, settings=told, run=RunnerSettings(tick=TICK), durable=False)
+    conduct(
+        planned, out / subject, taking_part, console, settings=provenance, run=RunnerSettings(tick=TICK), durable=False
+    )
     return [
         {**_row(subject, trial, stroke), **people.meant(trial)}
         for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
@@ -181,10 +183,10 @@ class SyntheticPeople(DueEvents):
             case AskMount(trial) if trial.number == self._spoilt.aborted:
                 self.put(Abort("the subject had to leave"))
             case AskMount(trial):
-                self._bench.mount(self._felt(trial))
+                self._bench.mount(self._perceived(trial))
                 self.put(StimulusMounted(trial.stimulus.code))
             case AskStroke(trial):
-                stroke = self._subject.stroke(self._felt(trial))
+                stroke = self._subject.stroke(self._perceived(trial))
                 self._bench.begin_stroke(stroke, self._transducer.now())
                 self.stroked.append(trial)
             case AskScore(trial):
@@ -197,7 +199,7 @@ class SyntheticPeople(DueEvents):
     def meant(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its place, what was stroked before, and the score without noise."""
         block, place, before = self._order(trial)
-        score = self._subject.meant(self._subject.felt(planted_surface(trial)), place, before)
+        score = self._subject.meant(self._subject.perceived(planted_surface(trial)), place, before)
         return {"indentation": block.indentation, "place": place, "before": before, "score": score}
 
     def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
@@ -206,8 +208,8 @@ class SyntheticPeople(DueEvents):
         place = block.trials.index(trial)
         return block, place, block.trials[place - 1].stimulus.known_index if place else None
 
-    def _felt(self, trial: Trial) -> Surface:
-        surface = self._subject.felt(planted_surface(trial))
+    def _perceived(self, trial: Trial) -> Surface:
+        surface = self._subject.perceived(planted_surface(trial))
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
@@ -216,5 +218,5 @@ class SyntheticPeople(DueEvents):
         at = self.clock.now_ns() * 1e-9 + JUDGING
         if trial.number == self._spoilt.unanswered:
             return Scored(None, (), None, 0, None, "simulated")
-        score = self._subject.score(self._subject.felt(planted_surface(trial)), 1, place, before)
+        score = self._subject.score(self._subject.perceived(planted_surface(trial)), 1, place, before)
         return Scored(score, ((at, score),), at, 0, None, "simulated")

@@ -10,7 +10,7 @@ from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.messages import DevicesFound, LifeKnown, Loaded, Message, Searching
 from daq_app.wording import tr
-from drivers.catalog import Found
+from drivers.catalog import Probe
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.recording import LoggedEvent
@@ -40,7 +40,7 @@ class BenchState:
     problem: str | None = None  # why the link is lost, or was not made
     searching: bool = False
     searched: bool = False  # a search has ended since somebody connected or let go
-    found: tuple[Found, ...] = ()
+    found: tuple[Probe, ...] = ()
     health: Health = field(default_factory=Health)
     rate: float = float("nan")  # measured [Hz]
     load: Load = field(default_factory=Load)
@@ -105,7 +105,7 @@ def _left(bench: BenchState, message: m.SessionEnded | m.Gone) -> BenchState:
     match message:
         case m.SessionEnded(end=end) if end.cause == "device":
             return replace(bench, link="lost", problem=end.reason)
-        case m.Gone(asked=False):
+        case m.Gone(requested=False):
             return BenchState(found=bench.found)  # the recorder's process held the transducer
         case _:
             return bench

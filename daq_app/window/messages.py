@@ -6,7 +6,7 @@ from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
 from daq_app.window.bench_load import Load
 from daq_app.window.stroke_quality import Quality
-from drivers.catalog import Found
+from drivers.catalog import Probe
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Searching:
 class DevicesFound:
     """What answered when devices were looked for."""
 
-    found: tuple[Found, ...]
+    found: tuple[Probe, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -203,8 +203,8 @@ def hold(link: Link) -> int:
 
 def status_word(link: Link) -> int | None:
     """Return the status word, or None when there is no answer: it is not there, or it streams."""
-    asked = wire.read_registers(wire.STATUS, 1)
-    answer = wire.answer_in(_heard(link, asked, b""), asked)
+    request = wire.read_registers(wire.STATUS, 1)
+    answer = wire.answer_in(_heard(link, request, b""), request)
     return struct.unpack(">H", answer)[0] if isinstance(answer, bytes) else None
 
 
@@ -213,22 +213,22 @@ def read(link: Link, first: int, count: int) -> bytes:
     read_so_far = b""
     while len(read_so_far) < 2 * count:
         done = len(read_so_far) // 2
-        asked = wire.read_registers(first + done, min(count - done, wire.MOST_REGISTERS))
-        read_so_far += _answer(link, asked, f"for register {first + done}")
+        request = wire.read_registers(first + done, min(count - done, wire.MOST_REGISTERS))
+        read_so_far += _answer(link, request, f"for register {first + done}")
     return read_so_far
 
 
-def _done(link: Link, asked: bytes, what: str) -> None:
+def _done(link: Link, request: bytes, what: str) -> None:
     """Carry out a request that is answered with success or a repetition of what was written."""
-    answer = _answer(link, asked, what)
-    if asked[1] == wire.UNLOCK and answer != b"\x01":
+    answer = _answer(link, request, what)
+    if request[1] == wire.UNLOCK and answer != b"\x01":
         raise DeviceFault(f"the transducer was asked {what} and refused; switch it off and on")
 
 
-def _answer(link: Link, asked: bytes, what: str) -> bytes:
+def _answer(link: Link, request: bytes, what: str) -> bytes:
     """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
     for times in _PATIENCE:
-        answer = wire.answer_in(_heard(link, asked, b"", times * _ANSWER), asked)
+        answer = wire.answer_in(_heard(link, request, b"", times * _ANSWER), request)
         if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
             while link.receive(_ANSWER) is not None:
                 pass
@@ -239,18 +239,18 @@ def _answer(link: Link, asked: bytes, what: str) -> bytes:
     raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")
 
 
-def _heard(link: Link, asked: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
+def _heard(link: Link, request: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
     """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
     deadline = time.monotonic() + _ANSWER
     while link.receive(0.0) and time.monotonic() < deadline:
         pass  # left over from before
-    link.send(asked)
+    link.send(request)
     heard = b""
     deadline = time.monotonic() + patience
     while True:
         left = deadline - time.monotonic()
         heard += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
-        if left <= 0.0 or (expected in heard if expected else wire.answer_in(heard, asked) is not None):
+        if left <= 0.0 or (expected in heard if expected else wire.answer_in(heard, request) is not None):
             return heard
 
 

@@ -112,19 +112,19 @@ def write_registers(first: int, registers: bytes) -> bytes:
     return request(WRITE, struct.pack(">HHB", first, len(registers) // 2, len(registers)) + registers)
 
 
-def answer_in(heard: bytes, asked: bytes) -> bytes | Refused | None:
+def answer_in(heard: bytes, request: bytes) -> bytes | Refused | None:
     """Return the data of the answer to the request `asked` wherever it lies in `heard`; None while it is not there.
 
     For registers read that is their bytes, else what follows the function code. Raises nothing.
     """
-    function = asked[1]
+    function = request[1]
     size, head = 5, bytes([ADDRESS, function])
     if function == READ:
-        size, head = 5 + 2 * asked[5], bytes([ADDRESS, READ, 2 * asked[5]])
+        size, head = 5 + 2 * request[5], bytes([ADDRESS, READ, 2 * request[5]])
     elif function == WRITE:
-        size, head = 8, asked[:6]
+        size, head = 8, request[:6]
     for frame in _frames(heard, head, size):
-        if frame != asked:  # an adapter may repeat what we send
+        if frame != request:  # an adapter may repeat what we send
             return frame[3:-2] if function == READ else frame[2:-2]
     for frame in _frames(heard, bytes([ADDRESS, function | _EXCEPTION]), 5):
         return Refused(_REASONS.get(frame[2], f"exception {frame[2]}"))
@@ -189,7 +189,7 @@ class StreamDecoder:
     def feed(self, data: bytes) -> Records:
         """Take what arrived and return every packet it completes."""
         self._buffer += data
-        found: list[NDArray[np.uint8]] = []
+        batches: list[NDArray[np.uint8]] = []
         damaged: list[NDArray[np.int64]] = []
         while (count := len(self._buffer) // PACKET_SIZE) >= (needed := 2 if self._in_step else _PROOF):
             packets = np.frombuffer(self._buffer, np.uint8, count * PACKET_SIZE).reshape(count, PACKET_SIZE)
@@ -203,11 +203,11 @@ class StreamDecoder:
             broken = -(-self._skipped // PACKET_SIZE) + first
             self.malformed += broken
             self._skipped = 0
-            found.append(packets[first : good - 1])
+            batches.append(packets[first : good - 1])
             damaged.append(np.concatenate([[broken], np.zeros(good - 2 - first, np.int64)]))
             self._buffer = self._buffer[(good - 1) * PACKET_SIZE :]
             self._in_step = True
-        return _records(found, damaged, self._flagged)
+        return _records(batches, damaged, self._flagged)
 
     def _skip(self) -> None:
         """Drop bytes up to the next place where the packets in the buffer may be sound."""
@@ -224,11 +224,11 @@ def _sound(packets: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return packets[:, :12].sum(axis=1, dtype=np.uint32) & 0x7F == packets[:, 12] & 0x7F
 
 
-def _records(found: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]], flagged: int) -> Records:
+def _records(batches: list[NDArray[np.uint8]], damaged: list[NDArray[np.int64]], flagged: int) -> Records:
     """Return sound packets as records: gauges in the order G0 to G5, `flagged` as status where the flag is set."""
-    if not found:
+    if not batches:
         return Records.of([], [], [])
-    packets = np.concatenate(found)
+    packets = np.concatenate(batches)
     gauges = np.ascontiguousarray(packets[:, :12]).view(">i2")[:, _ORDER].astype(np.float64)
     at_end = np.any(np.abs(gauges + 0.5) >= 32767.0, axis=1)
     status = np.where(packets[:, 12] & STATUS_FLAG, flagged, 0) + np.where(at_end, GAUGE_AT_END, 0)

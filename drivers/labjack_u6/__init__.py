@@ -17,7 +17,7 @@ from drivers.records import RecordDecoder
 from drivers.scan_count import ScanCount
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
-from drivers.usb_link import Endpoints, UsbLink, found
+from drivers.usb_link import Endpoints, UsbLink, devices
 
 _ANSWER = 1.0  # for an answer [real s], as in the maker's own driver
 _WRAP = 256 * wire.SCANS  # scans after which the packet counter begins anew
@@ -75,7 +75,7 @@ def _linked(place: _Where, deadline: Deadline) -> tuple[UsbLink, wire.Identity]:
     """Return the one converter that is meant, open, and who it is."""
     fitting: dict[int, Any] = {}
     refused: list[SetupError] = []
-    for one in found(_VENDOR, _PRODUCT):
+    for one in devices(_VENDOR, _PRODUCT):
         try:
             link = UsbLink(one, _ENDPOINTS, place.uri)
         except SetupError as error:
@@ -175,9 +175,9 @@ class GaugeConversation:
     def begin(self, link: Link) -> bytes:
         """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""
         self.end(link)
-        found = _identity(link)
-        if found.serial != self._serial:
-            raise DeviceFault(f"converter {found.serial} answers where {self._serial} was; open it anew")
+        identity = _identity(link)
+        if identity.serial != self._serial:
+            raise DeviceFault(f"converter {identity.serial} answers where {self._serial} was; open it anew")
         wire.check_configured(_said(link, wire.configure_stream(self._scan_clock)))
         if code := wire.normal_error(_said(link, wire.START), 0xA9):
             raise DeviceFault(f"the converter does not stream: {wire.meaning(code)}; pull its plug and put it in again")

@@ -203,20 +203,20 @@ class StreamDecoder:
 
     def _packets(self) -> list[bytes]:
         """Take whole sound packets off the front; bytes that begin none are skipped."""
-        found: list[bytes] = []
+        packets: list[bytes] = []
         head = bytes([0xF9, 4 + GAUGES * SCANS, 0xC0])
         while True:
             at = self._bytes.find(head, 1)
             start = at - 1 if at > 0 else max(len(self._bytes) - len(head), 0)
             self._skip(start)
             if at < 0 or len(self._bytes) < STREAM_PACKET:
-                return found
+                return packets
             packet = bytes(self._bytes[:STREAM_PACKET])
             if not _is_sound(packet):
                 self._skip(1)
                 continue
             self._skipped = 0
-            found.append(packet)
+            packets.append(packet)
             del self._bytes[:STREAM_PACKET]
 
     def _skip(self, count: int) -> None:

@@ -83,22 +83,24 @@ def identify(place: Where, deadline: Deadline) -> TransducerInfo:
 
 def prepare(place: Where, deadline: Deadline) -> TransducerInfo:
     """Set what the address asks for, and return who answers, as read back afterwards."""
-    found = _configuration(place, deadline)
-    if not found.streams:
+    configuration = _configuration(place, deadline)
+    if not configuration.streams:
         raise SetupError(f"{place.address.uri}: the box's RDT output is disabled; enable it on its Communications page")
-    if place.rate is not None and not _is_rate(found, place.rate):
+    if place.rate is not None and not _is_rate(configuration, place.rate):
         path = f"/comm.cgi?comrdtrate={place.rate}"
         answer = http_get(place.address.host, place.http_port, path, deadline)
-        if answer.status not in (200, 302) or not _is_rate(found := _configuration(place, deadline), place.rate):
-            shown = "shows no rate at all" if math.isnan(found.rate) else f"stays at {found.rate:g} Hz"
+        if answer.status not in (200, 302) or not _is_rate(
+            configuration := _configuration(place, deadline), place.rate
+        ):
+            shown = "shows no rate at all" if math.isnan(configuration.rate) else f"stays at {configuration.rate:g} Hz"
             raise SetupError(
                 f"{place.address.uri}: the box was asked for {place.rate} Hz but {shown}; "
                 "set the rate on its Communications page"
             )
-    done = _commanded(place, found, deadline) if place.set_bias or place.reset_latch else {}
+    done = _commanded(place, configuration, deadline) if place.set_bias or place.reset_latch else {}
     if place.buffered:
         done["streaming"] = "buffered"
-    info = _info(place, found)
+    info = _info(place, configuration)
     return replace(info, settings={**info.settings, **done})
 
 
@@ -107,12 +109,12 @@ def start_request(place: Where) -> bytes:
     return wire.START_BUFFERED if place.buffered else wire.START
 
 
-def _commanded(place: Where, found: Configuration, deadline: Deadline) -> dict[str, str]:
+def _commanded(place: Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
     """Carry out over the command port what the address asks for; return what came of it, for the record."""
     units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != (
-        found.counts_per_force,
-        found.counts_per_torque,
+        configuration.counts_per_force,
+        configuration.counts_per_torque,
     ):
         raise SetupError(
             f"{place.address.uri}: the box's command port does not count as its web page says; check the tcp port"
@@ -127,7 +129,7 @@ def _commanded(place: Where, found: Configuration, deadline: Deadline) -> dict[s
         _wrench(place, wire.SET_BIAS, deadline)
         time.sleep(_SETTLING)
         counts = np.array(_wrench(place, wire.READ_WRENCH, deadline)) * np.array(units.scales)
-        left = np.abs(found.calibration().matrix @ counts)
+        left = np.abs(configuration.calibration().matrix @ counts)
         done["software bias"] = (
             f"set at opening, as the address asks; at most {left[:3].max():.3g} N and {left[3:].max():.3g} N mm left"
         )
@@ -153,23 +155,23 @@ def who(place: Where) -> TransducerInfo | None:
         return None
 
 
-def _info(place: Where, found: Configuration) -> TransducerInfo:
+def _info(place: Where, configuration: Configuration) -> TransducerInfo:
     return TransducerInfo(
         uri=place.address.uri,
         driver="net-ft",
-        model=" ".join(filter(None, (found.product, found.model))),
-        serial=found.serial,
-        simulated="SIMULATED" in found.product.upper(),
-        rate=found.rate,
-        counter_rate=found.ticks,
-        calibration=found.calibration(),
-        settings=found.settings,
-        status=found.family.status,
+        model=" ".join(filter(None, (configuration.product, configuration.model))),
+        serial=configuration.serial,
+        simulated="SIMULATED" in configuration.product.upper(),
+        rate=configuration.rate,
+        counter_rate=configuration.ticks,
+        calibration=configuration.calibration(),
+        settings=configuration.settings,
+        status=configuration.family.status,
     )
 
 
-def _is_rate(found: Configuration, asked: int) -> bool:
-    return math.isclose(found.rate, true_rate(asked, found.ticks))
+def _is_rate(configuration: Configuration, rate: int) -> bool:
+    return math.isclose(configuration.rate, true_rate(rate, configuration.ticks))
 
 
 def _configuration(place: Where, deadline: Deadline) -> Configuration:
@@ -180,10 +182,10 @@ def _configuration(place: Where, deadline: Deadline) -> Configuration:
             "check that the address is that of a Net F/T box or an Ethernet Axia"
         )
     try:
-        found = parse_configuration(answer.body)
+        configuration = parse_configuration(answer.body)
     except SetupError as error:
         raise SetupError(f"{place.address.uri}: {error}") from None
-    return found
+    return configuration
 
 
 DRIVER = Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",))

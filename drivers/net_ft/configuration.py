@@ -74,19 +74,19 @@ class Configuration:
 
 def parse_configuration(page: bytes) -> Configuration:
     """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
-    found = _elements(page)
-    product = _one(found, "prodname")
+    elements = _elements(page)
+    product = _one(elements, "prodname")
     family = AXIA if "axia" in product.lower() else NET_FT
-    ticks = _ticks(_optional(found, "setadcrate")) if family is AXIA else COUNTER_RATE
-    force, torque = _one(found, "scfgfu"), _one(found, "scfgtu")
-    rated = _ratings(found)
+    ticks = _ticks(_optional(elements, "setadcrate")) if family is AXIA else COUNTER_RATE
+    force, torque = _one(elements, "scfgfu"), _one(elements, "scfgtu")
+    rated = _ratings(elements)
     settings = {
-        "configuration": _optional(found, "cfgnam"),
-        "filter": _filter(_optional(found, "setuserfilter")),
-        "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(found, "setbias"))),
-        "tool transform": _transform(found),
-        "status at opening": _status(_optional(found, "runstat"), family),
-        "records in a datagram, when buffered": _optional(found, "comrdtbsiz"),
+        "configuration": _optional(elements, "cfgnam"),
+        "filter": _filter(_optional(elements, "setuserfilter")),
+        "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(elements, "setbias"))),
+        "tool transform": _transform(elements),
+        "status at opening": _status(_optional(elements, "runstat"), family),
+        "records in a datagram, when buffered": _optional(elements, "comrdtbsiz"),
     }
     if family is AXIA:
         settings["time"] = (
@@ -97,15 +97,15 @@ def parse_configuration(page: bytes) -> Configuration:
         product=product,
         family=family,
         ticks=ticks,
-        serial=_optional(found, "cfgcalsn"),
-        model=_optional(found, "mfgtxdmdl"),
-        counts_per_force=_positive("cfgcpf", _one(found, "cfgcpf")),
-        counts_per_torque=_positive("cfgcpt", _one(found, "cfgcpt")),
+        serial=_optional(elements, "cfgcalsn"),
+        model=_optional(elements, "mfgtxdmdl"),
+        counts_per_force=_positive("cfgcpf", _one(elements, "cfgcpf")),
+        counts_per_torque=_positive("cfgcpt", _one(elements, "cfgcpt")),
         newtons=_unit("force", force, _FORCE),
         newton_millimetres=_unit("torque", torque, _TORQUE),
         rated=rated,
-        rate=_rate(_optional(found, "comrdtrate"), ticks),
-        streams=_optional(found, "comrdte").lower() != "disabled",
+        rate=_rate(_optional(elements, "comrdtrate"), ticks),
+        streams=_optional(elements, "comrdte").lower() != "disabled",
         settings={name: value for name, value in settings.items() if value},
     )
 
@@ -124,7 +124,7 @@ def true_rate(stated: float, ticks: float = COUNTER_RATE) -> float:
 
 def _elements(page: bytes) -> dict[str, list[str]]:
     """Return the texts of all elements that hold text alone, by name. Declarations and entities are refused."""
-    found: dict[str, list[str]] = {}
+    elements: dict[str, list[str]] = {}
     path: list[str] = []
     text: list[str] = []
     bare = True
@@ -141,7 +141,7 @@ def _elements(page: bytes) -> dict[str, list[str]]:
         if not path and name != "netft":
             raise SetupError(f"the box's configuration page is <{name}> and not <netft>; check the address")
         if bare:
-            found.setdefault(name, []).append("".join(text).strip())
+            elements.setdefault(name, []).append("".join(text).strip())
         bare = False
 
     def refuse(*_: object) -> None:
@@ -161,21 +161,21 @@ def _elements(page: bytes) -> dict[str, list[str]]:
         ) from None
     except (LookupError, ValueError):  # what expat raises for an encoding it does not know
         raise SetupError("the box's configuration page is in an unknown encoding; check the address") from None
-    return found
+    return elements
 
 
-def _one(found: Mapping[str, list[str]], name: str) -> str:
+def _one(elements: Mapping[str, list[str]], name: str) -> str:
     """Return the text of an element that must be there exactly once."""
-    texts = found.get(name, [])
+    texts = elements.get(name, [])
     if len(texts) != 1 or not texts[0]:
         how = "does not say" if not any(texts) else "says more than once"
         raise SetupError(f"the box's configuration page {how} what {name} is; check the address and the box's set-up")
     return texts[0]
 
 
-def _optional(found: Mapping[str, list[str]], name: str) -> str:
+def _optional(elements: Mapping[str, list[str]], name: str) -> str:
     """Return the text of an element, or nothing where it is missing or contradicts itself."""
-    texts = found.get(name, [])
+    texts = elements.get(name, [])
     return texts[0] if len(texts) == 1 else ""
 
 
@@ -202,8 +202,8 @@ def _unit(kind: str, text: str, units: Mapping[str, float]) -> float:
     return size
 
 
-def _ratings(found: Mapping[str, list[str]]) -> tuple[float, ...]:
-    values = tuple(_number(part) for part in re.split(r"[;,\s]+", _optional(found, "cfgmr")) if part)
+def _ratings(elements: Mapping[str, list[str]]) -> tuple[float, ...]:
+    values = tuple(_number(part) for part in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if part)
     return values if len(values) == 6 and all(math.isfinite(v) and v > 0.0 for v in values) else ()
 
 
@@ -227,12 +227,12 @@ def _filter(code: str) -> str:
     return f"{name} Hz" if name.isdecimal() and known else name
 
 
-def _transform(found: Mapping[str, list[str]]) -> str:
+def _transform(elements: Mapping[str, list[str]]) -> str:
     """Return the tool transform in force with its units, or nothing where there is none."""
-    values = [part for part in re.split(r"[;,\s]+", _optional(found, "cfgtfx")) if part]
+    values = [part for part in re.split(r"[;,\s]+", _optional(elements, "cfgtfx")) if part]
     if not any(_number(value) != 0.0 for value in values):
         return ""
-    units = f"{_optional(found, 'scfgtdu')}, {_optional(found, 'scfgtau')}".strip(", ")
+    units = f"{_optional(elements, 'scfgtdu')}, {_optional(elements, 'scfgtau')}".strip(", ")
     return f"{' '.join(values)} [{units}]"
 
 

@@ -66,9 +66,9 @@ class NetFtTransducer(ThreadedTransducer):
         with self.lock:
             self.digest()
             account = self._account
-            found = [self._rate_found()] if account.changed else []
-            found += (
-                [rate_words("its clock runs", self._watch.rate, self.info.counter_rate)] if self._watch.found else []
+            sentences = [self._rate_change()] if account.changed else []
+            sentences += (
+                [rate_words("its clock runs", self._watch.rate, self.info.counter_rate)] if self._watch.changes else []
             )
             return self.totals(
                 lost=account.lost,
@@ -77,8 +77,8 @@ class NetFtTransducer(ThreadedTransducer):
                 malformed=self._wrong_length + account.garbage,
                 stalled=account.frozen,
                 restarted=account.restarted,
-                off_rate=account.changed + self._watch.found,
-                rate_words="; ".join(found),
+                off_rate=account.changed + self._watch.changes,
+                rate_words="; ".join(sentences),
                 off_units=0 if self._settings.fault is None else sum(count for _, count in self._unconfirmed),
             )
 
@@ -139,7 +139,7 @@ class NetFtTransducer(ThreadedTransducer):
         receive, keep, now_ns = link.receive, self._pending.append, self.clock.now_ns
         link.send(self._request)
         # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.
-        silence = asked = 0.0
+        silence = last_request = 0.0
         streaming = ever = False
         returns: deque[float] = deque(maxlen=_THEFTS)
         while not self.stopping.is_set():
@@ -150,12 +150,12 @@ class NetFtTransducer(ThreadedTransducer):
                 keep((datagram, now_ns()))
                 if not self.news.is_set():
                     self.news.set()
-                silence, asked, streaming, ever = 0.0, 0.0, True, True
+                silence, last_request, streaming, ever = 0.0, 0.0, True, True
                 continue
             silence += _TICK
             if silence > _SILENCE + 4.0 * self._period:
                 raise LinkLost(self._fell_silent(silence))
-            if silence - asked < (_QUIET if streaming else _ASK_EVERY) + 2.0 * self._period:
+            if silence - last_request < (_QUIET if streaming else _ASK_EVERY) + 2.0 * self._period:
                 continue
             if streaming:
                 returns.append(time.monotonic())
@@ -166,7 +166,7 @@ class NetFtTransducer(ThreadedTransducer):
                     )
             if not ever or self._settings.is_the_same():
                 link.send(self._request)
-            asked, streaming = silence, False
+            last_request, streaming = silence, False
 
     def digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
@@ -216,7 +216,7 @@ class NetFtTransducer(ThreadedTransducer):
 
     def _compare_settings(self, received_ns: int, count: int) -> None:
         """Keep count of readings whose units are not confirmed, and look at once where rate or counter has changed."""
-        changes = self._account.changed + self._account.restarted + self._watch.found
+        changes = self._account.changed + self._account.restarted + self._watch.changes
         if changes != self._changes:
             self._changes = changes
             self._settings.look_now()
@@ -224,7 +224,7 @@ class NetFtTransducer(ThreadedTransducer):
             self._unconfirmed.popleft()
         self._unconfirmed.append((received_ns, count))
 
-    def _rate_found(self) -> str:
+    def _rate_change(self) -> str:
         """Return at which rate the box sends now."""
         return rate_words("it sends", self.info.counter_rate / (self._account.step or 1), self.info.rate)
 

@@ -47,26 +47,26 @@ class SettingsWatch:
         """Tell whether the box answers and counts as before. Raises DeviceFault when another does, or other units."""
         began_ns = self._clock.now_ns()
         try:
-            found = self._who()
+            info = self._who()
             self._senseless = 0
         except SetupError as error:
             self._senseless += 1
             if self._senseless > 1:  # once it may have been cut on its way
                 raise DeviceFault(f"{error}; it did when it was opened") from None
             return False
-        if found is None:
+        if info is None:
             return False
         uri, serial = self._info.uri, self._info.serial
-        if found.serial != serial:
+        if info.serial != serial:
             raise DeviceFault(
-                f"{uri}: transducer {found.serial} answers where {serial} was; connect that one again, or open it anew"
+                f"{uri}: transducer {info.serial} answers where {serial} was; connect that one again, or open it anew"
             )
-        if not np.array_equal(found.calibration.matrix, self._info.calibration.matrix):
+        if not np.array_equal(info.calibration.matrix, self._info.calibration.matrix):
             raise DeviceFault(
-                f"{uri}: transducer {serial} counts in other units than before: {_units(found)}, not "
+                f"{uri}: transducer {serial} counts in other units than before: {_units(info)}, not "
                 f"{_units(self._info)}; open it anew"
             )
-        if found.settings.get(_TRANSFORM) != self._info.settings.get(_TRANSFORM):
+        if info.settings.get(_TRANSFORM) != self._info.settings.get(_TRANSFORM):
             raise DeviceFault(f"{uri}: the tool transform of transducer {serial} was changed on its page; open it anew")
         self.confirmed_ns = began_ns
         return True

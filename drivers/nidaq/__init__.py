@@ -51,7 +51,7 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
     """Return the transducer at `address`, not streaming. Raises SetupError with the reason."""
     check_options(address, _OPTIONS)
     api = library()
-    device, info = _found(api, address)
+    device, info = _device_info(api, address)
     rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
     link = TaskLink(api, device, rate)
     link.close()
@@ -67,10 +67,10 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
 def identify_nidaq(address: Address, _deadline: Deadline) -> TransducerInfo:
     """Return who is there; nothing is acquired. Raises SetupError with the reason."""
     check_options(address, _OPTIONS)
-    return _found(library(), address)[1]
+    return _device_info(library(), address)[1]
 
 
-def _found(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
+def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # noqa: ANN401
     """Return the device's name as NI-DAQmx spells it, and who the transducer on it is."""
     file = address.options.get("cal")
     if not address.host or file is None:

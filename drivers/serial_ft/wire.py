@@ -107,7 +107,7 @@ class BinaryDecoder:
     def feed(self, data: bytes) -> Records:
         """Take what arrived and return every record that can be judged: one that three to eight more follow."""
         self._buffer += data
-        found: list[tuple[int, ...]] = []
+        records: list[tuple[int, ...]] = []
         status: list[int] = []
         damaged: list[int] = []
         self._at = 0
@@ -128,12 +128,12 @@ class BinaryDecoder:
             broken = -(-self._skipped // BINARY_SIZE)
             self.malformed += broken
             self._skipped = 0
-            found.append(tuple(values.tolist()))
+            records.append(tuple(values.tolist()))
             status.append(int(record["error"][0]))
             damaged.append(broken)
             self._at += BINARY_SIZE
         del self._buffer[: self._at]
-        return Records.of(found, status, damaged)
+        return Records.of(records, status, damaged)
 
     def _shift(self) -> int | None:
         """Return how many bytes at the head belong to no record; None while more bytes must come to tell."""

@@ -6,18 +6,18 @@ from itertools import pairwise
 from sessions.plan.plan import Answer
 from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
-Given = Scored | MagnitudeEstimate | PairedChoice
+AnswerEvent = Scored | MagnitudeEstimate | PairedChoice
 
-ASKED: dict[Answer, type[Given] | None] = {
+EVENTS: dict[Answer, type[AnswerEvent] | None] = {
     "line": Scored,
     "number": MagnitudeEstimate,
     "choice": PairedChoice,
     "none": None,
 }
-IN_WORDS: dict[type[Given], str] = {Scored: "a score", MagnitudeEstimate: "a number", PairedChoice: "a choice"}
+IN_WORDS: dict[type[AnswerEvent], str] = {Scored: "a score", MagnitudeEstimate: "a number", PairedChoice: "a choice"}
 
 
-def problem(answer: Given, expected: Answer) -> str | None:
+def problem(answer: AnswerEvent, expected: Answer) -> str | None:
     """Say in a sentence what is wrong with an answer where `expected` is due; None where nothing is.
 
     >>> problem(Scored(120.0), "line")
@@ -25,7 +25,7 @@ def problem(answer: Given, expected: Answer) -> str | None:
     >>> problem(Scored(12.0), "number")
     'this trial asks for a number, not for a score'
     """
-    expected_kind = ASKED[expected]
+    expected_kind = EVENTS[expected]
     if expected_kind is None:
         return "this trial asks for no answer"
     if not isinstance(answer, expected_kind):

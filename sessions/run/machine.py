@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from sessions.plan.plan import SessionPlan
-from sessions.run.answers import Given, problem
+from sessions.run.answers import AnswerEvent, problem
 from sessions.run.states import (
     Closing,
     Ended,
@@ -170,7 +170,7 @@ def _touched(state: State, event: ContactOnset | FingerLifted | Settled) -> Step
             return state, (_refusal(state, event),)
 
 
-def _answered(state: Scoring, answer: Given) -> Step:
+def _answered(state: Scoring, answer: AnswerEvent) -> Step:
     """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
     place = state.place
     wrong = problem(answer, place.trial.answer)

@@ -129,10 +129,10 @@ def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 
-_Found = list[tuple[FlawName, str, Grade]]
+_FlawParts = list[tuple[FlawName, str, Grade]]
 
 
-def _loss_flaws(lost: int, arrived: int) -> _Found:
+def _loss_flaws(lost: int, arrived: int) -> _FlawParts:
     if not lost:
         return []
     share = 100 * lost / (lost + arrived)
@@ -140,10 +140,10 @@ def _loss_flaws(lost: int, arrived: int) -> _Found:
     return [(FlawName.LOST_READINGS, sentence, "note")]
 
 
-def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _Found:
+def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _FlawParts:
     """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
     refused = float(frozen.mean()) >= settings.signal.frozen_refused
-    flaws: _Found = []
+    flaws: _FlawParts = []
     if repeated.any():
         sentence = (
             f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
@@ -158,9 +158,9 @@ def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisS
     return flaws
 
 
-def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
+def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _FlawParts:
     """Name each axis that was clipped or frozen by the first run that shows it."""
-    flaws: _Found = []
+    flaws: _FlawParts = []
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
         lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
@@ -180,7 +180,7 @@ def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _Found:
     return flaws
 
 
-def _wild_flaws(wild: Mask, time: Array) -> _Found:
+def _wild_flaws(wild: Mask, time: Array) -> _FlawParts:
     """Name the readings (n, 6) that stand far beyond all around them."""
     if not wild.any():
         return []
@@ -194,7 +194,7 @@ def _wild_flaws(wild: Mask, time: Array) -> _Found:
     return [(FlawName.WILD, sentence, "doubtful")]
 
 
-def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _Found:
+def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _FlawParts:
     """Name the faults that the device reported."""
     faulty = table.faulty(block.status)
     if not faulty.any():
@@ -208,7 +208,7 @@ def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _Found:
     return [(FlawName.DEVICE_FAULT, sentence, "doubtful")]
 
 
-def _saturation_flaws(saturated: Mask, time: Array) -> _Found:
+def _saturation_flaws(saturated: Mask, time: Array) -> _FlawParts:
     if not saturated.any():
         return []
     sentence = (
@@ -218,7 +218,7 @@ def _saturation_flaws(saturated: Mask, time: Array) -> _Found:
     return [(FlawName.SATURATED, sentence, "doubtful")]
 
 
-def _dead_flaws(dead: tuple[str, ...]) -> _Found:
+def _dead_flaws(dead: tuple[str, ...]) -> _FlawParts:
     if not dead:
         return []
     names = ", ".join(dead)
@@ -227,10 +227,10 @@ def _dead_flaws(dead: tuple[str, ...]) -> _Found:
     return [(FlawName.DEAD, f"{names} never changed: no centre of pressure, hence no speed.", "doubtful")]
 
 
-def _time_flaws(step: float, even: bool, stalled: int) -> _Found:
+def _time_flaws(step: float, even: bool, stalled: int) -> _FlawParts:
     if not step > 0.0:
         return [(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")]
-    flaws: _Found = []
+    flaws: _FlawParts = []
     if stalled:
         sentence = f"At {stalled} readings the device's time did not advance; they are left out."
         flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))

@@ -78,7 +78,7 @@ def test_a_session_run_through_the_recorder_is_whole_and_sealed(whole):
     end = desk.of(SessionEnded)[0]
     assert (end.end.cause, end.end.complete, end.resumable) == ("finished", True, False)
     assert (recording.folder / "MANIFEST.json").exists()
-    assert desk.of(Gone)[0].asked
+    assert desk.of(Gone)[0].requested
 
 
 def test_the_client_is_told_every_event_of_the_log_once_it_is_safe(whole):
@@ -211,7 +211,7 @@ def test_a_recorder_that_is_killed_has_lost_nothing_it_told_of_and_its_session_g
             assert "is in use" in Desk(another).until(Failed).sentence
         os.kill(first.pid, signal.SIGKILL)
         gone = desk.until(Gone)
-    assert not gone.asked
+    assert not gone.requested
     assert "signal 9" in gone.sentence
     assert "resume the session" in gone.sentence
     told = desk.of(LoggedEvent)

@@ -33,7 +33,7 @@ def test_a_clock_within_its_half_percent_is_as_set_however_late_records_come(rat
     counted = np.arange(round(60 * rate))
     watch = RateWatch(rate, 1.0, 0.5)
     assert watched(watch, counted, late(counted / (rate * (1.0 + error)))) == []
-    assert watch.rate == watch.asked
+    assert watch.rate == watch.nominal
 
 
 @pytest.mark.parametrize("to", [0.5, 0.9, 0.95, 1.05, 1.3, 2.0])
@@ -46,7 +46,7 @@ def test_a_rate_that_becomes_another_is_found_within_seconds_and_so_is_its_retur
     assert found == pytest.approx(rate * to, rel=0.02)
     assert 20.0 < back < (24.0 if abs(to - 1) > 0.15 else 28.5)
     assert again == rate
-    assert watch.found == 2
+    assert watch.changes == 2
 
 
 def test_a_rate_that_was_only_measured_for_a_moment_is_put_right_without_a_word_and_watched_from_then_on():
@@ -54,9 +54,9 @@ def test_a_rate_that_was_only_measured_for_a_moment_is_put_right_without_a_word_
     watch = RateWatch(282.0, 1.0, 1.0, vague=0.1)
     (_, right), (_, half) = watched(watch, np.arange(len(made)), late(made, jitter=0.004, stalls=0))
     assert right == pytest.approx(300.0, rel=0.01)
-    assert watch.asked == right
+    assert watch.nominal == right
     assert half == pytest.approx(150.0, rel=0.02)
-    assert watch.found == 1
+    assert watch.changes == 1
 
 
 def test_time_that_runs_faster_is_allowed_for():
@@ -81,7 +81,7 @@ def test_a_line_without_numbers_is_followed_at_its_new_rate(to):
     for at in made:
         blocks.append(recovery.take(np.zeros(1, np.int64), round((START + at) * 1e9)))
     time = np.concatenate([block.time for block in [*blocks, recovery.release()]])
-    assert recovery.watch.found == 1
+    assert recovery.watch.changes == 1
     assert recovery.watch.rate == pytest.approx(rate * to, rel=0.02)
     assert len(time) == len(made)
     assert np.all(np.diff(time) > 0.0)

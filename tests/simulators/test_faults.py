@@ -74,7 +74,7 @@ def test_whatever_the_timetable_nothing_is_made_up_and_the_ledger_knows_all(time
     leaving = [d for i in range(100) for d in faults.route(i / 100, [(i / 100, bytes([i]) * 36)])] + faults.route(
         99, []
     )
-    assert faults.made == [bytes([i]) * 36 for i in range(100)]
+    assert faults.datagrams == [bytes([i]) * 36 for i in range(100)]
     assert faults.delivered == leaving
     assert len(leaving) <= 200
 
@@ -103,11 +103,11 @@ def test_a_fault_that_cannot_be_carried_out_is_refused(wrong):
 
 def test_a_drift_walks_to_its_share_of_each_range_and_stays():
     faults, times = Faults([Fault("drift", 1.0, 3.0, share=0.1)]), np.array([0.5, 2.0, 3.0, 9.0])
-    felt = faults.felt(np.zeros((4, 6)), times, (36.0, 36.0, 36.0, 500.0, 500.0, 500.0))
+    felt = faults.sensed(np.zeros((4, 6)), times, (36.0, 36.0, 36.0, 500.0, 500.0, 500.0))
     np.testing.assert_allclose(felt[:, 2], [0.0, 1.8, 3.6, 3.6])
     np.testing.assert_allclose(felt[:, 5], [0.0, 25.0, 50.0, 50.0])
 
 
 def test_a_wrong_calibration_feels_more_than_there_is_while_it_lasts():
     faults, times = Faults([Fault("miscalibrate", 1.0, 2.0, share=0.25)]), np.array([0.0, 1.0, 2.0])
-    np.testing.assert_allclose(faults.felt(np.ones((3, 6)), times, (1.0,) * 6)[:, 0], [1.0, 1.25, 1.0])
+    np.testing.assert_allclose(faults.sensed(np.ones((3, 6)), times, (1.0,) * 6)[:, 0], [1.0, 1.25, 1.0])

@@ -36,25 +36,25 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent
-    found = _found(options, console)
-    if found.stopped:
+    measured = _measured(options, console)
+    if measured.stopped:
         console.note("stopped; drawing what was measured until now")
     console.progress(0.99, "drawing")
-    write(found, options.out)
-    console.result({"page": str(options.out / PAGE), **found.to_dict()})
-    made = tables(found)
+    write(measured, options.out)
+    console.result({"page": str(options.out / PAGE), **measured.to_dict()})
+    page_tables = tables(measured)
     if options.docs is not None:
-        fill(options.docs, made)
-    if "targets" in made:
-        rows = [[cell for n, cell in enumerate(row) if n != 7] for row in made["targets"].rows]
-        console.say(table(rows, head=list(made["targets"].header[:7])))
-    console.say(*(made[name].caption for name in ("hard-small", "hard-finite") if name in made))
-    console.note(*(f"note: {sentence}" for sentence in found.left_out))
+        fill(options.docs, page_tables)
+    if "targets" in page_tables:
+        rows = [[cell for n, cell in enumerate(row) if n != 7] for row in page_tables["targets"].rows]
+        console.say(table(rows, head=list(page_tables["targets"].header[:7])))
+    console.say(*(page_tables[name].caption for name in ("hard-small", "hard-finite") if name in page_tables))
+    console.note(*(f"note: {sentence}" for sentence in measured.left_out))
     console.say(f"{options.out / PAGE}")
-    return STOPPED if found.stopped else DONE
+    return STOPPED if measured.stopped else DONE
 
 
-def _found(options: argparse.Namespace, console: Console) -> "Measured":
+def _measured(options: argparse.Namespace, console: Console) -> "Measured":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
     from sessions.file_access import read_limited
     from sessions.recording.provenance import software_versions

@@ -76,12 +76,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _leaning(tilt: Tilt, levelled: tuple[float, float]) -> str:
     """Say how the face leans, and whether that was levelled."""
     ends = (tilt.x_interval, tilt.y_interval)
-    told = [
+    rows = [
         f"{number(a)}° ({number(low)} to {number(high)}) to +{axis}"
         for axis, a, (low, high) in zip("xy", tilt.lean, ends, strict=True)
     ]
     done = f"levelled by {levelled[0]:g}° and {levelled[1]:g}°" if levelled != (0.0, 0.0) else "not levelled"
-    return f"tilt of the face, if the hand pressed straight down: {', '.join(told)}; {tilt.kind}; {done}"
+    return f"tilt of the face, if the hand pressed straight down: {', '.join(rows)}; {tilt.kind}; {done}"
 
 
 def _row(intervals: StrokeIntervals) -> list[str]:

@@ -66,8 +66,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     stored = stored_document(recording.folder, ANALYSIS)
     gain_error_set(recording.folder)  # where it is damaged nothing is recorded that could not be analysed then
     analysis = analyse(recording, settings_of(stored or {}), before)
-    asked = _asked(options) if options.tilt is None else _tilt(options, analysis)
-    decision = with_present(analysis, asked)
+    decision = _decision(options) if options.tilt is None else _tilt(options, analysis)
+    decision = with_present(analysis, decision)
     after = preview(recording, decision, before, analysis)
     line = append(recording, decision)
     if stored is not None:
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return DONE
 
 
-def _asked(options: argparse.Namespace) -> Decision:
+def _decision(options: argparse.Namespace) -> Decision:
     decision = Decision(options.by, options.why, trial=options.trial, stroke=options.stroke)
     if options.undo is not None:
         return Decision(options.by, options.why, undoes=options.undo)
@@ -99,11 +99,11 @@ def _asked(options: argparse.Namespace) -> Decision:
 
 def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
     """Return the decision to level the face, by the angles given or by those that its presses tell."""
-    given: list[float] = options.tilt
-    if len(given) not in (0, 2):
+    angles: list[float] = options.tilt
+    if len(angles) not in (0, 2):
         raise WrongValue("--tilt takes two angles, to +x and to +y in degrees, or none")
-    if given:
-        return Decision(options.by, options.why, "tilt", new=(given[0], given[1]))
+    if angles:
+        return Decision(options.by, options.why, "tilt", new=(angles[0], angles[1]))
     if analysis.tilt is None:
         raise DecisionError("nothing pressed without sliding, so the tilt is not known: give two angles after --tilt")
     return Decision(options.by, options.why, "tilt", new=analysis.tilt.lean)
@@ -122,16 +122,16 @@ def _list(decisions: Decisions, console: Console) -> int:
 
 def _changes(before: Analysis, after: Analysis) -> list[str]:
     """Return a sentence for each stroke whose numbers a decision changes."""
-    found: list[str] = []
-    given = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
+    sentences: list[str] = []
+    strokes = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
     for at, (old, new) in enumerate(zip(before.strokes, after.strokes, strict=False)):
         words = [f"{name} {was} -> {now}" for name, was, now in _numbers(old, new) if was != now]
-        if (at in given[0]) != (at in given[1]):
-            words.append("the model gets it" if at in given[1] else "the model does not get it")
+        if (at in strokes[0]) != (at in strokes[1]):
+            words.append("the model gets it" if at in strokes[1] else "the model does not get it")
         if words:
             trial = "" if new.trial is None else f" of trial {new.trial}"
-            found.append(f"stroke {new.number}{trial}: {', '.join(words)}")
-    return found
+            sentences.append(f"stroke {new.number}{trial}: {', '.join(words)}")
+    return sentences
 
 
 def _numbers(old: Stroke, new: Stroke) -> list[tuple[str, str, str]]:

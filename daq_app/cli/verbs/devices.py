@@ -13,7 +13,7 @@ import numpy as np
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, table
 from daq_app.recorder.device_history import Life, life_of
 from daq_app.simulation.wiring import connected
-from drivers.catalog import Found, reachable
+from drivers.catalog import Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.serial_link import serial_ports
@@ -40,15 +40,15 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if len(options.words) != 2:
             raise WrongValue("'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")
         return _probe(options.words[1], console)
-    found = reachable(options.words)
+    devices = reachable(options.words)
     lines = serial_ports()
-    described = [_described(device) for device in found] + [{"uri": "sim:", "simulated": True}]
+    described = [_described(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
     console.result({"devices": described, "serial_ports": list(lines)})
     rows = [
         [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
         if device.info
         else [device.uri, "–", "–", "no answer"]
-        for device in found
+        for device in devices
     ]
     rows.append(["sim:", "simulated bench", "–", "always there"])
     console.say(table(rows, head=["address", "model", "serial", "calibration"]))
@@ -56,16 +56,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
         console.say(
             f"{line} is a serial port, which was not opened: ask it as serial-ft://{line} or digital-ft://{line}"
         )
-    for device in found:
+    for device in devices:
         if device.problem:
-            told = device.problem.removeprefix(f"{device.uri}: ")
-            console.say(told if device.uri in told else f"{device.uri}: {told}")
+            problem = device.problem.removeprefix(f"{device.uri}: ")
+            console.say(problem if device.uri in problem else f"{device.uri}: {problem}")
         if device.info is not None and (life := life_of(device.info.serial)) is not None:
-            console.say(f"{device.info.serial}: {_told(life)}")
+            console.say(f"{device.info.serial}: {_life_words(life)}")
     return DONE
 
 
-def _described(device: Found) -> dict[str, Any]:
+def _described(device: Probe) -> dict[str, Any]:
     if device.info is None:
         return {"uri": device.uri, "problem": device.problem}
     info = device.info
@@ -76,7 +76,7 @@ def _described(device: Found) -> dict[str, Any]:
     }
 
 
-def _told(life: Life) -> str:
+def _life_words(life: Life) -> str:
     """Return a transducer's history in one sentence."""
     overloads = f"{life.overloads} overloads, the last on {life.last_overload}" if life.overloads else "no overload"
     if not life.zeros:

@@ -86,33 +86,33 @@ def run(options: argparse.Namespace, console: Console) -> int:
     curves = _curves(options, recording, settings)
     flaws = [*curves.left_out, *([] if options.relaxation else _relaxes(curves))]
     console.note(*flaws)
-    found = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
+    outcome = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
     if options.scene is not None:
         head = f"# {simulated}\n" if simulated else ""
-        write_whole(options.scene, (head + toml_text(found.scene)).encode())
+        write_whole(options.scene, (head + toml_text(outcome.scene)).encode())
     assumed = {
         "mu": options.mu,
         "prior_factor": options.prior,
         "calibration_error": settings.gain_uncertainty,
-        "width": found.scene.finger.width,
+        "width": outcome.scene.finger.width,
         "seed": options.seed,
     }
-    shares = dict(zip(LAYERS, found.check.shares.tolist(), strict=True))
+    shares = dict(zip(LAYERS, outcome.check.shares.tolist(), strict=True))
     console.result(
         {
             **({"simulated": "SIMULATED"} if simulated else {}),
-            **found.fit.to_dict(),
-            **({} if found.relaxation is None else {"relaxation": found.relaxation.to_dict()}),
+            **outcome.fit.to_dict(),
+            **({} if outcome.relaxation is None else {"relaxation": outcome.relaxation.to_dict()}),
             "presses": list(curves.names),
             "flaws": flaws,
-            "check": {"deviation": found.check.deviation, "shares": shares},
+            "check": {"deviation": outcome.check.deviation, "shares": shares},
             "assumed": assumed,
         }
     )
     console.say(simulated)
-    _print(found, options, console)
-    return FLAWED if flaws or found.check.deviation > AGREE else DONE
+    _print(outcome, options, console)
+    return FLAWED if flaws or outcome.check.deviation > AGREE else DONE
 
 
 class _Outcome(NamedTuple):
@@ -162,20 +162,22 @@ def _fitted(
     held = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
     if options.relaxation and not held:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
-    given, _ = (None, "") if options.finger is None else finger_in(options.finger)
-    finger = template(with_own_finger(PredictionOptions(scene=given), plan))
+    stated, _ = (None, "") if options.finger is None else finger_in(options.finger)
+    finger = template(with_own_finger(PredictionOptions(scene=stated), plan))
     progress = console.reporter("solving presses")
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
     if options.relaxation:
-        found, rate = relaxing_fit(model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed)
+        finger_fit, rate = relaxing_fit(
+            model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed
+        )
     else:
-        found, rate = fit(model, curves.presses, gain_error, options.seed), None
-    own = check(model, np.array([one.stiffness.value for one in found.layers]), found.deepest)
-    return _Outcome(found, own, rate)
+        finger_fit, rate = fit(model, curves.presses, gain_error, options.seed), None
+    own = check(model, np.array([one.stiffness.value for one in finger_fit.layers]), finger_fit.deepest)
+    return _Outcome(finger_fit, own, rate)
 
 
 def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> None:
-    found, checked = outcome.fit, outcome.check
+    finger_fit, checked = outcome.fit, outcome.check
     rows = [
         [
             one.name,
@@ -185,16 +187,16 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
             _ends(one.prior),
             f"{100 * share:.0f} %",
         ]
-        for one, share in zip(found.layers, checked.shares, strict=True)
+        for one, share in zip(finger_fit.layers, checked.shares, strict=True)
     ]
     console.say(table(rows, head=["E [kPa]", "found", "95 % interval", "by likelihood alone", "prior", "share of N"]))
-    overall, (low, high) = found.overall, (found.overall.low or 0.0, found.overall.high or 0.0)
+    overall, (low, high) = finger_fit.overall, (finger_fit.overall.low or 0.0, finger_fit.overall.high or 0.0)
     console.say(
         f"overall stiffness: {number(overall.value)} of the published finger's, 95 % interval {span(low, high)}, from "
-        f"{found.points} points of {len(found.touch)} presses up to {number(found.deepest)} mm"
-        + (f", and {found.widths} lengths of contact" if found.widths else "")
+        f"{finger_fit.points} points of {len(finger_fit.touch)} presses up to {number(finger_fit.deepest)} mm"
+        + (f", and {finger_fit.widths} lengths of contact" if finger_fit.widths else "")
     )
-    console.say(*(one.sentence for one in found.layers))
+    console.say(*(one.sentence for one in finger_fit.layers))
     if outcome.relaxation is not None:
         part, time = outcome.relaxation.part, outcome.relaxation.time
         console.say(
@@ -203,7 +205,7 @@ def _print(outcome: _Outcome, options: argparse.Namespace, console: Console) -> 
         )
         console.say(outcome.relaxation.sentence)
     console.say(
-        f"Assumed: friction {options.mu:g}, width {found.scene.finger.width:g} mm, a prior of a factor "
+        f"Assumed: friction {options.mu:g}, width {finger_fit.scene.finger.width:g} mm, a prior of a factor "
         f"{options.prior:g}. The stiffness is by the width: a finger twice as wide is half as stiff."
     )
     agree = "agree with" if checked.deviation <= AGREE else "DIFFER from"

@@ -38,11 +38,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Import the file, seal the session and say what nobody stated."""
     from sessions.exchange.import_session import exported
 
-    told = exported(options.file)
-    return _foreign(options, console) if told is None else _restored(told, options, console)
+    session = exported(options.file)
+    return _foreign(options, console) if session is None else _restored(session, options, console)
 
 
-def _restored(told: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
+def _restored(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
     """Make a session of an export of ours again."""
     from sessions.exchange.import_session import import_session
     from sessions.recording.archive import seal
@@ -51,12 +51,12 @@ def _restored(told: "ExportedSession", options: argparse.Namespace, console: Con
     if stated:
         raise WrongValue(f"--{stated[0]} says nothing of an export, which holds all that is known: leave it out")
     folder = options.out or Path("recordings") / options.file.stem
-    made = import_session(told, folder)
+    imported = import_session(session, folder)
     seal(folder)
-    console.result({"session": str(folder), "format": told.form, **asdict(made)})
-    outcome = "with the above" if made.differences else "as they were"
-    console.say(*made.differences, f"{folder}: {made.readings} readings, {made.events} events, {outcome}")
-    return FLAWED if made.differences else DONE
+    console.result({"session": str(folder), "format": session.form, **asdict(imported)})
+    outcome = "with the above" if imported.differences else "as they were"
+    console.say(*imported.differences, f"{folder}: {imported.readings} readings, {imported.events} events, {outcome}")
+    return FLAWED if imported.differences else DONE
 
 
 def _foreign(options: argparse.Namespace, console: Console) -> int:
@@ -79,14 +79,14 @@ def _foreign(options: argparse.Namespace, console: Console) -> int:
         subject=options.subject or "unknown",
     )
     folder = options.out or Path("recordings") / options.file.stem
-    made = import_csv(options.file, folder, stated)
-    seal(made.folder)
-    list_in_manifest(made.folder, (ORIGINAL_FILE,), Recording.open(made.folder).simulated_sentence)
-    console.result({"session": str(made.folder), **{k: v for k, v in asdict(made).items() if k != "folder"}})
+    imported = import_csv(options.file, folder, stated)
+    seal(imported.folder)
+    list_in_manifest(imported.folder, (ORIGINAL_FILE,), Recording.open(imported.folder).simulated_sentence)
+    console.result({"session": str(imported.folder), **{k: v for k, v in asdict(imported).items() if k != "folder"}})
     console.say(
-        f"{made.folder}: {made.readings} readings at {number(made.rate, 4)} a second",
-        *(f"default: {default}" for default in made.defaults),
-        f"kept in the original file alone: {', '.join(made.extra)}" if made.extra else None,
+        f"{imported.folder}: {imported.readings} readings at {number(imported.rate, 4)} a second",
+        *(f"default: {default}" for default in imported.defaults),
+        f"kept in the original file alone: {', '.join(imported.extra)}" if imported.extra else None,
     )
     return DONE
 

@@ -97,7 +97,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = _afferent(options)
     scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
     console.note(ignored or None)
-    asked = PredictionOptions(
+    choices = PredictionOptions(
         tau_reading=options.tau,
         scene=scene,
         indentation=options.indentation,
@@ -108,7 +108,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     )
     recording = open_visit(options.session, options.subject)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
-    prediction = predict_session(recording, analysis, console, asked, afferent if options.afferent else None)
+    prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)
     seal = {"sealed_sha256": seal_prediction(recording, prediction.to_dict())} if options.seal else {}
     firing = {"afferent": firing_document(prediction, afferent)} if options.afferent else {}
     console.result({**prediction.to_dict(), **seal, **firing})
@@ -135,7 +135,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         else "nothing to predict: no forces were recorded"
     )
     _print_beside(prediction, console)
-    if asked.intervals:
+    if choices.intervals:
         _print_intervals(prediction, console)
         _print_beside_intervals(prediction, console)
     if firing:
@@ -196,8 +196,8 @@ def _called(row: TrialPrediction) -> str:
 def _cell(one: Alternative) -> str:
     if one.sed is None:
         return "–"
-    beside = one.indentation if one.variant.driven == "force" else one.normal_force
-    return f"{number(one.sed, 4, factor=1e3)} ({number(beside)}){'!' if one.doubt else ''}"
+    companion = one.indentation if one.variant.driven == "force" else one.normal_force
+    return f"{number(one.sed, 4, factor=1e3)} ({number(companion)}){'!' if one.doubt else ''}"
 
 
 def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:

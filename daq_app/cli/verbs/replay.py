@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         except Stopped:
             raise KeyboardInterrupt from None
         taken = time.perf_counter() - began
-        found = [
+        differences = [
             *different_readings(recording, replayed),
             *first_sentences(list(different_events(recording, replayed))),
         ]
@@ -59,11 +59,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         analysis = stored_document(options.session, ANALYSIS)
         if analysis is None:
             analysis = json.loads(json.dumps(repeat(ANALYSIS, {}, recording, decided)))
-        found += changes(ANALYSIS, analysis, repeat(ANALYSIS, analysis, replayed, decided))
+        differences += changes(ANALYSIS, analysis, repeat(ANALYSIS, analysis, replayed, decided))
         prediction = None if options.no_prediction else stored_document(options.session, PREDICTION)
         if prediction is not None:
             console.progress(0.9, f"making {PREDICTION} again")
-            found += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, replayed, decided, recording))
+            differences += changes(PREDICTION, prediction, repeat(PREDICTION, prediction, replayed, decided, recording))
             compared.append(PREDICTION)
     lasted = _duration(recording)
     notes = list(_notes(recording))
@@ -71,21 +71,21 @@ def run(options: argparse.Namespace, console: Console) -> int:
         {
             "session": str(options.session),
             "compared": compared,
-            "differences": found,
+            "differences": differences,
             "notes": notes,
             "duration_s": lasted,
             "wall_s": taken,
         }
     )
-    outcome = "identical" if not found else "not identical, as named above"
+    outcome = "identical" if not differences else "not identical, as named above"
     console.say(
         recording.simulated_sentence,
         *notes,
-        *found,
+        *differences,
         f"{options.session}: {outcome} ({', '.join(compared)} compared)",
         f"{lasted:.1f} s of session in {taken:.2f} s, the comparison not counted",
     )
-    return FLAWED if found else DONE
+    return FLAWED if differences else DONE
 
 
 def _notes(recording: Recording) -> Iterator[str]:

@@ -60,10 +60,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     """Analyse, predict and write the page."""
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
     recording = open_visit(options.session, options.subject)
-    others = [revealed(Recording.open(folder)) for folder in options.scores]
+    score_only = [revealed(Recording.open(folder)) for folder in options.scores]
     if is_study(options.session):
-        others += score_visits(options.session, besides=recording)
-    for one in (recording, *others):
+        score_only += score_visits(options.session, besides=recording)
+    for one in (recording, *score_only):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
     from sessions.report import html
@@ -74,11 +74,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
-    prediction = predict_session(recording, analysis, console, _asked(recording, options), afferent)
+    prediction = predict_session(recording, analysis, console, _prediction_options(recording, options), afferent)
     from sessions.report import findings, score_table
 
     further = _further(recording, prediction, afferent, options, console)
-    report = findings(recording, analysis, prediction, [score_table(one) for one in others], further=further)
+    report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
     console.progress(0.9, "drawing")
     drawings = html.plates(report)
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
@@ -92,11 +92,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return FLAWED if analysis.flawed else DONE
 
 
-def _asked(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
+def _prediction_options(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
     """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
     before = stored_options(recording) or PredictionOptions()
-    beside = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
-    return replace(before, intervals=True, beside=beside, course="history")
+    variants = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
+    return replace(before, intervals=True, beside=variants, course="history")
 
 
 def _further(

@@ -86,10 +86,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     with Recorder.start(options.pace, debug=options.debug) as recorder:
         bench = open_device(recorder, options.device) if options.device else None
         frame = _frame(options, planned.frame if bench is None else bench.frame or planned.frame)
-        asked = StartSession(
+        request = StartSession(
             replace(planned, frame=frame), str(folder.absolute()), people, settings, any_folder=options.any_folder
         )
-        outcome = attend_session(recorder, asked, console)
+        outcome = attend_session(recorder, request, console)
     end = outcome.end
     if Path(outcome.folder) != folder.absolute():  # it was taken away meanwhile
         folder = Path(outcome.folder)

@@ -136,18 +136,18 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             "fingers": len(random),
             "without_answer": without_answer,
             "shares": shares,
-            "indices": {name: [one.to_dict() for one in found] for name, (found, _) in indices.items()},
+            "indices": {name: [one.to_dict() for one in computed] for name, (computed, _) in indices.items()},
         }
     )
     _print_changes(single, quantity, console)
     _print_map(radii, quantity, console)
     _print_shares(shares, len(random), without_answer, console)
-    for found, _ in indices.values():
-        if found:
-            _print_thirds(found[0].name, points, kept[:, at], quantity, console)
+    for computed, _ in indices.values():
+        if computed:
+            _print_thirds(computed[0].name, points, kept[:, at], quantity, console)
             break
-    for name, (found, count) in indices.items():
-        _print_indices(name, found, count, samples, quantity, console)
+    for name, (computed, count) in indices.items():
+        _print_indices(name, computed, count, samples, quantity, console)
     return DONE
 
 
@@ -161,9 +161,9 @@ def _print_shares(
         "Share of the others that keep both published signs:"
     )
     rows = [
-        [one.label, f"{100 * found[0]:.0f} %", f"{100 * found[1]:.0f} to {100 * found[2]:.0f} %"]
-        for one, found in zip(QUANTITIES, shares.values(), strict=True)
-        if found is not None
+        [one.label, f"{100 * share[0]:.0f} %", f"{100 * share[1]:.0f} to {100 * share[2]:.0f} %"]
+        for one, share in zip(QUANTITIES, shares.values(), strict=True)
+        if share is not None
     ]
     console.say(table(rows, head=["quantity", "share", "95 % interval"]))
 
@@ -216,22 +216,22 @@ def _print_thirds(
 ) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
     values = points[:, list(sign_map.DESIGN).index(name)]
-    told = [
+    rows = [
         f"{100 * part:.0f} % at {number(low)} to {number(high)}"
         for low, high, part in sign_map.shares_by_thirds(kept, values)
         if part is not None
     ]
-    console.say(f"The {quantity.label} keeps both signs, by {name}: {', '.join(told)}.")
+    console.say(f"The {quantity.label} keeps both signs, by {name}: {', '.join(rows)}.")
 
 
 def _print_indices(
-    name: str, found: tuple[Index, ...], count: int, samples: int, quantity: Quantity, console: Console
+    name: str, indices: tuple[Index, ...], count: int, samples: int, quantity: Quantity, console: Console
 ) -> None:
     console.say(f"\nWhat moves the change of the {quantity.label} over {name} (Sobol indices, {count} fingers):")
-    if not found:
+    if not indices:
         console.say("too few whole blocks of the design have an answer: ask for more --samples")
         return
-    console.say(_index_table(found), *doubts(found, samples))
+    console.say(_index_table(indices), *doubts(indices, samples))
 
 
 def _index_table(indices: Sequence[Index]) -> str:

@@ -44,14 +44,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Serve until Ctrl-C."""
-    given = {name: getattr(options, name) for name in OF_ONE_WIRE if getattr(options, name) is not None}
-    for name in given:
+    settings = {name: getattr(options, name) for name in OF_ONE_WIRE if getattr(options, name) is not None}
+    for name in settings:
         if OF_ONE_WIRE[name] != options.wire:
             raise WrongValue(f"--{name.replace('_', '-')} belongs to {OF_ONE_WIRE[name]}, not to {options.wire}")
-    if given.get("baud", 9600) not in BAUDS:
+    if settings.get("baud", 9600) not in BAUDS:
         raise WrongValue(f"--baud {options.baud} is not allowed: one of {', '.join(map(str, BAUDS))}")
     serve = {"net-ft": serve_net_ft, "serial-ft": serve_serial_ft, "digital-ft": serve_digital_ft}[options.wire]
-    box = serve(**given, seed=options.seed, factor=options.factor, script=options.script)
+    box = serve(**settings, seed=options.seed, factor=options.factor, script=options.script)
     try:
         console.result({"address": box.uri, "simulated": True})
         console.say(f"SIMULATED {options.wire} at {box.uri}")

@@ -55,8 +55,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     deep = _row_receptor(scene, options.row)
     before: list[Prediction] = []
     try:
-        with console.working("solving") as told:
-            found = solve(scene, told, rough=before.append)
+        with console.working("solving") as progress:
+            prediction = solve(scene, progress, rough=before.append)
     except SolveFailure as failure:
         console.result(failure.to_dict())
         raise
@@ -64,12 +64,12 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if not before:
             raise
         deep = None
-        found = replace(before[-1], warnings=(*before[-1].warnings, UNFINISHED))
-        _print(found, scene.title or options.scene.name, console)
+        prediction = replace(before[-1], warnings=(*before[-1].warnings, UNFINISHED))
+        _print(prediction, scene.title or options.scene.name, console)
         return STOPPED
-    _print(found, scene.title or options.scene.name, console, deep)
-    asked = scene.solve.tolerance
-    return DONE if asked is None or found.error_estimate <= asked else FLAWED
+    _print(prediction, scene.title or options.scene.name, console, deep)
+    tolerance = scene.solve.tolerance
+    return DONE if tolerance is None or prediction.error_estimate <= tolerance else FLAWED
 
 
 def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
@@ -82,33 +82,37 @@ def _row_receptor(scene: "Scene", depth: float | None) -> "Receptor | None":
     return replace(scene.receptor, depth=depth)
 
 
-def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
-    row, course = _row(found, deep), _course(found)
-    told = {} if row is None or deep is None else {"row_at": {"depth": deep.depth, **_row_in_json(row)}}
-    plain = found.to_dict()
-    console.result({**plain, **told, **({} if course is None else _course_in_json(*course))})
+def _print(prediction: "Prediction", title: str, console: Console, deep: "Receptor | None" = None) -> None:
+    row, course = _row(prediction, deep), _course(prediction)
+    row_at = {} if row is None or deep is None else {"row_at": {"depth": deep.depth, **_row_in_json(row)}}
+    plain = prediction.to_dict()
+    console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
     console.say(title)
     rows = [
-        ["SED at the ending", number(found.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
-        *([["corrected", number(found.sed_ending_corrected, 5, factor=1e3), "kPa", ""]] if found.nested else []),
-        ["SED at the point", number(found.sed_point, 5, factor=1e3), "kPa", _percent(plain["sed_point_error"])],
-        ["normal force", number(found.normal_force, 5), "N/mm", _percent(plain["normal_force_error"])],
-        ["tangential force", number(found.tangential_force, 5), "N/mm", _percent(plain["tangential_force_error"])],
-        ["contact width", number(found.contact_width, 3), "mm", _percent(plain["contact_width_error"])],
-        ["indentation", number(found.indentation, 4), "mm", _percent(plain["indentation_error"])],
+        ["SED at the ending", number(prediction.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
+        *(
+            [["corrected", number(prediction.sed_ending_corrected, 5, factor=1e3), "kPa", ""]]
+            if prediction.nested
+            else []
+        ),
+        ["SED at the point", number(prediction.sed_point, 5, factor=1e3), "kPa", _percent(plain["sed_point_error"])],
+        ["normal force", number(prediction.normal_force, 5), "N/mm", _percent(plain["normal_force_error"])],
+        ["tangential force", number(prediction.tangential_force, 5), "N/mm", _percent(plain["tangential_force_error"])],
+        ["contact width", number(prediction.contact_width, 3), "mm", _percent(plain["contact_width_error"])],
+        ["indentation", number(prediction.indentation, 4), "mm", _percent(plain["indentation_error"])],
         *(
             []
-            if found.shift is None
-            else [["sideways shift", number(found.shift, 4), "mm", _length(plain["shift_error"])]]
+            if prediction.shift is None
+            else [["sideways shift", number(prediction.shift, 4), "mm", _length(plain["shift_error"])]]
         ),
-        ["unknowns", str(found.dofs), "", ""],
-        ["solving took", number(found.wall_s, factor=1e3), "ms", ""],
-        ["setting up took", number(found.setup_s, factor=1e3), "ms", ""],
-        ["estimating errors took", number(found.estimate_s, factor=1e3), "ms", ""],
+        ["unknowns", str(prediction.dofs), "", ""],
+        ["solving took", number(prediction.wall_s, factor=1e3), "ms", ""],
+        ["setting up took", number(prediction.setup_s, factor=1e3), "ms", ""],
+        ["estimating errors took", number(prediction.estimate_s, factor=1e3), "ms", ""],
     ]
     console.say(table(rows, head=["", "", "", "error, estimated"]))
     console.say("\nEvery quantity at the ending, averaged over it (--json says what each is):")
-    responses = [_response(one, *found.responses[one.name]) for one in QUANTITIES]
+    responses = [_response(one, *prediction.responses[one.name]) for one in QUANTITIES]
     console.say(table(responses, head=["", "", "", "error, estimated"]).lstrip("\n"))
     if course is not None:
         _say_course(*course, console)
@@ -122,22 +126,24 @@ def _print(found: "Prediction", title: str, console: Console, deep: "Receptor | 
         ]
         lines = [[number(arc, 4), *line] for arc, line in zip(ROW.tolist(), cells, strict=True)]
         console.say(table(lines, head=["arc [mm]", *NAMES]).lstrip("\n"))
-    left = [[name, _percent(entry["estimate"])] for name, entry in found.model["left_out"].items()]
+    left = [[name, _percent(entry["estimate"])] for name, entry in prediction.model["left_out"].items()]
     console.say(
         "\nLeft out of the model, and what of the SED that is estimated to have changed (--json says how it was found):"
     )
     console.say(table(left, head=["", ""]).lstrip("\n"))
     console.say("\nChecks of the state found (0 is perfect; a volume of 1 is one that did not change):")
-    shown = [[told, number(found.audits[name] + 0.0, 2)] for name, told in AUDITS.items() if name in found.audits]
+    shown = [
+        [label, number(prediction.audits[name] + 0.0, 2)] for name, label in AUDITS.items() if name in prediction.audits
+    ]
     console.say(table(shown, head=["", ""]).lstrip("\n"))
-    console.note(*(f"note: {warning}" for warning in found.warnings))
+    console.note(*(f"note: {warning}" for warning in prediction.warnings))
 
 
-def _course(found: "Prediction") -> "tuple[CourseNumbers, CourseNumbers] | None":
+def _course(prediction: "Prediction") -> "tuple[CourseNumbers, CourseNumbers] | None":
     """Return the named instants and the rates of a course, and their errors; None where no course was asked for."""
     from solver.response.rates import course_errors, course_numbers
 
-    return None if found.history is None else (course_numbers(found.history), course_errors(found))
+    return None if prediction.history is None else (course_numbers(prediction.history), course_errors(prediction))
 
 
 def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[str, object]:
@@ -197,10 +203,10 @@ def _with_error(value: float, error: float) -> str:
     return "–" if not isfinite(value) else f"{number(value, 4)} ± {number(_none(error), 2)}"
 
 
-def _row(found: "Prediction", receptor: "Receptor | None") -> "Row | None":
+def _row(prediction: "Prediction", receptor: "Receptor | None") -> "Row | None":
     from solver.response.receptor_row import row_along
 
-    return None if receptor is None else row_along(found, receptor=receptor)
+    return None if receptor is None else row_along(prediction, receptor=receptor)
 
 
 def _row_in_json(row: "Row") -> dict[str, object]:

@@ -88,17 +88,17 @@ def run(options: argparse.Namespace, console: Console) -> int:
     intervals = options.kinematics == "small" if options.intervals is None else options.intervals
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
-    asked = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
+    visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
     exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
-    shelf = Shelf(out / "results", asked)
-    done, failed = visits(sessions, asked, shelf, console, scheduler=options.scheduler, workers=options.workers)
+    shelf = Shelf(out / "results", visit_options)
+    done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
     if truth is not None and options.quantity == SED.name:
         from daq_app.simulation.ground_truth import (
             planted_relations,  # simulators are loaded only where they are asked for
         )
 
-        truth["relation"] = planted_relations(truth["people"], asked.prediction, asked.area)
-    study = pooled(done, failed, exclusions, truth, asked, BY_NAME[options.quantity])
+        truth["relation"] = planted_relations(truth["people"], visit_options.prediction, visit_options.area)
+    study = pooled(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
     console.progress(0.97, "writing the page")
     files = _write(study, folder.resolve().name, out)
     console.result({**files, "study": study.to_dict() | {"visits": [visit.session for visit in study.visits]}})
@@ -113,10 +113,10 @@ def _planted(folder: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        found = checked_planted(json.loads(read_limited(path)))
+        settings = checked_planted(json.loads(read_limited(path)))
     except ValueError as damaged:
         raise RecordingError(f"{path} is damaged; delete it to pool the study without what was planted") from damaged
-    return found
+    return settings
 
 
 def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:

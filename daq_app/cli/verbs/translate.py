@@ -71,18 +71,18 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     if language == source.language:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
     held = {one.block: one for one in source.translations if one.language == language}
-    asked = [
+    texts = [
         Translation(language, one.name, one.instruction, one.scale_ends, one.question or usual_question(one.descriptor))
         for one in source.blocks
     ]
     if source.pre_evaluation is not None:
-        asked.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
+        texts.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
     lines: list[str] = []
-    for one in asked:
+    for one in texts:
         mark = "" if one.block in held else f"# to be translated from {source.language}\n"
         table = toml_text(held.get(one.block, one)).replace('question = ""\n', "")
         lines.append(f"[[translations]]\n{mark}{table}")
-    return "\n".join(lines), sum(one.block not in held for one in asked)
+    return "\n".join(lines), sum(one.block not in held for one in texts)
 
 
 def window_texts() -> list[str]:
@@ -107,10 +107,10 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
     for text in texts:
         message = ElementTree.SubElement(group, "message")
         ElementTree.SubElement(message, "source").text = text
-        made = ElementTree.SubElement(message, "translation")
-        made.text = held.get(text, "")
-        if not made.text:
-            made.set("type", "unfinished")
+        translation = ElementTree.SubElement(message, "translation")
+        translation.text = held.get(text, "")
+        if not translation.text:
+            translation.set("type", "unfinished")
             missing += 1
     ElementTree.indent(root, "    ")
     body = ElementTree.tostring(root, encoding="unicode")

@@ -48,8 +48,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     utc = datetime.now(UTC).isoformat(timespec="seconds")
     note(folder, "unblinded", {"by": options.by, "session": None if whole else path.resolve().name})
     for recording in chosen:
-        told = {"unblinded_utc": utc, "by": options.by, "made_before": dict(_made(recording)), "key": key.to_dict()}
-        store_derived(recording.folder, UNBLINDING, told)
+        document = {
+            "unblinded_utc": utc,
+            "by": options.by,
+            "made_before": dict(_results_before(recording)),
+            "key": key.to_dict(),
+        }
+        store_derived(recording.folder, UNBLINDING, document)
     names = [recording.folder.name for recording in chosen]
     console.result({"study": str(folder), "sessions": names, "left_out": refused, "by": options.by, "utc": utc})
     console.say(f"unblinded by {options.by}: {', '.join(names) or 'no session yet'}", *refused)
@@ -77,7 +82,7 @@ def _ready(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], 
     return chosen, refused
 
 
-def _made(recording: Recording) -> Iterator[tuple[str, str]]:
+def _results_before(recording: Recording) -> Iterator[tuple[str, str]]:
     """Yield name and SHA-256 of each number and page that was made of a session while it was blinded."""
     for path in sorted(recording.folder.iterdir()):
         if path.is_file() and path.name not in RECORDED and path.suffix in (".json", ".jsonl", ".html"):

@@ -159,13 +159,13 @@ def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetabl
     transducer = opened(link)
     block = all_readings(transducer, link)
 
-    made = set(faults.made)
+    made = set(faults.datagrams)
     whole = [d for d in faults.delivered if d in made]
     numbers = [int.from_bytes(d[:4], "big") for d in whole]
     kept = sorted({n for i, n in enumerate(numbers) if n == max(numbers[: i + 1])})
     health = transducer.health
     assert block.sequence.tolist() == kept
-    assert block.raw.tolist() == [list(struct.unpack(">6i", faults.made[n - 1][12:])) for n in kept]
+    assert block.raw.tolist() == [list(struct.unpack(">6i", faults.datagrams[n - 1][12:])) for n in kept]
     assert health.received == len(kept)
     assert health.received + health.lost == kept[-1]
     assert health.received + health.repeated + health.late + health.malformed == len(faults.delivered)

@@ -56,10 +56,10 @@ def test_7000_readings_a_second_are_each_received_or_named_as_lost_over_a_bad_ne
     one = box(clock=RealClock(), rate=7000, faults=faults)
     transducer = open_transducer(one.uri, RealClock())
     transducer.start()
-    block = read_until(transducer, lambda: int.from_bytes(faults.made[-1][4:8], "big") > 1.3 * 7000)
+    block = read_until(transducer, lambda: int.from_bytes(faults.datagrams[-1][4:8], "big") > 1.3 * 7000)
     one.close()
 
-    made = {d[4:8]: d for d in faults.made}  # a box asked twice to start numbers anew; its counter goes on
+    made = {d[4:8]: d for d in faults.datagrams}  # a box asked twice to start numbers anew; its counter goes on
     whole = [d for d in faults.delivered if len(d) == 36 and made.get(d[4:8]) == d]
     ticks = [int.from_bytes(d[4:8], "big") for d in whole]
     kept, greatest, repeated, late = [], -1, 0, 0
@@ -73,7 +73,7 @@ def test_7000_readings_a_second_are_each_received_or_named_as_lost_over_a_bad_ne
     assert block.counter.tolist() == kept
     assert (health.received, health.repeated, health.late) == (len(kept), repeated, late)
     assert health.malformed == len(faults.delivered) - len(whole)
-    assert health.received + health.lost == kept[-1] - int.from_bytes(faults.made[0][4:8], "big") + 1
+    assert health.received + health.lost == kept[-1] - int.from_bytes(faults.datagrams[0][4:8], "big") + 1
 
 
 def test_the_rate_asked_for_is_set_and_read_back(box):

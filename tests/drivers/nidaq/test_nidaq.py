@@ -48,7 +48,7 @@ def test_it_says_who_it_is_and_at_which_rate_it_was_set(library, address):
     assert info.serial == "SIM00003"
     assert info.rate == pytest.approx(1000.5)
     assert "1A2B3C" in info.settings["converter"]
-    assert library.asked == [("Dev1/ai0:5", "diff", -10.0, 10.0)]
+    assert library.requests == [("Dev1/ai0:5", "diff", -10.0, 10.0)]
     assert info.settings["gauges"] == "six differential pairs from ai0 on, -10 to 10 V, as read back"
     assert identify_nidaq(address, Deadline(1.0)).model == info.model
 
