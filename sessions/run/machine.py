@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from sessions.plan.plan import SessionPlan
+from sessions.run import steps
 from sessions.run.answers import AnswerEvent, problem
 from sessions.run.states import (
     Closing,
@@ -20,49 +21,8 @@ from sessions.run.states import (
     Stroking,
     Taring,
 )
-from sessions.run.steps import (
-    Abort,
-    AskBegin,
-    AskChoice,
-    AskFinish,
-    AskMount,
-    AskNumber,
-    AskRest,
-    AskScore,
-    AskStroke,
-    Begin,
-    Command,
-    ContactOnset,
-    DiscardTake,
-    EndSession,
-    Event,
-    FingerLifted,
-    Finish,
-    KeepTake,
-    LeaveOut,
-    MagnitudeEstimate,
-    MeasureZero,
-    Note,
-    PairedChoice,
-    Pause,
-    Redo,
-    Refuse,
-    RestoreTake,
-    RestOver,
-    Resume,
-    Scored,
-    Settled,
-    ShowInstruction,
-    Skip,
-    StartTake,
-    StimulusMounted,
-    StrokeDone,
-    Tell,
-    UndoRedo,
-    Zeroed,
-)
 
-Step = tuple[State, tuple[Command, ...]]
+Step = tuple[State, tuple[steps.Command, ...]]
 
 UNDONE = "the redo was undone"
 
@@ -74,30 +34,32 @@ def start(plan: SessionPlan) -> Step:
     """
     if not plan.trials:
         raise ValueError(f"the plan of {plan.subject} has no trials, so there is nothing to run")
-    return Idle(Place(plan, 0, (Progress(),) * len(plan.trials))), (AskBegin(),)
+    return Idle(Place(plan, 0, (Progress(),) * len(plan.trials))), (steps.AskBegin(),)
 
 
-def advance(state: State, event: Event) -> Step:
+def advance(state: State, event: steps.Event) -> Step:
     """Return the next state and the commands that enter it; an event that is not meant now is refused."""
     match state, event:
         case Ended(), _:
             return state, (_refusal(state, event),)
-        case _, Abort(reason):
+        case _, steps.Abort(reason):
             why = reason.strip() or "no reason given"
-            return Ended(why, complete=False), (*_discarding(state, why), EndSession(why, complete=False))
-        case _, Note(text):
-            return state, () if text.strip() else (Refuse("an empty note says nothing: write what is to be kept"),)
-        case _, Pause() | Resume() | RestOver():
+            return Ended(why, complete=False), (*_discarding(state, why), steps.EndSession(why, complete=False))
+        case _, steps.Note(text):
+            return state, () if text.strip() else (
+                steps.Refuse("an empty note says nothing: write what is to be kept"),
+            )
+        case _, steps.Pause() | steps.Resume() | steps.RestOver():
             return _resting(state, event)
-        case _, Redo(reason) | Skip(reason) if not reason.strip():
-            return state, (Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
-        case _, Redo() | UndoRedo():
+        case _, steps.Redo(reason) | steps.Skip(reason) if not reason.strip():
+            return state, (steps.Refuse(f"say why: {type(event).__name__.lower()} needs a reason"),)
+        case _, steps.Redo() | steps.UndoRedo():
             return _again(state, event)
-        case _, Skip(reason):
+        case _, steps.Skip(reason):
             return _left_out(state, reason)
-        case _, ContactOnset() | FingerLifted() | Settled():
+        case _, steps.ContactOnset() | steps.FingerLifted() | steps.Settled():
             return _touched(state, event)
-        case Scoring(), Scored() | MagnitudeEstimate() | PairedChoice():
+        case Scoring(), steps.Scored() | steps.MagnitudeEstimate() | steps.PairedChoice():
             return _answered(state, event)
         case _:
             return _went_on(state, event)
@@ -111,9 +73,9 @@ def interrupted(state: State, reason: str) -> Step:
     """
     match state:
         case Idle():
-            return state, (AskBegin(),)
+            return state, (steps.AskBegin(),)
         case Closing():
-            return state, (AskFinish(),)
+            return state, (steps.AskFinish(),)
         case Ended():
             return state, ()
         case _:
@@ -126,45 +88,47 @@ def trial_in_hand(state: State) -> int | None:
     return None if isinstance(state, Idle | Closing | Ended) else state.place.trial.number
 
 
-def _went_on(state: State, event: Event) -> Step:
+def _went_on(state: State, event: steps.Event) -> Step:
     """Follow the plan."""
     match state, event:
-        case Idle(place), Begin():
+        case Idle(place), steps.Begin():
             return Mounting(place), _asking_for(place, new_block=True)
-        case Mounting(place), StimulusMounted(code) if code == place.trial.stimulus.code:
+        case Mounting(place), steps.StimulusMounted(code) if code == place.trial.stimulus.code:
             return _take_begun(place)
-        case Mounting(place), StimulusMounted(code):
+        case Mounting(place), steps.StimulusMounted(code):
             wanted = place.trial.stimulus.code
-            return state, (Refuse(f"trial {place.trial.number} needs the stimulus {wanted}, not {code}"),)
-        case Taring(place), Zeroed():
+            return state, (steps.Refuse(f"trial {place.trial.number} needs the stimulus {wanted}, not {code}"),)
+        case Taring(place), steps.Zeroed():
             return Ready(place), (_ask_stroke(place),)
-        case Ready(place), StrokeDone() if not place.plan.forces:
+        case Ready(place), steps.StrokeDone() if not place.plan.forces:
             return _stroke_over(place.at(place.index))
-        case Closing(), Finish():
+        case Closing(), steps.Finish():
             reason = "every trial is done"
-            return Ended(reason, complete=True), (EndSession(reason, complete=True),)
+            return Ended(reason, complete=True), (steps.EndSession(reason, complete=True),)
         case _:
             return state, (_refusal(state, event),)
 
 
-def _touched(state: State, event: ContactOnset | FingerLifted | Settled) -> Step:
+def _touched(state: State, event: steps.ContactOnset | steps.FingerLifted | steps.Settled) -> Step:
     """Follow the finger, where a transducer tells of it."""
     match state, event:
-        case Ready(place), ContactOnset() if place.plan.forces:
+        case Ready(place), steps.ContactOnset() if place.plan.forces:
             return Stroking(place.at(place.index)), ()
-        case Stroking(place), FingerLifted():
+        case Stroking(place), steps.FingerLifted():
             return _stroke_over(place)
-        case Scoring(place, touching=False, strokes=strokes), ContactOnset() if place.plan.forces:
+        case Scoring(place, touching=False, strokes=strokes), steps.ContactOnset() if place.plan.forces:
             return Scoring(place, touching=True, strokes=strokes + 1), _further_stroke(place, strokes + 1)
-        case Scoring(place, touching=True, strokes=strokes), FingerLifted():
+        case Scoring(place, touching=True, strokes=strokes), steps.FingerLifted():
             return Scoring(place, strokes=strokes), ()
-        case Scoring(place, touching=False, strokes=strokes, settled=False), Settled() if place.plan.forces:
+        case Scoring(place, touching=False, strokes=strokes, settled=False), steps.Settled() if place.plan.forces:
             return Scoring(place, strokes=strokes, settled=True), ()
-        case Settling(place, touching=False), ContactOnset():
-            return Settling(place, touching=True), (Tell("the finger touches again: the take runs on until it is off"),)
-        case Settling(place, touching=True), FingerLifted():
+        case Settling(place, touching=False), steps.ContactOnset():
+            return Settling(place, touching=True), (
+                steps.Tell("the finger touches again: the take runs on until it is off"),
+            )
+        case Settling(place, touching=True), steps.FingerLifted():
             return Settling(place), ()
-        case Settling(place, touching=False), Settled():
+        case Settling(place, touching=False), steps.Settled():
             return _keep_take(place)
         case _:
             return state, (_refusal(state, event),)
@@ -175,36 +139,36 @@ def _answered(state: Scoring, answer: AnswerEvent) -> Step:
     place = state.place
     wrong = problem(answer, place.trial.answer)
     if wrong is not None:
-        return state, (Refuse(wrong),)
-    if isinstance(answer, PairedChoice):
+        return state, (steps.Refuse(wrong),)
+    if isinstance(answer, steps.PairedChoice):
         place = place.with_progress(replace(place.progress[place.index], choice=answer.choice))
     if state.settled or not place.plan.forces:
         return _keep_take(place)
     return Settling(place, touching=state.touching), ()
 
 
-def _resting(state: State, event: Pause | Resume | RestOver) -> Step:
+def _resting(state: State, event: steps.Pause | steps.Resume | steps.RestOver) -> Step:
     """Stop asking, and go on where it is safe: the stimulus is confirmed and the zero measured anew."""
     match state, event:
-        case Scoring(place, strokes=strokes), Pause():
+        case Scoring(place, strokes=strokes), steps.Pause():
             return Paused(place, scoring=True, strokes=strokes), ()
-        case ((Mounting(place) | Taring(place) | Ready(place) | Stroking(place)), Pause()):
+        case ((Mounting(place) | Taring(place) | Ready(place) | Stroking(place)), steps.Pause()):
             why = "a pause came before the stroke was done"
             return Paused(place, scoring=False), _discarding(state, why)
-        case Paused(place, scoring=True, strokes=strokes), Resume():
+        case Paused(place, scoring=True, strokes=strokes), steps.Resume():
             return Scoring(place, strokes=strokes, settled=True), (_ask_answer(place),)
-        case Paused(place), Resume():
+        case Paused(place), steps.Resume():
             before, undone = _pair_undone(place, "a pause parted the two stimuli")
-            return Mounting(before), (*undone, AskMount(before.trial))
-        case Resting(place), Resume() | RestOver():
+            return Mounting(before), (*undone, steps.AskMount(before.trial))
+        case Resting(place), steps.Resume() | steps.RestOver():
             return Mounting(place), _asking_for(place, new_block=place.trial == place.block.trials[0])
         case _:
             return state, (_refusal(state, event),)
 
 
-def _again(state: State, event: Redo | UndoRedo) -> Step:
+def _again(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
     """Repeat a trial, or undo that; a redo that discards no whole stroke cannot be undone."""
-    if isinstance(event, UndoRedo):
+    if isinstance(event, steps.UndoRedo):
         return _redo_undone(state)
     after, commands = _repeated(state, event.reason)
     between_takes = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
@@ -219,17 +183,17 @@ def _repeated(state: State, reason: str) -> Step:
         case Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
             if place.trial.compared_with is not None:
                 before, undone = _pair_undone(place, reason)
-                return Mounting(before), (*_discarding(state, reason), *undone, AskMount(before.trial))
+                return Mounting(before), (*_discarding(state, reason), *undone, steps.AskMount(before.trial))
             after, commands = _take_begun(place)
             return after, (*_discarding(state, reason), *commands)
         case Mounting(place) if place.take > 0:
-            return state, (Refuse(f"trial {place.trial.number} is about to be repeated already"),)
+            return state, (steps.Refuse(f"trial {place.trial.number} is about to be repeated already"),)
         case Mounting(place) | Resting(place) if place.index > 0:
             return _taken_up(place.at(place.index - 1), reason)
         case Closing(place):
             return _taken_up(place, reason)
         case _:
-            return state, (_refusal(state, Redo(reason)),)
+            return state, (_refusal(state, steps.Redo(reason)),)
 
 
 def _redo_undone(state: State) -> Step:
@@ -238,16 +202,16 @@ def _redo_undone(state: State) -> Step:
         case Mounting(place) | Taring(place) | Ready(place) if place.before_redo is not None:
             before = place.before_redo
         case _:
-            return state, (Refuse("there is no redo to undo: it can be undone until the next stroke"),)
+            return state, (steps.Refuse("there is no redo to undo: it can be undone until the next stroke"),)
     assert not isinstance(before, Ended)
-    then, trials, restored = before.place, place.plan.trials, list[Command]()
+    then, trials, restored = before.place, place.plan.trials, list[steps.Command]()
     in_hand = then.index if isinstance(before, Scoring | Settling) else None
     for index in range(place.index, then.index + isinstance(before, Scoring | Settling | Closing)):
         was, takes, number = then.progress[index], place.progress[index].takes, trials[index].number
         if was.kept or index == in_hand:
-            restored += (RestoreTake(number, was.take), *([KeepTake(number, was.take)] if was.kept else ()))
+            restored += (steps.RestoreTake(number, was.take), *([steps.KeepTake(number, was.take)] if was.kept else ()))
         else:
-            restored.append(LeaveOut(number, UNDONE))
+            restored.append(steps.LeaveOut(number, UNDONE))
         then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
     after, commands = _gone_back(replace(before, place=then))
     return after, (*_discarding(state, UNDONE), *restored, *commands)
@@ -261,11 +225,11 @@ def _gone_back(before: State) -> Step:
         case Settling(place):
             return _keep_take(place)
         case Resting(place):
-            return before, (AskRest(place.plan.rests.duration),)
+            return before, (steps.AskRest(place.plan.rests.duration),)
         case Mounting(place):
-            return before, (AskMount(place.trial),)
+            return before, (steps.AskMount(place.trial),)
         case _:
-            return before, (AskFinish(),)
+            return before, (steps.AskFinish(),)
 
 
 def _left_out(state: State, reason: str) -> Step:
@@ -273,23 +237,23 @@ def _left_out(state: State, reason: str) -> Step:
     match state:
         case Mounting(place) | Taring(place) | Ready(place) | Stroking(place) | Scoring(place) | Settling(place):
             why = f"skipped: {reason}"
-            more: tuple[Command, ...] = ()
+            more: tuple[steps.Command, ...] = ()
             discarded = _discarding(state, why)
             if place.first_of_two:
                 place = place.at(place.index + 1)
-                more = (LeaveOut(place.trial.number, why),)
+                more = (steps.LeaveOut(place.trial.number, why),)
             after, commands = _next(place)
             return after, (*discarded, *more, *commands)
         case _:
-            return state, (_refusal(state, Skip(reason)),)
+            return state, (_refusal(state, steps.Skip(reason)),)
 
 
 def _take_begun(place: Place) -> Step:
     """Open the next take of the trial in hand, its stimulus being on."""
     place = place.with_take(place.progress[place.index].takes + 1)
-    begun = StartTake(place.trial.number, place.take)
+    begun = steps.StartTake(place.trial.number, place.take)
     if place.plan.forces:
-        return Taring(place), (begun, MeasureZero())
+        return Taring(place), (begun, steps.MeasureZero())
     return Ready(place), (begun, _ask_stroke(place))
 
 
@@ -300,16 +264,16 @@ def _stroke_over(place: Place) -> Step:
     return (Settling(place), ()) if place.plan.forces else _keep_take(place)
 
 
-def _further_stroke(place: Place, strokes: int) -> tuple[Command, ...]:
+def _further_stroke(place: Place, strokes: int) -> tuple[steps.Command, ...]:
     """Say so where a stroke is one more than allowed."""
     allowed = place.block.strokes_allowed
     if strokes <= allowed:
         return ()
-    return (Tell(f"stroke {strokes} where {allowed} may be made: it is recorded and will be flagged"),)
+    return (steps.Tell(f"stroke {strokes} where {allowed} may be made: it is recorded and will be flagged"),)
 
 
 def _keep_take(place: Place) -> Step:
-    keep = KeepTake(place.trial.number, place.take)
+    keep = steps.KeepTake(place.trial.number, place.take)
     after, commands = _next(place.with_progress(replace(place.progress[place.index], kept=True)))
     return after, (keep, *commands)
 
@@ -317,10 +281,10 @@ def _keep_take(place: Place) -> Step:
 def _taken_up(place: Place, reason: str) -> Step:
     """Return to a trial that was done or left out."""
     before, undone = _pair_undone(place, reason)
-    return Mounting(before), (*_undoing(place, reason), *undone, AskMount(before.trial))
+    return Mounting(before), (*_undoing(place, reason), *undone, steps.AskMount(before.trial))
 
 
-def _pair_undone(place: Place, reason: str) -> tuple[Place, tuple[Command, ...]]:
+def _pair_undone(place: Place, reason: str) -> tuple[Place, tuple[steps.Command, ...]]:
     """Return to the first of two that are compared, its take discarded; any other place stays as it is, not kept."""
     if place.trial.compared_with is None:
         return _not_kept(place), ()
@@ -328,9 +292,9 @@ def _pair_undone(place: Place, reason: str) -> tuple[Place, tuple[Command, ...]]
     return _not_kept(first), _undoing(first, reason)
 
 
-def _undoing(place: Place, reason: str) -> tuple[Command, ...]:
+def _undoing(place: Place, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that was kept of the trial in hand, where one was."""
-    return (DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
+    return (steps.DiscardTake(place.trial.number, place.take, reason),) if place.progress[place.index].kept else ()
 
 
 def _not_kept(place: Place) -> Place:
@@ -340,32 +304,32 @@ def _not_kept(place: Place) -> Place:
 def _next(place: Place) -> Step:
     """Go on to the next trial, if there is one, or to the rest before it."""
     if place.last:
-        return Closing(place.at(place.index)), (AskFinish(),)
+        return Closing(place.at(place.index)), (steps.AskFinish(),)
     after = place.following()
     if after.rest_due:
-        return Resting(after), (AskRest(after.plan.rests.duration),)
+        return Resting(after), (steps.AskRest(after.plan.rests.duration),)
     return Mounting(after), _asking_for(after, new_block=after.block.name != place.block.name)
 
 
-def _asking_for(place: Place, *, new_block: bool) -> tuple[Command, ...]:
-    instruction = (ShowInstruction(place.block),) if new_block else ()
-    return (*instruction, AskMount(place.trial))
+def _asking_for(place: Place, *, new_block: bool) -> tuple[steps.Command, ...]:
+    instruction = (steps.ShowInstruction(place.block),) if new_block else ()
+    return (*instruction, steps.AskMount(place.trial))
 
 
-def _ask_stroke(place: Place) -> AskStroke:
-    return AskStroke(place.trial, place.block.strokes_allowed)
+def _ask_stroke(place: Place) -> steps.AskStroke:
+    return steps.AskStroke(place.trial, place.block.strokes_allowed)
 
 
-def _ask_answer(place: Place) -> Command:
+def _ask_answer(place: Place) -> steps.Command:
     trial, block = place.trial, place.block
     if trial.answer == "number":
-        return AskNumber(trial, block.question)
+        return steps.AskNumber(trial, block.question)
     if trial.answer == "choice":
-        return AskChoice(place.at(place.index - 1).trial, trial, block.question)
-    return AskScore(trial, block.scale_ends, block.ticks, block.question)
+        return steps.AskChoice(place.at(place.index - 1).trial, trial, block.question)
+    return steps.AskScore(trial, block.scale_ends, block.ticks, block.question)
 
 
-def _discarding(state: State, reason: str) -> tuple[Command, ...]:
+def _discarding(state: State, reason: str) -> tuple[steps.Command, ...]:
     """Return the command that discards the take that is open, where one is."""
     match state:
         case (
@@ -376,12 +340,12 @@ def _discarding(state: State, reason: str) -> tuple[Command, ...]:
             | Settling(place)
             | Paused(place, scoring=True)
         ):
-            return (DiscardTake(place.trial.number, place.take, reason),)
+            return (steps.DiscardTake(place.trial.number, place.take, reason),)
         case _:
             return ()
 
 
-def _refusal(state: State, event: Event) -> Refuse:
+def _refusal(state: State, event: steps.Event) -> steps.Refuse:
     """Say what came, and what is waited for."""
     waiting: dict[type[State], str] = {
         Idle: "the session has not begun",
@@ -396,27 +360,27 @@ def _refusal(state: State, event: Event) -> Refuse:
         Closing: "every trial is done",
         Ended: "the session has ended",
     }
-    return Refuse(f"{WORDS[type(event)]} means nothing now: {waiting[type(state)]}")
+    return steps.Refuse(f"{WORDS[type(event)]} means nothing now: {waiting[type(state)]}")
 
 
-WORDS: dict[type[Event], str] = {
-    Abort: "abort",
-    Begin: "begin",
-    StimulusMounted: "a mounted stimulus",
-    Zeroed: "a measured zero",
-    ContactOnset: "a touch",
-    FingerLifted: "a lift",
-    Settled: "a finger that stays off",
-    StrokeDone: "a stroke reported by hand",
-    Scored: "a score",
-    MagnitudeEstimate: "a number",
-    PairedChoice: "a choice",
-    Note: "a note",
-    Redo: "redo",
-    UndoRedo: "the undoing of a redo",
-    Skip: "skip",
-    Pause: "pause",
-    Resume: "resume",
-    RestOver: "the end of a rest",
-    Finish: "finish",
+WORDS: dict[type[steps.Event], str] = {
+    steps.Abort: "abort",
+    steps.Begin: "begin",
+    steps.StimulusMounted: "a mounted stimulus",
+    steps.Zeroed: "a measured zero",
+    steps.ContactOnset: "a touch",
+    steps.FingerLifted: "a lift",
+    steps.Settled: "a finger that stays off",
+    steps.StrokeDone: "a stroke reported by hand",
+    steps.Scored: "a score",
+    steps.MagnitudeEstimate: "a number",
+    steps.PairedChoice: "a choice",
+    steps.Note: "a note",
+    steps.Redo: "redo",
+    steps.UndoRedo: "the undoing of a redo",
+    steps.Skip: "skip",
+    steps.Pause: "pause",
+    steps.Resume: "resume",
+    steps.RestOver: "the end of a rest",
+    steps.Finish: "finish",
 }

@@ -23,7 +23,6 @@ from sessions.run.resuming import resumption
 from sessions.run.states import Mounting
 from sessions.statistics.scales.psychometric import QUARTILE
 from sessions.strokes.contact_area import FIXED
-from sessions.toml_file import SettingsError
 from simulators.subject import SubjectSettings
 
 ADAPTIVE = protocol("adaptive-comparison")
@@ -122,20 +121,3 @@ def test_a_blinded_study_refuses_an_adaptive_block(tmp_path):
     with pytest.raises(StudyError, match=r"friction is adaptive .* unblinded"):
         create_study(tmp_path / "s", text, 1, blinded=True)
     assert not (tmp_path / "s").exists()
-
-
-@pytest.mark.parametrize(
-    ("was", "written", "named"),
-    [
-        ("standard = 50\n", "", r"adaptive = 40 .*takes a standard"),
-        ("adaptive = 40", "adaptive = 5", r"adaptive = 5 .*between 10 and 200"),
-        ("adaptive = 40", "adaptive = 40\nrepetitions = 2", r"repetitions = 2 .*what its answers ask for"),
-    ],
-)
-def test_an_adaptive_block_that_cannot_be_is_refused(tmp_path, was, written, named):
-    text = (FOLDER / "adaptive-comparison.toml").read_text()
-    assert was in text
-    wrong = tmp_path / "wrong.toml"
-    wrong.write_text(text.replace(was, written))
-    with pytest.raises(SettingsError, match=named):
-        protocol(wrong)

@@ -65,6 +65,20 @@ def ended(folder, *, blocks=3, **options):
     return folder
 
 
+def with_a_long_answer(folder, positions, count=0):
+    """A recording of `count` readings whose one answer has so many positions, followed by 118 notes."""
+    writer = begun(folder)
+    if count:
+        writer.readings(readings(0, count))
+    answer = {"score": 42.5, "positions": [[1000.0 + i / 60, i % 101 * 0.99] for i in range(positions)]}
+    writer.event("scored", 1, answer, commit=False)
+    for i in range(118):
+        writer.event("note", data={"text": f"{i}"}, commit=False)
+    writer.event("ended", data={"reason": "every trial is done"})
+    writer.close()
+    return folder
+
+
 def rows(folder, query):
     with closing(sqlite3.connect(folder / "session.sqlite")) as connection:
         return connection.execute(query).fetchall()

@@ -11,7 +11,7 @@ GIVEN = Scored(31.5, ((4.25, 60.0), (4.75, 31.5)), 4.25, 1, "left", "pen")
 
 
 def test_every_position_of_an_answer_its_first_touch_corrections_hand_and_device_are_recorded(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskScore: once([GIVEN])}).run()
+    recording = Session(tmp_path / "s", instead={AskScore: once(GIVEN)}).run()
     logged = next(event for event in recording.events if event.kind == "scored")
     assert logged.data["positions"] == [[4.25, 60.0], [4.75, 31.5]]
     assert event_of(logged) == GIVEN

@@ -5,7 +5,6 @@ import csv
 import gzip
 import importlib
 import json
-import math
 import shutil
 import subprocess
 import sys
@@ -18,7 +17,7 @@ import h5py
 import numpy as np
 import pytest
 from exported_sessions import MADE, Exports, source_of
-from recordings import PLAN, TRIAL, begun, ended, plainly_read, readings
+from recordings import PLAN, plainly_read, with_a_long_answer
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS, ExportError, ExportSource, export
@@ -26,7 +25,6 @@ from sessions.exchange.exported import side_files
 from sessions.exchange.import_csv import ImportRefused
 from sessions.exchange.import_session import exported, import_session
 from sessions.exchange.session_tables import tables
-from sessions.file_access import packed_lines
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.calibration_uncertainty import gain_error_set
@@ -133,15 +131,7 @@ def test_the_csv_holds_every_number_of_the_live_file_to_the_last_bit(sources, ex
 @pytest.mark.parametrize("form", [pytest.param(form, marks=[pytest.mark.slow] * (form == "nwb")) for form in FORMATS])
 def test_one_long_answer_takes_room_and_memory_once_in_every_export(exports, tmp_path, form):
     assert exports[form, "whole"].exists()  # so that its libraries are loaded
-    writer = begun(tmp_path / "s")
-    writer.readings(readings(0, 100))
-    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(12_000)]
-    writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
-    for i in range(118):
-        writer.event("note", data={"text": f"{i}"}, commit=False)
-    writer.event("ended", data={"reason": "every trial is done"})
-    writer.close()
-    recording = Recording.open(tmp_path / "s")
+    recording = Recording.open(with_a_long_answer(tmp_path / "s", 12_000, 100))
     source = ExportSource(recording, {"made_by": {}, **analyse(recording).to_dict()}, None)
     tracemalloc.start()
     folder = export(source, form, tmp_path / "out")
@@ -397,47 +387,3 @@ def test_a_full_folder_for_an_import_is_refused(exports, tmp_path):
 
 def test_the_plan_of_these_tests_has_texts_beyond_ascii():
     assert not json.dumps(PLAN.blocks[0].scale_ends, ensure_ascii=False).isascii()
-
-
-def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back(tmp_path):
-    writer = begun(tmp_path / "s")
-    block = readings(0, 20)
-    raw = block.raw.copy()
-    raw[7, 2] = math.inf
-    writer.readings(replace(block, raw=raw))
-    writer.event("ended", data={"reason": "done"})
-    writer.close()
-    source = ExportSource(
-        Recording.open(tmp_path / "s"), {"made_by": {}, "strokes": [], "friction": [], "flaws": []}, None
-    )
-    for form, named in (
-        ("csv", ()),
-        ("hdf5", ()),
-        ("bids", ("since it was exported: raw of the readings is not what it was",)),
-    ):
-        made = import_session(exported(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
-        assert made.differences == named
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinded(tmp_path, form):
-    hidden = replace(TRIAL, stimulus=replace(TRIAL.stimulus, index=None))
-    plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(hidden,)),), key_sha256="0" * 64)
-    ended(tmp_path / "s", plan=plan)
-    recording = Recording.open(tmp_path / "s")
-    source = ExportSource(recording, {"made_by": {}, "strokes": [], "friction": [], "flaws": []}, None)
-    out = export(source, form, tmp_path / "out")
-    if form in AGAIN:
-        import_session(exported(out), tmp_path / "again")
-        assert Recording.open(tmp_path / "again").plan == plan
-
-
-@pytest.mark.parametrize("line", [b"0" * 2**20, b"n/a\n" * 2**18])
-def test_a_packed_table_that_unpacks_without_end_is_refused(tmp_path, line):
-    path = tmp_path / "x_physio.tsv.gz"
-    with gzip.open(path, "wb") as file:
-        for _ in range(40):
-            file.write(line)
-    with pytest.raises(ValueError, match="unpacks to more than readings can"):
-        for _ in packed_lines(path):
-            pass

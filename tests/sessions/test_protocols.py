@@ -2,6 +2,7 @@ from collections import Counter
 from itertools import pairwise
 
 import pytest
+from protocol_texts import OWN
 
 from sessions.plan.plan import Blinded, Finger, Frame
 from sessions.plan.protocols import Body, StudyPlace, VisitSetting, plan, protocol, protocol_names
@@ -9,6 +10,17 @@ from sessions.plan.protocols.protocol import FOLDER
 from sessions.toml_file import SettingsError
 
 PAPER = "sensotact-friction"
+
+
+def refused(tmp_path, name, was, written, named):
+    """Return what a built-in protocol with one text changed is refused with."""
+    text = (FOLDER / f"{name}.toml").read_text()
+    assert was in text
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(text.replace(was, written))
+    with pytest.raises(SettingsError, match=named) as caught:
+        protocol(wrong)
+    return str(caught.value)
 
 
 @pytest.mark.parametrize("name", protocol_names())
@@ -108,19 +120,13 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
     ],
 )
 def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowed(tmp_path, was, written, named):
-    text = (FOLDER / f"{PAPER}.toml").read_text()
-    assert was in text
-    wrong = tmp_path / "wrong.toml"
-    wrong.write_text(text.replace(was, written))
-    with pytest.raises(SettingsError, match=named) as caught:
-        protocol(wrong)
-    message = str(caught.value)
-    assert message.startswith(f"{wrong}, line ")
+    message = refused(tmp_path, PAPER, was, written, named)
+    assert message.startswith(f"{tmp_path / 'wrong.toml'}, line ")
     assert "\n" not in message
     if "no order of these" in message:
         return  # the constraint is in one place and the stimuli it shuts out in another
-    line = int(message.removeprefix(f"{wrong}, line ").split(":")[0])
-    assert written in wrong.read_text().splitlines()[line - 1]
+    line = int(message.removeprefix(f"{tmp_path / 'wrong.toml'}, line ").split(":")[0])
+    assert written in (tmp_path / "wrong.toml").read_text().splitlines()[line - 1]
 
 
 @pytest.mark.parametrize(
@@ -146,14 +152,32 @@ def test_a_wrong_protocol_file_is_refused_with_line_key_value_and_what_is_allowe
             r'order.rule = "williams" .*"shuffled"',
         ),
         (PAPER, "[pre_evaluation]", "[pre_evaluations]", r"pre_evaluations is not known"),
+        ("constant-stimuli", "standard = 50", "standard = 30", r"line 23: blocks\[0\].standard = 30 .*one of indices"),
+        (
+            "constant-stimuli",
+            "repetitions = 10             # of",
+            "repetitions = 9 # of",
+            r"blocks\[0\].repetitions = 9 .*even",
+        ),
+        (
+            "constant-stimuli",
+            "indices = [0, 20, 50, 80, 100]",
+            "indices = [0, 50, 100]",
+            r"blocks\[0\].indices = .*3 others",
+        ),
+        ("constant-stimuli", 'answer = "choice"', 'answer = "number"', r"blocks\[0\].standard = 50 .*only a choice"),
+        ("adaptive-comparison", "standard = 50\n", "", r"adaptive = 40 .*takes a standard"),
+        ("adaptive-comparison", "adaptive = 40", "adaptive = 5", r"adaptive = 5 .*between 10 and 200"),
+        (
+            "adaptive-comparison",
+            "adaptive = 40",
+            "adaptive = 40\nrepetitions = 2",
+            r"repetitions = 2 .*what its answers ask for",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused_with_its_line(tmp_path, name, was, written, named):
-    wrong = tmp_path / "wrong.toml"
-    wrong.write_text((FOLDER / f"{name}.toml").read_text().replace(was, written))
-    with pytest.raises(SettingsError, match=named) as caught:
-        protocol(wrong)
-    assert ", line " in str(caught.value)
+    assert ", line " in refused(tmp_path, name, was, written, named)
 
 
 def edited(tmp_path, *changes, name=PAPER):
@@ -315,25 +339,9 @@ def test_one_block_alone_cannot_be_counterbalanced(tmp_path):
 @pytest.mark.parametrize(("planted", "said"), [("[0.3]", "one number for each"), ("[0.3, 0.0]", "between 0.01 and 5")])
 def test_planted_friction_has_a_number_for_each_surface(tmp_path, planted, said):
     file = tmp_path / "own.toml"
-    file.write_text(OWN.replace("INDICES", f"[3, 70]\nplanted_friction = {planted}"))
+    file.write_text(OWN.replace("[3, 70]", f"[3, 70]\nplanted_friction = {planted}"))
     with pytest.raises(SettingsError, match=said):
         protocol(file)
-
-
-OWN = """
-name = "own"
-title = "Cloths"
-label_seed = 1
-contact_angle = 45.0
-[[blocks]]
-name = "softness"
-descriptor = "softness"
-direction = "proximal to distal"
-indentation = 2.0
-indices = INDICES
-instruction = "Push your finger once away from you."
-scale_ends = ["not soft at all", "as soft as can be"]
-"""
 
 
 def test_constant_stimuli_meet_every_comparison_with_the_standard_as_often_first_as_second():
@@ -345,21 +353,3 @@ def test_constant_stimuli_meet_every_comparison_with_the_standard_as_often_first
         rounds = [tuple(indices(block)[8 * n : 8 * n + 8]) for n in range(10)]
         assert all(set(one) - {standard} == others for one in rounds)
         assert len(set(rounds)) > 8
-
-
-@pytest.mark.parametrize(
-    ("was", "written", "named"),
-    [
-        ("standard = 50", "standard = 30", r"line 23: blocks\[0\].standard = 30 .*one of indices"),
-        ("repetitions = 10             # of", "repetitions = 9 # of", r"blocks\[0\].repetitions = 9 .*even"),
-        ("indices = [0, 20, 50, 80, 100]", "indices = [0, 50, 100]", r"blocks\[0\].indices = .*3 others"),
-        ('answer = "choice"', 'answer = "number"', r"blocks\[0\].standard = 50 .*only a choice"),
-    ],
-)
-def test_a_standard_that_cannot_be_is_refused(tmp_path, was, written, named):
-    text = (FOLDER / "constant-stimuli.toml").read_text()
-    assert was in text
-    wrong = tmp_path / "wrong.toml"
-    wrong.write_text(text.replace(was, written))
-    with pytest.raises(SettingsError, match=named):
-        protocol(wrong)

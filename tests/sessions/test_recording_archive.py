@@ -3,7 +3,6 @@ import itertools
 import json
 import math
 import shutil
-import sqlite3
 import stat
 import tracemalloc
 from dataclasses import replace
@@ -11,12 +10,11 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from recordings import PLAN, begun, change, crashed, ended, readings
+from recordings import PLAN, begun, change, crashed, ended, readings, with_a_long_answer
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
-from sessions.recording.derived import load_derived, store_derived, store_page
 from sessions.recording.manifest import list_in_manifest
 from sessions.recording.text_column import TextColumn, read_texts, write_texts
 
@@ -171,14 +169,7 @@ def test_a_recording_without_trials_is_sealed(tmp_path):
 
 
 def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_path):
-    writer = begun(tmp_path / "s")
-    positions = [[1000.0 + i / 60, i % 101 * 0.99] for i in range(20_000)]
-    writer.event("scored", 1, {"score": 42.5, "positions": positions}, commit=False)
-    for i in range(118):
-        writer.event("note", data={"text": f"{i}"}, commit=False)
-    writer.event("ended", data={"reason": "every trial is done"})
-    writer.close()
-    del positions
+    with_a_long_answer(tmp_path / "s", 20_000)
     tracemalloc.start()
     seal(tmp_path / "s")
     _, peak = tracemalloc.get_traced_memory()
@@ -358,77 +349,3 @@ def test_a_session_cut_short_by_a_crash_is_sealed_with_all_that_was_safe_and_its
     assert losses[1].startswith("the session has no end")
     assert problems(folder) == tuple(losses)
     assert not log.exists()
-
-
-# ---- numbers made from a recording
-
-
-def test_derived_numbers_come_back_with_the_versions_that_made_them(sealed):
-    path = store_derived(sealed, "analysis.json", {"strokes": [{"mu": 0.1 + 0.2, "speed": None}]})
-    assert path == sealed / "analysis.json"
-    told = load_derived(sealed, "analysis.json")
-    assert told["strokes"] == [{"mu": 0.1 + 0.2, "speed": None}]
-    assert told["made_by"]["numpy"] == np.__version__
-    assert path.read_text().startswith('{\n "SIMULATED": ')
-    assert problems(sealed) == ()
-
-
-def test_derived_numbers_are_listed_so_that_a_change_is_named(sealed):
-    path = store_derived(sealed, "analysis.json", {"mu": 0.5})
-    path.write_text(path.read_text().replace("0.5", "0.6"))
-    assert problems(sealed)[0].startswith("analysis.json is not what it was")
-
-
-def test_derived_numbers_made_anew_replace_the_old_ones_as_a_whole(sealed, monkeypatch):
-    store_derived(sealed, "analysis.json", {"mu": 0.5})
-    store_derived(sealed, "analysis.json", {"mu": 0.7})
-    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
-    assert problems(sealed) == ()
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("sessions.atomic_file.os.fsync", full)
-    with pytest.raises(RecordingError, match="No space left on device"):
-        store_derived(sealed, "analysis.json", {"mu": 0.9})
-    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
-    assert problems(sealed) == ()
-
-
-def test_derived_numbers_are_stored_beside_a_session_that_is_not_sealed_yet(tmp_path):
-    folder = ended(tmp_path / "s", info=REAL)
-    store_derived(folder, "analysis.json", {"mu": 0.5})
-    assert "SIMULATED" not in (folder / "analysis.json").read_text()
-    assert load_derived(folder, "prediction.json") is None
-
-
-def test_a_page_is_stored_and_listed(sealed):
-    store_page(sealed, "report.html", "<p>SIMULATED</p>")
-    assert "report.html" in json.loads((sealed / "MANIFEST.json").read_bytes())["files"]
-    assert problems(sealed) == ()
-
-
-def test_a_number_that_is_none_is_refused(sealed):
-    with pytest.raises(ValueError, match="JSON"):
-        store_derived(sealed, "analysis.json", {"mu": math.nan})
-    assert not (sealed / "analysis.json").exists()
-
-
-@pytest.mark.parametrize("name", ["session.json", "MANIFEST.json", "../analysis.json", "a/b.json", ".hidden", ""])
-def test_what_was_recorded_and_what_lies_elsewhere_is_never_written_over(sealed, name):
-    with pytest.raises(ValueError, match="is no name for a file made from a recording"):
-        store_derived(sealed, name, {})
-
-
-def test_a_damaged_derived_file_is_named(sealed):
-    (sealed / "analysis.json").write_text("{")
-    with pytest.raises(RecordingError, match=r"analysis\.json is damaged .*make it anew"):
-        load_derived(sealed, "analysis.json")
-
-
-def test_a_sealed_session_is_opened_without_side_files(sealed):
-    Recording.open(sealed).readings()
-    assert not list(sealed.glob("session.sqlite-*"))
-    with sqlite3.connect(f"file:{sealed / 'session.sqlite'}?mode=ro", uri=True) as connection:
-        assert connection.execute("SELECT count(*) FROM blocks").fetchone() == (5,)
-    connection.close()

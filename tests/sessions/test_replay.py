@@ -5,7 +5,7 @@ from dataclasses import replace as replace_fields
 import pytest
 from recordings import change, rows
 from stand_ins import INFO, Hands, SimulatedClock, StandIn
-from told_session import resume
+from told_session import once, resume
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.exchange.import_csv import import_csv
@@ -86,11 +86,6 @@ def identical(recording, tmp_path):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("replay") / "whole", most=5)
-
-
-def once(*events):
-    left = [list(events)]
-    return lambda _: left.pop() if left else None
 
 
 def test_a_whole_session_comes_out_identical_to_the_last_bit(whole, tmp_path):
@@ -302,8 +297,7 @@ def test_an_onset_that_the_readings_do_not_show_comes_no_more(tmp_path):
 
 
 def test_at_a_chosen_speed_the_outcome_is_the_same(whole, tmp_path):
-    again = replayed(whole, tmp_path, speed=200.0)
-    assert differences(whole, again) == []
+    assert differences(whole, replayed(whole, tmp_path, speed=200.0)) == []
 
 
 def cut(folder, last):

@@ -161,7 +161,7 @@ def test_a_visit_with_forces_is_not_run_without_a_transducer(tmp_path):
 
 
 def test_a_discarded_take_stays_in_the_file_and_the_next_one_counts(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskScore: once([Redo("finger slipped")])}).run()
+    recording = Session(tmp_path / "s", instead={AskScore: once(Redo("finger slipped"))}).run()
     record = recording.trials[0]
     assert record.outcome == "scored"
     assert (record.take.number, [take.number for take in record.other_takes]) == (2, [1])
@@ -184,7 +184,7 @@ def test_a_trial_done_again_after_its_score_has_only_its_new_score(tmp_path):
 
 
 def test_a_skipped_trial_is_recorded_as_skipped(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskStroke: once([Skip("surface torn")])}).run()
+    recording = Session(tmp_path / "s", instead={AskStroke: once(Skip("surface torn"))}).run()
     record = recording.trials[0]
     assert (record.outcome, record.take, record.score) == ("skipped", None, None)
     assert record.other_takes[0].discarded == "skipped: surface torn"
@@ -193,20 +193,20 @@ def test_a_skipped_trial_is_recorded_as_skipped(tmp_path):
 
 
 def test_not_answered_is_an_outcome_of_its_own_and_its_stroke_counts(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskScore: once([Scored(None)])}).run()
+    recording = Session(tmp_path / "s", instead={AskScore: once(Scored(None))}).run()
     record = recording.trials[0]
     assert (record.outcome, record.score, record.answered) == ("not answered", None, False)
     assert len(recording.readings(1)) > 0
 
 
 def test_a_pause_and_its_end_are_recorded_and_the_trial_is_done_anew(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskStroke: once([Pause(), Resume()])}).run()
+    recording = Session(tmp_path / "s", instead={AskStroke: once(Pause(), Resume())}).run()
     assert [kind for kind in kinds(recording, 1) if kind in ("pause", "resume")] == ["pause", "resume"]
     assert recording.trials[0].take.number == 2
 
 
 def test_an_event_that_is_not_meant_is_refused_shown_and_logged(tmp_path):
-    session = Session(tmp_path / "s", instead={AskMount: once([StimulusMounted("A00"), StimulusMounted("X")])})
+    session = Session(tmp_path / "s", instead={AskMount: once(StimulusMounted("A00"), StimulusMounted("X"))})
     calls = []
 
     def poll():

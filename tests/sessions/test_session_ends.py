@@ -22,7 +22,7 @@ COMMANDS = [AskMount, MeasureZero, AskStroke, AskScore]
 
 @pytest.mark.parametrize("at", COMMANDS)
 def test_an_abort_in_any_state_ends_the_session_with_its_reason(tmp_path, at):
-    session = Session(tmp_path / "s", instead={at: once([Abort("fire alarm")])})
+    session = Session(tmp_path / "s", instead={at: once(Abort("fire alarm"))})
     assert_ended(session.run(), "fire alarm", "aborted")
     assert not session.end.complete
     assert not session.transducer.streaming
@@ -80,7 +80,7 @@ def test_an_error_in_the_operators_program_is_written_down_and_raised(tmp_path):
 
 
 def test_an_interrupted_take_is_kept_as_one_that_does_not_count(tmp_path):
-    recording = Session(tmp_path / "s", instead={AskScore: once([Abort("ill")])}).run()
+    recording = Session(tmp_path / "s", instead={AskScore: once(Abort("ill"))}).run()
     record = recording.trials[0]
     assert (record.outcome, record.take) == ("open", None)
     assert record.other_takes[0].discarded == "ill"

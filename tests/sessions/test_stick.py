@@ -62,3 +62,39 @@ def test_no_break_away_is_told_after_the_slide_began():
 
 def test_a_ratio_that_does_not_climb_has_no_stick_phase():
     assert analysed(block(T, felt(stroke(T)))).strokes[0].break_away is None
+
+
+# ---- a finger that sticks and slips, and friction that follows the normal force
+
+
+def sawing(each, drop, mu=0.5):
+    """Return a stroke whose T/N climbs by `drop` of mu and falls back within a tenth of the period, `each` Hz."""
+    phase = each * np.maximum(T - 1.0, 0.0) % 1.0
+    saw = np.where(phase < 0.9, phase / 0.9, (1.0 - phase) / 0.1)
+    return wrench(T, trapezium(T, 1.0, 3.0, 0.1, 2.0), mu * (1.0 - drop * (1.0 - saw)), 25.0 * (T - 2.0))
+
+
+@pytest.mark.parametrize(("each", "drop"), [(5.0, 0.2), (8.0, 0.3), (13.0, 0.15)])
+def test_of_a_finger_that_sticks_and_slips_tau_max_is_that_of_the_crests_and_no_static_peak_is_given(each, drop):
+    (one,) = (found := analysed(block(T, felt(sawing(each, drop))))).strokes
+    assert "stick_slip" in one.flaws
+    assert any(f"{each:.2g} Hz" in flaw.sentence for flaw in found.flaws)
+    assert one.tau_max == pytest.approx(0.5 * 2.0 / 100.0, rel=0.02)
+    low, high = found.intervals[0].tau_max
+    assert low < 0.5 * 2.0 / 100.0 < high
+    assert one.mu_static is None
+
+
+@pytest.mark.parametrize("hum", [0.02, 0.1])  # N
+def test_hum_and_noise_are_no_stick_slip(hum):
+    raw = felt(stroke(T))
+    raw[:, :3] += hum * np.sin(2 * np.pi * 50.0 * T + 0.3)[:, None]
+    (one,) = analysed(block(T, raw)).strokes
+    assert "stick_slip" not in one.flaws
+
+
+def test_friction_that_falls_with_the_normal_force_is_no_static_peak():
+    n = trapezium(T, 1.0, 3.0, 0.4, 3.0)
+    ratio = 0.5 * (np.maximum(n, 0.1) / 3.0) ** (-1.0 / 3.0)
+    (one,) = analysed(block(T, felt(wrench(T, n, ratio, 25.0 * (T - 2.0))))).strokes
+    assert one.mu_static is None

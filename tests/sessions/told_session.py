@@ -31,9 +31,9 @@ class Session:
         return Recording.open(self.writer.folder)
 
 
-def once(events):
+def once(*events):
     """Answer with `events` the first time, as usual afterwards."""
-    left = [events]
+    left = [list(events)]
     return lambda _: left.pop() if left else None
 
 

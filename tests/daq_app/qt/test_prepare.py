@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from protocol_texts import OWN
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLabel
@@ -14,21 +15,6 @@ from daq_app.window.messages import DevicesFound, Searching
 from daq_app.window.new_session import Unfinished
 
 pytestmark = pytest.mark.qt
-
-OWN = """
-name = "own"
-title = "Cloths"
-label_seed = 1
-contact_angle = 45.0
-[[blocks]]
-name = "softness"
-descriptor = "softness"
-direction = "proximal to distal"
-indentation = 2.0
-indices = [3, 70]
-instruction = "Push your finger once away from you."
-scale_ends = ["not soft at all", "as soft as can be"]
-"""
 
 
 def test_without_a_transducer_no_field_reaches_beyond_the_page(driver):

@@ -1,0 +1,95 @@
+"""Numbers and pages made from a recording: stored beside it, listed, made anew, and never in its place."""
+
+import json
+import math
+import sqlite3
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recordings import ended
+from stand_ins import INFO
+
+from sessions.recording import Recording, RecordingError
+from sessions.recording.archive import problems, seal
+from sessions.recording.derived import load_derived, store_derived, store_page
+
+REAL = replace(INFO, simulated=False)
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    folder = ended(tmp_path / "s", blocks=5, subject_simulated=True)
+    seal(folder)
+    return folder
+
+
+def test_derived_numbers_come_back_with_the_versions_that_made_them(sealed):
+    path = store_derived(sealed, "analysis.json", {"strokes": [{"mu": 0.1 + 0.2, "speed": None}]})
+    assert path == sealed / "analysis.json"
+    told = load_derived(sealed, "analysis.json")
+    assert told["strokes"] == [{"mu": 0.1 + 0.2, "speed": None}]
+    assert told["made_by"]["numpy"] == np.__version__
+    assert path.read_text().startswith('{\n "SIMULATED": ')
+    assert problems(sealed) == ()
+
+
+def test_derived_numbers_are_listed_so_that_a_change_is_named(sealed):
+    path = store_derived(sealed, "analysis.json", {"mu": 0.5})
+    path.write_text(path.read_text().replace("0.5", "0.6"))
+    assert problems(sealed)[0].startswith("analysis.json is not what it was")
+
+
+def test_derived_numbers_made_anew_replace_the_old_ones_as_a_whole(sealed, monkeypatch):
+    store_derived(sealed, "analysis.json", {"mu": 0.5})
+    store_derived(sealed, "analysis.json", {"mu": 0.7})
+    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
+    assert problems(sealed) == ()
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sessions.atomic_file.os.fsync", full)
+    with pytest.raises(RecordingError, match="No space left on device"):
+        store_derived(sealed, "analysis.json", {"mu": 0.9})
+    assert load_derived(sealed, "analysis.json")["mu"] == 0.7
+    assert problems(sealed) == ()
+
+
+def test_derived_numbers_are_stored_beside_a_session_that_is_not_sealed_yet(tmp_path):
+    folder = ended(tmp_path / "s", info=REAL)
+    store_derived(folder, "analysis.json", {"mu": 0.5})
+    assert "SIMULATED" not in (folder / "analysis.json").read_text()
+    assert load_derived(folder, "prediction.json") is None
+
+
+def test_a_page_is_stored_and_listed(sealed):
+    store_page(sealed, "report.html", "<p>SIMULATED</p>")
+    assert "report.html" in json.loads((sealed / "MANIFEST.json").read_bytes())["files"]
+    assert problems(sealed) == ()
+
+
+def test_a_number_that_is_none_is_refused(sealed):
+    with pytest.raises(ValueError, match="JSON"):
+        store_derived(sealed, "analysis.json", {"mu": math.nan})
+    assert not (sealed / "analysis.json").exists()
+
+
+@pytest.mark.parametrize("name", ["session.json", "MANIFEST.json", "../analysis.json", "a/b.json", ".hidden", ""])
+def test_what_was_recorded_and_what_lies_elsewhere_is_never_written_over(sealed, name):
+    with pytest.raises(ValueError, match="is no name for a file made from a recording"):
+        store_derived(sealed, name, {})
+
+
+def test_a_damaged_derived_file_is_named(sealed):
+    (sealed / "analysis.json").write_text("{")
+    with pytest.raises(RecordingError, match=r"analysis\.json is damaged .*make it anew"):
+        load_derived(sealed, "analysis.json")
+
+
+def test_a_sealed_session_is_opened_without_side_files(sealed):
+    Recording.open(sealed).readings()
+    assert not list(sealed.glob("session.sqlite-*"))
+    with sqlite3.connect(f"file:{sealed / 'session.sqlite'}?mode=ro", uri=True) as connection:
+        assert connection.execute("SELECT count(*) FROM blocks").fetchone() == (5,)
+    connection.close()

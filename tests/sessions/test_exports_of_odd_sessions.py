@@ -1,0 +1,58 @@
+"""Exports of sessions with an infinite reading or without their key, and a packed table without end."""
+
+import gzip
+import importlib
+import math
+from dataclasses import replace
+
+import pytest
+from recordings import PLAN, TRIAL, begun, ended, readings
+
+from sessions.exchange import FORMATS, ExportSource, export
+from sessions.exchange.import_session import exported, import_session
+from sessions.file_access import packed_lines
+from sessions.recording import Recording
+
+BARE = {"made_by": {}, "strokes": [], "friction": [], "flaws": []}  # an analysis of nothing
+
+
+def test_an_infinite_number_which_bids_does_not_know_is_named_when_it_comes_back(tmp_path):
+    writer = begun(tmp_path / "s")
+    block = readings(0, 20)
+    raw = block.raw.copy()
+    raw[7, 2] = math.inf
+    writer.readings(replace(block, raw=raw))
+    writer.event("ended", data={"reason": "done"})
+    writer.close()
+    source = ExportSource(Recording.open(tmp_path / "s"), BARE, None)
+    for form, named in (
+        ("csv", ()),
+        ("hdf5", ()),
+        ("bids", ("since it was exported: raw of the readings is not what it was",)),
+    ):
+        made = import_session(exported(export(source, form, tmp_path / form)), tmp_path / f"{form}-again")
+        assert made.differences == named
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_blinded_session_is_exported_without_the_indices_and_comes_back_blinded(tmp_path, form):
+    hidden = replace(TRIAL, stimulus=replace(TRIAL.stimulus, index=None))
+    plan = replace(PLAN, blocks=(replace(PLAN.blocks[0], trials=(hidden,)),), key_sha256="0" * 64)
+    ended(tmp_path / "s", plan=plan)
+    recording = Recording.open(tmp_path / "s")
+    source = ExportSource(recording, BARE, None)
+    out = export(source, form, tmp_path / "out")
+    if hasattr(importlib.import_module(FORMATS[form]), "read"):
+        import_session(exported(out), tmp_path / "again")
+        assert Recording.open(tmp_path / "again").plan == plan
+
+
+@pytest.mark.parametrize("line", [b"0" * 2**20, b"n/a\n" * 2**18])
+def test_a_packed_table_that_unpacks_without_end_is_refused(tmp_path, line):
+    path = tmp_path / "x_physio.tsv.gz"
+    with gzip.open(path, "wb") as file:
+        for _ in range(40):
+            file.write(line)
+    with pytest.raises(ValueError, match="unpacks to more than readings can"):
+        for _ in packed_lines(path):
+            pass
