@@ -56,7 +56,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     if options.folder is not None or options.synthetic is not None:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
     planted = _set(options.power)
-    found = power(
+    powers = power(
         planted,
         SUBJECTS,
         SURFACES,
@@ -65,10 +65,10 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
         lambda part: console.progress(part, f"{part:.0%} of the designs"),
     )
     recoveries = _recovery(options, planted, console)
-    designs = [{**asdict(one), "power": one.share} for one in found]
+    designs = [{**asdict(one), "power": one.share} for one in powers]
     console.result({"planted": asdict(planted), "designs": designs, "recovery": [asdict(one) for one in recoveries]})
     rows = [
-        [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in found if one.subjects == people)]
+        [str(people), *(f"{100 * one.share:.0f} ± {100 * one.half:.0f} %" for one in powers if one.subjects == people)]
         for people in SUBJECTS
     ]
     values = ", ".join(f"{one.name} = {getattr(planted, one.name):g}" for one in fields(planted))
@@ -92,19 +92,19 @@ def _recovery(options: argparse.Namespace, planted: Planted, console: Console) -
     depths = tuple(options.depths)
     # Values spread evenly over a range have a standard deviation of the range by the root of 12.
     judgement = Judgement(planted.effect / math.sqrt(12.0), planted.noise, planted.level_sd, planted.slope_sd)
-    found: list[Recovery] = []
+    recoveries: list[Recovery] = []
     count = len(RIVAL_SURFACES) * len(RIVAL_SUBJECTS)
     for surfaces in RIVAL_SURFACES:
-        console.progress(len(found) / count, f"strokes on {surfaces} surfaces")
+        console.progress(len(recoveries) / count, f"strokes on {surfaces} surfaces")
         draw = np.random.default_rng([options.seed, surfaces])
         strokes = planted_strokes(StudyDesign.even(surfaces, depths), max(RIVAL_SUBJECTS), draw)
         for people in RIVAL_SUBJECTS:
-            found.append(recovery(strokes, people, depths, options.quantity, judgement, RIVAL_STUDIES, draw))
-            console.progress(len(found) / count, f"{people} subjects, {surfaces} surfaces")
-    return found
+            recoveries.append(recovery(strokes, people, depths, options.quantity, judgement, RIVAL_STUDIES, draw))
+            console.progress(len(recoveries) / count, f"{people} subjects, {surfaces} surfaces")
+    return recoveries
 
 
-def _say_recovery(found: Sequence[Recovery], options: argparse.Namespace, console: Console) -> None:
+def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, console: Console) -> None:
     label = BY_NAME[options.quantity].label
     depths = ", ".join(f"{depth:g}" for depth in options.depths)
     console.say(f"Scores that follow {label} with that effect over its range, surfaces pressed to {depths} mm:")
@@ -114,10 +114,10 @@ def _say_recovery(found: Sequence[Recovery], options: argparse.Namespace, consol
             f"{100 * one.preferred:.0f} %",
             f"{100 * one.family:.0f} %",
         ]
-        for one in found
+        for one in recoveries
     ]
     console.say(table(rows, head=["subjects × surfaces × depths", "preferred", "it or a twin"]))
-    twins = ", ".join(found[-1].twins) or "none"
+    twins = ", ".join(recoveries[-1].twins) or "none"
     console.say(
         f"Share of {RIVAL_STUDIES} simulated studies in which it has the greatest Akaike weight of all rivals. Its "
         f"twins in the last row, by r of at least {TWIN:g}: {twins}. The finger is the published one, so real studies "
