@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Frame, Parts
-from daq_app.wording import errors_words, tr, tr_noop
+from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,7 +56,7 @@ def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: flo
     if triangle < 0:
         return tr("{where} · no tissue", where=where)
     tissue = tr(TISSUES[int(parts.region[triangle])])
-    return f"{field.words(float(values[0]))}{errors_words(None)} · {where} · {tissue}"
+    return f"{field.words(float(values[0]))} · {where} · {tissue}"
 
 
 def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:

@@ -70,8 +70,19 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             ),
             *_other_response(state, said),
             (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
-            (tr("model: indentation"), _value(said.indentation, "{:.2f} mm", said.reasons, "indentation")),
-            (tr("model: normal force"), _value(said.normal_force, "{:.2f} N", said.reasons, "normal_force")),
+            (
+                tr("model: indentation"),
+                _value(said.indentation, "{:.2f} mm, " + tr("prescribed"), said.reasons, "indentation"),
+            ),
+            (
+                tr("model: normal force {condition}", condition=condition(state.report, said)),
+                _value(
+                    said.normal_force,
+                    "{:.2f} N" + errors_words(said.normal_force_error),
+                    said.reasons,
+                    "normal_force",
+                ),
+            ),
         ]
     elif state.stage == "analysed":
         told.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
@@ -98,10 +109,35 @@ def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[
 def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
     """Return a SED with its error from the mesh, and the greatest from what the model leaves out, over all trials."""
     assert said.sed is not None  # a trial without an answer has a reason in its place
+    return f"{1000.0 * said.sed:.3f} kPa{errors_words(said.error_estimate, _effect(report))}"
+
+
+def greatest_errors(report: Report | None, response: str = SED.name) -> str:
+    """Return the condition and the errors that hold for every trial of a session; "" where none was predicted.
+
+    The mesh's error is the greatest of all trials, and unknown where that of one is.
+    """
+    shown = shown_response(response)
+    pairs = [(said, shown.of(said)) for said in (() if report is None else report.predictions)]
+    found = [(said, value) for said, value in pairs if value]
+    if not found:
+        return ""
+    mesh = [value[1] / abs(value[0]) for _, value in found if len(value) > 1 and value[0]]
+    told = errors_words(max(mesh) if len(mesh) == len(found) else None, _effect(report) if response == SED.name else "")
+    conditions = {condition(report, said) for said, _ in found}
+    return tr(
+        "{response} {condition}{errors}",
+        response=tr(shown.label),
+        condition=" / ".join(sorted(conditions)),
+        errors=told,
+    )
+
+
+def _effect(report: Report | None) -> str:
+    """Return the greatest effect on the SED of what the model leaves out; "" where none is known."""
     facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]
     most = max(facts, key=lambda fact: max(map(float, PLAIN.findall(fact.value)), default=0.0), default=None)
-    effect = "" if most is None else f"{most.name} {most.value}"
-    return f"{1000.0 * said.sed:.3f} kPa{errors_words(said.error_estimate, effect)}"
+    return "" if most is None else f"{most.name} {most.value}"
 
 
 def condition(report: Report | None, said: PredictionFinding) -> str:

@@ -26,7 +26,7 @@ from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Shortened, button, choice, label, panel
+from daq_app.qt.parts import Wrapped, button, choice, label, panel
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens
@@ -79,7 +79,7 @@ class AnalystWindow(QMainWindow):
         self.trials.responded.connect(self.take)  # no work: the model answers with every quantity
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
-        self._words = Shortened("quiet")
+        self._words = Wrapped("quiet", keeps_room=True)
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
         self.go_on = button(
             tr("Go on"), tr("have the model answer the trials that are left"), lambda: self.ask(m.GoOn())
@@ -223,14 +223,14 @@ class AnalystWindow(QMainWindow):
             self.ask(m.Choose(self.state.row + 1))
 
     def _say(self, sentence: str) -> None:
-        self._words.show_whole(sentence)
+        self._words.show_text(sentence)
 
     def _show(self) -> None:
         state = self.state
         busy = state.step is not None
         self.progress.setVisible(busy)
         self.progress.setValue(0 if state.step is None else round(100 * state.step.part))
-        self._words.show_whole(progress_words(state.step) or state.told)
+        self._words.show_text(progress_words(state.step) or state.told)
         self.stop.setEnabled(busy)
         self.go_on.setVisible(state.halted and not busy)
         for made in (self.report, self.export):

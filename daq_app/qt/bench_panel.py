@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import EntryLine, Shortened, button, choice, label, regrade, say, scrolled
+from daq_app.qt.parts import EntryLine, button, choice, label, regrade, say, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
@@ -51,7 +51,7 @@ class BenchPanel(QFrame):
         self._fields = {name: label("–", wrap=True) for name in FIELDS}
         self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
         self._life = {name: label("–", wrap=True) for name in NAMES}
-        self._name = Shortened("title")
+        self._name = label("", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
@@ -79,7 +79,7 @@ class BenchPanel(QFrame):
         self._lamp.show_grade(view.lamp, view.lamp_words)
         say(self._lamp_words, view.lamp_words)
         regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
-        self._name.show_whole(view.name)
+        say(self._name, view.name)
         for name, text in (
             ("serial", view.serial),
             ("calibration", view.calibration),

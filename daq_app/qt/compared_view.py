@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from daq_app.analyst.compared import NAMES, ComparedRow
-from daq_app.qt.parts import Shortened, button
+from daq_app.qt.parts import button, label, say
 from daq_app.qt.picture_view import PictureView, Save
 from daq_app.qt.text_table import TextTable
 from daq_app.wording import tr
@@ -19,7 +19,7 @@ class ComparedView(QWidget):
     def __init__(self, choose: Callable[[], object], save: Save) -> None:
         """Show nothing yet."""
         super().__init__()
-        self.words = Shortened("quiet")
+        self.words = label("", "quiet", wrap=True)
         self.choose = button(tr("Compare with…"), tr("compare with another session"), choose)
         head = (tr("stimulus"), *(f"{tr(name)} {part}" for name in NAMES for part in ("A", "B", "B − A")))
         self.table = TextTable(tr("two sessions compared"), head)
@@ -38,7 +38,8 @@ class ComparedView(QWidget):
     def show_rows(self, rows: Sequence[ComparedRow], sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
         there = bool(sessions[1])
-        self.words.show_whole(f"A: {sessions[0]}   B: {sessions[1]}" if there else tr("No second session is open."))
+        named = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
+        say(self.words, named if there else tr("No second session is open."))
         self.table.setVisible(there)
         self.picture.setVisible(there)
         lines: list[tuple[str, ...]] = []

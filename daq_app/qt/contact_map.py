@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap
 
 from daq_app.qt.painted_widget import PaintedWidget
 from daq_app.qt.shapes import blank, lines
@@ -27,6 +27,7 @@ class ContactMap(PaintedWidget):
         self._trail: Array = np.empty((0, 2))
         self._touching = False
         self._direction = 0
+        self._words = (tr("distal"), tr("10 mm grid"), tr("proximal"))
         self.setMinimumSize(100, 60)
         self.setAccessibleName(tr("centre of pressure on the sample: nothing touches"))
 
@@ -56,8 +57,8 @@ class ContactMap(PaintedWidget):
             return
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         # +x of the face frame points away from the subject: up. +y then points to the subject's left.
-        x = self.width() / 2 - self._trail[:, 1] * per_mm
-        y = self.height() / 2 - self._trail[:, 0] * per_mm
+        x = self._middle().x() - self._trail[:, 1] * per_mm
+        y = self._middle().y() - self._trail[:, 0] * per_mm
         painter.setPen(QPen(QColor(MU), 2))
         for piece in lines(x, y):
             painter.drawPolyline(piece)
@@ -68,7 +69,17 @@ class ContactMap(PaintedWidget):
 
     def _per_mm(self) -> float:
         """Return how many pixels a millimetre has."""
-        return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - 2 * MARGIN) / ACROSS)
+        return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - self._words_width() - 2 * MARGIN) / ACROSS)
+
+    def _words_width(self) -> float:
+        """Return the width of the column of words at the right of the sample."""
+        metrics = QFontMetricsF(font(SMALL, self._scale))
+        return max(metrics.horizontalAdvance(words) for words in self._words) + 2 * MARGIN
+
+    def _middle(self) -> QPointF:
+        """Return where the middle of the face is: that of the widget, or as far left as the words need."""
+        room = self.width() - self._words_width() - MARGIN
+        return QPointF(min(self.width() / 2, room - ACROSS * self._per_mm() / 2), self.height() / 2)
 
     def draw_ground(self) -> QPixmap:
         """Return sample, grid, words and arrow."""
@@ -79,7 +90,7 @@ class ContactMap(PaintedWidget):
             return made
         painter = QPainter(made)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        middle = QPointF(self.width() / 2, self.height() / 2)
+        middle = self._middle()
         box = QRectF(0, 0, ACROSS * per_mm, ALONG * per_mm)
         box.moveCenter(middle)
         painter.setPen(QPen(QColor(t.line), 1))
@@ -87,12 +98,11 @@ class ContactMap(PaintedWidget):
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL, self._scale))
         painter.setPen(QColor(t.quiet))
-        beside = QRectF(0, box.top(), box.left() - 2 * MARGIN, box.height())
-        for edge, text in ((Qt.AlignmentFlag.AlignTop, tr("distal")), (Qt.AlignmentFlag.AlignBottom, tr("proximal"))):
-            painter.drawText(beside, Qt.AlignmentFlag.AlignRight | edge, text)
-        beside.moveLeft(box.right() + 2 * MARGIN)
-        low = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom | Qt.TextFlag.TextWordWrap
-        painter.drawText(beside, low, tr("10 mm grid"))
+        beside = QRectF(box.right() + 2 * MARGIN, box.top(), self.width() - box.right() - 2 * MARGIN, box.height())
+        places = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
+        if box.height() >= len(places) * painter.fontMetrics().height():
+            for place, text in zip(places, self._words, strict=True):
+                painter.drawText(beside, Qt.AlignmentFlag.AlignLeft | place, text)
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm

@@ -85,7 +85,7 @@ class FieldPlot(QWidget):
             self._named = len(fingers) > 1
             self.plot.name_curves(self._curves if self._named else (), (0.0, 0.0))
         self._here.setVisible(source != LINE)
-        self.plot.getPlotItem().setLabel("bottom", f"{axis}<br>{words}" if len(place) else words)
+        self.plot.name_across(f"{axis}<br>{words}" if len(place) else words)
         self.plot.setAccessibleName(f"{axis}: {words}")
         self._unit = "kPa" if source == RECEPTORS else field.unit.removesuffix("-")
 

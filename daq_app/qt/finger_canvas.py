@@ -24,6 +24,7 @@ SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
 STEP = 0.1  # of the picture's width that an arrow key moves it
 END_STEP = 0.2  # of `STEP`, by which an arrow key moves an end of a line
+LEAST_LINES = 2.2  # of words over a finger: with fewer of them the picture stays where it is
 NEAREST, FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
 # Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
@@ -49,7 +50,7 @@ class Sight(QObject):
         self.part: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None
         self.draws_line = False  # the mouse draws a line in place of moving the picture
-        self.lines = 2.2  # of words over each finger
+        self.words = ("",)  # over each finger
 
     def look_at(self, part: QRectF | None) -> None:
         """Show a part of the finger [mm]; None shows all of it."""
@@ -255,8 +256,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return QRectF(self._box.mapRectToScene(self._box.rect()))
 
     def _above(self) -> float:
-        """Return the height of the words [pixel]."""
-        return self.sight.lines * QFontMetricsF(self._font).height()
+        """Return the height of the words [pixel], the same over every finger."""
+        metrics, box = QFontMetricsF(self._font), QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
+        needed = (
+            metrics.boundingRect(box, int(Qt.TextFlag.TextWordWrap), words).height() for words in self.sight.words
+        )
+        return max(LEAST_LINES * metrics.height(), *needed)
 
     def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
         pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}

@@ -22,7 +22,7 @@ SHOWN = (-9.0, 9.0, -1.0, 13.0)  # left, right, below, above of what is drawn [m
 PART = 0.62  # of the height that the finger takes; the row has the rest
 # The colour map magma (van der Walt and Smith, 2015), from its light end to a fifth before its dark one.
 MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
-WORDS = 0.45  # of the height, at most, that a sentence takes
+ROW_LINES = 4.0  # of text, below which height the row is left out and the finger has all the room
 SHADES = 20
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
@@ -70,16 +70,20 @@ class FingerView(Painted):
             QColor(self.tokens.look if self._words.state in ("instead", "beyond", "failed") else self.tokens.quiet)
         )
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
-        box = QRectF(4, 0, self.width() - 8, self.height() * WORDS)
+        box = QRectF(4, 0, self.width() - 8, self.height())
         needed = painter.boundingRect(box, flags, self._words.words).height()
         painter.drawText(box, flags, self._words.words)
         # Three lines are always left to them, so that the picture stays where it is; a failure takes what it needs.
-        top = min(max(needed, 3.0 * painter.fontMetrics().height()), box.height()) + 4
+        line = painter.fontMetrics().height()
+        top = max(needed, 3.0 * line) + 4
         painter.setFont(font(SMALL, self._scale))
         room = self.height() - top
+        row = room * (1.0 - PART) if room * (1.0 - PART) >= ROW_LINES * line else 0.0
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        self._paint_finger(painter, QRectF(0, top, self.width(), room * PART))
-        self._paint_row(painter, QRectF(0, top + room * PART, self.width(), room * (1.0 - PART)))
+        if room - row >= line:
+            self._paint_finger(painter, QRectF(0, top, self.width(), room - row))
+        if row:
+            self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
         left, right, below, above = SHOWN
@@ -137,8 +141,6 @@ class FingerView(Painted):
         ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), tr("{row:g} mm distal", row=ROW[-1]))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
-        if plot.height() < 10:
-            return
         painter.setPen(QPen(QColor(self.tokens.line), 1))
         painter.drawLine(plot.bottomLeft(), plot.bottomRight())
         across = (ROW - ROW[0]) / (ROW[-1] - ROW[0])

@@ -3,17 +3,19 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QApplication, QFrame, QHBoxLayout, QWidget
+from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtWidgets import QApplication, QBoxLayout, QFrame, QHBoxLayout, QSizePolicy, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.languages import name_of
-from daq_app.qt.parts import Shortened, button, label, regrade, say
+from daq_app.qt.parts import button, label, regrade, say
 from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
+
+ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
 
 
 class Header(QWidget):
@@ -22,31 +24,38 @@ class Header(QWidget):
     def __init__(self, tokens: Tokens, scale: float) -> None:
         """Show no session."""
         super().__init__()
-        self._heading = Shortened("title")
+        self._heading, self._device = label("", "title", wrap=True), label("", "quiet", wrap=True)
+        self._language = label("", "quiet")
+        for wrapped in (self._heading, self._device):
+            policy = wrapped.sizePolicy()
+            policy.setHorizontalPolicy(QSizePolicy.Policy.Ignored)  # they share the room there is
+            wrapped.setSizePolicy(policy)
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._simulated.setVisible(False)
         self._lamp = Lamp(tokens, tr("recording"))
         self._words = label(tr("not recording"), "title")
         self._saved = label("", "quiet")
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(GRID, 0, GRID, 0)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._heading, 3)
-        layout.addWidget(self._simulated)
-        layout.addSpacing(GRID)
-        layout.addWidget(self._lamp)
-        layout.addWidget(self._words)
-        layout.addWidget(self._saved)
-        self._device, self._language = Shortened("quiet"), label("", "quiet")
-        layout.insertWidget(1, self._device, 2)
-        layout.insertWidget(2, self._language)
+        subject, lamp = QHBoxLayout(), QHBoxLayout()
+        subject.addWidget(self._heading, 3)
+        subject.addWidget(self._device, 2)
+        subject.addWidget(self._language)
+        lamp.addStretch(1)
+        for part in (self._simulated, self._lamp, self._words, self._saved):
+            lamp.addWidget(part)
+        self._one_row = round(ONE_ROW * scale)
+        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
+        self._rows.setContentsMargins(GRID, 0, GRID, 0)
+        for row, stretch in ((subject, 1), (lamp, 0)):
+            row.setSpacing(GRID)
+            self._rows.addLayout(row, stretch)
+        self._rows.setSpacing(GRID)
         self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
 
     def show_view(self, view: View) -> None:
         """Show the top line."""
-        self._heading.show_whole(view.heading)
-        self._device.show_whole(f"{view.bench.name}: {view.bench.lamp_words}")
+        say(self._heading, view.heading)
+        say(self._device, f"{view.bench.name}: {view.bench.lamp_words}")
         say(self._language, name_of(view.subject.language), tr("language that the subject reads"))
         self._simulated.setVisible(view.simulated is not None)
         self._simulated.setToolTip(view.simulated or "")
@@ -59,6 +68,12 @@ class Header(QWidget):
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
         self._lamp.set_tokens(tokens)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Put the lamp under the subject where there is no room beside it."""
+        super().resizeEvent(event)
+        wide = self.width() >= self._one_row
+        self._rows.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
 
 
 class Notice(QFrame):

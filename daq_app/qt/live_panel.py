@@ -251,7 +251,7 @@ class LivePanel(QFrame):
         for row, (plot, stretch) in enumerate(zip((*self.plots[:3], self._model_plot), (3, 2, 2, 2), strict=True)):
             grid.addWidget(plot, row, 0)
             grid.setRowStretch(row, stretch)
-        side.addWidget(self.finger, 5)
+        side.addWidget(self.finger, 7)
         side.addWidget(self.map, 3)
         for plot in self.plots[3:]:
             side.addWidget(plot, 2)

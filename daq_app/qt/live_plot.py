@@ -23,6 +23,7 @@ from daq_app.wording import tr, tr_noop
 Array = NDArray[np.float64]
 
 AXIS_WIDTH = 52  # the same for all, so that their times stand under each other [before the font's scale]
+LEAST = 36  # height that holds the name and the times under it, likewise
 SAMPLE = 14  # length of the piece of line before a curve's name, likewise
 DASHES = 45  # times two thirds of a dash in the stretch that is shown
 FAR = 1e4  # a value so many pixels away is as good as any beyond it
@@ -54,7 +55,7 @@ class LivePlot(PaintedWidget):
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
         self._words = {kind: QStaticText(tr(kind)) for kind in tr_noop(("onset", "lift"))}
-        self.setMinimumSize(40, 32)
+        self.setMinimumSize(40, round(LEAST * type_scale))
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
     def show_seconds(self, seconds: float) -> None:
@@ -131,8 +132,12 @@ class LivePlot(PaintedWidget):
     def _paint_values(self, painter: QPainter, inside: QRectF) -> None:
         line = painter.fontMetrics().height()
         low, high = self._reach()
-        for value in ticks(self._scale.low, self._scale.high, inside.height() / line):
-            y = inside.bottom() - (value - low) * inside.height() / (high - low)
+        per_unit = inside.height() / (high - low)
+        above, below = (self._scale.high - high) * per_unit, (self._scale.low - low) * per_unit
+        moved = max(line / 2.0 - inside.top() + above, inside.bottom() - below + line / 2.0 - self.height(), 0.0)
+        room = (inside.height() + above - below - 2.0 * moved) / line  # the numbers at the edges are moved inside
+        for value in ticks(self._scale.low, self._scale.high, room):
+            y = inside.bottom() - (value - low) * per_unit
             faint = QColor(self.tokens.line)
             faint.setAlpha(110)
             painter.setPen(fine(faint))
@@ -154,7 +159,7 @@ class LivePlot(PaintedWidget):
                 continue
             text = f"{_number(value)} s" if value else self._end
             width = metrics.horizontalAdvance(text)
-            left = min(max(x - width / 2.0, 0.0), self.width() - width - 1)
+            left = min(max(x - width / 2.0, inside.left() - 3), self.width() - width - 1)
             if value and left + width > end:
                 continue
             painter.setPen(QColor(self.tokens.quiet))
@@ -205,8 +210,10 @@ class LivePlot(PaintedWidget):
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
             if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
-                left = start - words.size().width() - 3 if onset else start + 3
-                painter.drawStaticText(QPointF(left, inside.top() + line), words)
+                width = words.size().width()
+                left = start - width - 3 if onset else start + 3
+                if inside.left() <= left <= inside.right() - width:
+                    painter.drawStaticText(QPointF(left, inside.top() + line), words)
 
     def _colour(self, name: str) -> str:
         return name if name.startswith("#") else str(getattr(self.tokens, name))

@@ -8,10 +8,10 @@ from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QVBoxLayout,
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
-from daq_app.analyst.field_list import automatic_range
+from daq_app.analyst.field_list import FIELD_ERRORS, automatic_range
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.seen import common_range, film_words, finger_words, other_finger, shown_film, was_tried
-from daq_app.analyst.shown import scene_table, session_pictures
+from daq_app.analyst.shown import greatest_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
 from daq_app.qt.field_bar import OWN, FieldBar
@@ -19,7 +19,7 @@ from daq_app.qt.field_plot import LINE, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
-from daq_app.qt.parts import Shortened, Wrapped, button, choice
+from daq_app.qt.parts import Wrapped, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import Tokens
@@ -50,7 +50,8 @@ class ModelColumn(QWidget):
         self.finger = FingerCanvas(tokens, scale)
         self.other = FingerCanvas(tokens, scale, self.finger.sight)  # of the session that is compared
         self.other.hide()
-        self.fields, self.plot, self.probe = FieldBar(), FieldPlot(tokens), Shortened("quiet")
+        self.fields, self.plot = FieldBar(), FieldPlot(tokens)
+        self.probe, self.errors = Wrapped("quiet", keeps_room=True), Wrapped("quiet")
         self.fields.changed.connect(self._paint)
         self.plot.changed.connect(self._paint)
         self.plot.draw.toggled.connect(self._draw_line)
@@ -73,6 +74,7 @@ class ModelColumn(QWidget):
         self.player = TransportBar(tr("the history"), tells_time=False)
         self.player.moved.connect(self._moved)
         self.why = Wrapped("value", "look")
+        self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
         self.which.activated.connect(lambda: self._show_session())
         self.compared = ComparedView(self.other_wanted.emit, self._save)
@@ -127,7 +129,10 @@ class ModelColumn(QWidget):
 
     def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
         assert state.report is not None  # nothing is compared before this session is open
-        self.compared.show_rows(compared(state.report, other.report), (state.report.session, other.report.session))
+        first, second = (
+            " · ".join(filter(None, (one.session, greatest_errors(one)))) for one in (state.report, other.report)
+        )
+        self.compared.show_rows(compared(state.report, other.report), (first, second))
         self.both.setChecked(True)
         self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
@@ -179,9 +184,10 @@ class ModelColumn(QWidget):
         common = common_range(state, field)
         ends = own if self.fields.mode == OWN or (lost and own[1] > common[1]) else common
         look = Look(field, self.fields.range(ends), self.near.isChecked(), self.mesh.isChecked(), lost)
-        self.finger.sight.lines = 3.2 if other_words else 2.2
         pair = ((self.finger, finger, f"A  {words}"), (self.other, other, f"B  {other_words}"))
-        for canvas, one, said in pair if other_words else ((self.finger, finger, words),):
+        drawn = pair if other_words else ((self.finger, finger, words),)
+        self.finger.sight.words = tuple(said for _, _, said in drawn)
+        for canvas, one, said in drawn:
             frame, parts = (None, NO_PARTS) if one is None else (one.frame, one.parts)
             canvas.show_frame(frame, parts, said, look if canvas is self.finger else replace(look, lost=None), shown)
         self.other.setVisible(bool(other_words))
@@ -204,7 +210,7 @@ class ModelColumn(QWidget):
         """Say what both fingers have at a place [mm]."""
         canvases = [self.finger, *([self.other] if self.other.isVisible() else [])]
         said = [] if place is None else [canvas.words_at(place) for canvas in canvases]
-        self.probe.show_whole("  |  ".join(filter(None, said)))
+        self.probe.show_text("  |  ".join(filter(None, said)))
 
     def _moved(self, at: int) -> None:
         self._at = at
@@ -298,6 +304,7 @@ class ModelColumn(QWidget):
         layout.addLayout(fingers, 3)
         layout.addWidget(self.probe)
         layout.addWidget(self.plot, 1)
+        layout.addWidget(self.errors)
         layout.addWidget(self.why)
         layout.addLayout(course)
         layout.addLayout(bar)

@@ -34,44 +34,20 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     return made
 
 
-class Shortened(QLabel):
-    """A label that ends in dots where there is no room for all of it, and says the whole to screen readers."""
-
-    def __init__(self, role: str) -> None:
-        """Show nothing."""
-        super().__init__()
-        self._whole = ""
-        self.setProperty("role", role)
-        self.setTextFormat(Qt.TextFormat.PlainText)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-
-    def show_whole(self, text: str) -> None:
-        """Show as much of a text as there is room for."""
-        if text != self._whole:
-            self._whole = text
-            self.setToolTip(text)
-            self.setAccessibleName(text)
-            self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Fit the text anew."""
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        self.setText(self.fontMetrics().elidedText(self._whole, Qt.TextElideMode.ElideRight, max(self.width(), 1)))
-
-
 class Wrapped(QLabel):
-    """A label of as many lines as its text needs at the width it has.
+    """A label of as many lines as its text needs at the width it has, a long path too.
 
     What it stands in is not asked for a height by its width: where that is scrolled it would be made as high as it
     would like to be, not as there is room.
     """
 
-    def __init__(self, role: str, grade: str = "") -> None:
-        """Show nothing."""
+    def __init__(self, role: str, grade: str = "", *, keeps_room: bool = False) -> None:
+        """Show nothing; one that `keeps_room` has at least a line, and never less than it once needed at its width.
+
+        So what stands around words that come and go does not move.
+        """
         super().__init__()
+        self._keeps_room, self._least = keeps_room, 1
         self.setProperty("role", role)
         self.setProperty("grade", grade)
         self.setTextFormat(Qt.TextFormat.PlainText)
@@ -80,10 +56,12 @@ class Wrapped(QLabel):
 
     def show_text(self, text: str) -> None:
         """Show a text; none of it takes no room."""
-        if text != self.text():
-            self.setText(text)
+        shown = text.replace("/", "/\u200b")  # where a line may end
+        if shown != self.text():
+            self.setText(shown)
+            self.setAccessibleName(text)
             self._fit()
-        self.setVisible(bool(text))
+        self.setVisible(self._keeps_room or bool(text))
 
     def hasHeightForWidth(self) -> bool:  # noqa: N802  Qt's name
         """Say that its height is its own affair."""
@@ -92,10 +70,15 @@ class Wrapped(QLabel):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Take the height for another width."""
         super().resizeEvent(event)
-        self._fit()
+        if event.size().width() != event.oldSize().width():
+            self._least = self.fontMetrics().height() if self._keeps_room else 1
+            self._fit()
 
     def _fit(self) -> None:
-        self.setFixedHeight(max(self.heightForWidth(max(self.width(), 60)), 1))
+        needed = max(self.heightForWidth(max(self.width(), 60)), self._least)
+        if self._keeps_room:
+            self._least = needed
+        self.setFixedHeight(needed)
 
 
 def button(text: str, name: str, does: Callable[[], object], role: str = "") -> QPushButton:

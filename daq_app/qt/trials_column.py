@@ -8,9 +8,9 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.shown import marks_of, points, row_words
+from daq_app.analyst.shown import greatest_errors, marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
-from daq_app.qt.parts import choice, label
+from daq_app.qt.parts import Wrapped, choice, label
 from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
@@ -38,6 +38,7 @@ class TrialsColumn(QWidget):
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
             self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
         self.responses.activated.connect(self._respond)
+        self.errors = Wrapped("quiet")
         self.relation, self.points = self._relation()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -45,6 +46,7 @@ class TrialsColumn(QWidget):
         layout.addWidget(self.list, 3)
         layout.addWidget(label(tr("At the plan's depth, against the score"), "section"))
         layout.addWidget(self.responses)
+        layout.addWidget(self.errors)
         layout.addWidget(self.relation, 2)
 
     def show_state(self, state: AnalystState) -> None:
@@ -65,6 +67,7 @@ class TrialsColumn(QWidget):
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {told}".rstrip())
         self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
         self.list.blockSignals(False)
+        self.errors.show_text(greatest_errors(state.report, state.response))
         ring = pg.mkPen(QColor(self._tokens.text))
         self.points.setData(
             [

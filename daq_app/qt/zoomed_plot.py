@@ -5,7 +5,7 @@ from typing import Any
 
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QColor, QFont, QKeyEvent, QMouseEvent
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent
 
 from daq_app.qt.parts import label
 from daq_app.qt.remembered import type_scale
@@ -53,6 +53,13 @@ class ZoomedPlot(pg.PlotWidget):
         item.hideButtons()
         for side in ("left", "bottom"):
             style_axis(item.getAxis(side), tokens, font(SMALL, scale))
+
+    def name_across(self, words: str) -> None:
+        """Name the horizontal axis in one or two lines, under its numbers."""
+        axis: Any = self.getPlotItem().getAxis("bottom")
+        axis.setLabel(words)
+        above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
+        axis.setHeight(round(above + axis.label.boundingRect().height()))
 
     def name_curves(self, curves: Sequence[Any], corner: tuple[float, float] = (0.5, 1.0)) -> None:
         """Name curves, each beside a piece of its line; `corner` is where, from 0, 0 at the top left to 1, 1."""

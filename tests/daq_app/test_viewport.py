@@ -46,7 +46,7 @@ def test_a_linear_field_is_read_exactly_at_every_place_and_along_every_line():
 
 def test_the_probe_names_field_unit_place_and_tissue():
     words = probe_words(frame(), PARTS, BY_NAME["sed"], 3.5, 2.0)
-    assert words == "SED 5 kPa; mesh, model: no estimate · x 3.500 mm, y 2.000 mm · dermis"
+    assert words == "SED 5 kPa · x 3.500 mm, y 2.000 mm · dermis"
     assert probe_words(frame(), PARTS, BY_NAME["sed"], -1.0, 2.0) == "x −1.000 mm, y 2.000 mm · no tissue"
 
 
@@ -60,7 +60,7 @@ def test_a_finger_without_triangles_has_no_field_anywhere():
 def test_a_strain_has_no_unit_and_a_negative_number_a_minus():
     strained = frame(principal_strain_least=np.full(5, -0.125))
     words = probe_words(strained, PARTS, BY_NAME["principal_strain_least"], 2.0, 0.5)
-    assert words == "least principal strain −0.125; mesh, model: no estimate · x 2.000 mm, y 0.500 mm · epidermis"
+    assert words == "least principal strain −0.125 · x 2.000 mm, y 0.500 mm · epidermis"
 
 
 def test_the_field_along_the_skin_is_that_of_the_skin_s_own_nodes():

@@ -22,7 +22,6 @@ from PySide6.QtWidgets import (
 from daq_app import wording
 from daq_app.cli.verbs.translate import window_texts
 from daq_app.qt import remembered
-from daq_app.qt.parts import Shortened
 from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
 
 pytestmark = pytest.mark.qt
@@ -55,8 +54,6 @@ def texts_of(widget):
     """Return every text of a widget that is seen or read out."""
     yield from (widget.accessibleName(), widget.accessibleDescription(), widget.toolTip())
     match widget:
-        case Shortened():
-            pass  # its name is the whole of it
         case QLabel() | QAbstractButton():
             yield widget.text()
         case QLineEdit():
