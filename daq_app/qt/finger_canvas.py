@@ -50,7 +50,7 @@ class Sight(QObject):
         self.part: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None
         self.draws_line = False  # the mouse draws a line in place of moving the picture
-        self.words = ("",)  # over each finger
+        self.words: tuple[str, ...] = ("",)  # over each finger
 
     def look_at(self, part: QRectF | None) -> None:
         """Show a part of the finger [mm]; None shows all of it."""
