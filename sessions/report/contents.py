@@ -65,9 +65,11 @@ class Experiment:
     answers: tuple[Answers, ...]
     score_relation: Relation | None  # `response` [MPa or -] against mean score; None where one of the two is missing
     index_relation: Relation | None  # `response` against index
+    own_relation: Relation | None = None  # `response` against the scores of whoever made the strokes, one of several
     rivals: tuple[Rival, ...] = ()  # the SED first, and what else follows the mean scores
     paths: tuple[PathFinding, ...] = ()  # the first of them along many paths of the analysis, where they were asked for
     psychometric: Psychometric | None = None  # of comparisons with a standard, where the block has one
+    own_scores: Mapping[int, float] = field(default_factory=dict[int, float])  # of that subject, by index
     response: str = "sed"  # the quantity at the ending whose relations these are, one of `solver.quantities`
 
 

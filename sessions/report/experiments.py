@@ -14,7 +14,7 @@ from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.rivals import FIELDS, GIVEN, MODEL, NAMES, RESPONSES, rivals_of_means
 from sessions.statistics.scales.constant_stimuli import comparison, function_of
 from sessions.statistics.scales.psychometric import Psychometric
-from sessions.statistics.scores import MeanScore, Relation, ScoreTable, mean_scores, relation, score_matrix
+from sessions.statistics.scores import Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.strokes import Analysis
 from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.friction import rule_for
@@ -78,9 +78,8 @@ def experiments(
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
     number was told.
     """
-    means = mean_scores(tables)
     return tuple(
-        _experiment(block, means, tables, numbers, paths or {}, law, response)
+        _experiment(block, plan.subject, tables, numbers, paths or {}, law, response)
         for block in plan.blocks
         if block.phase == "main"
     )
@@ -88,7 +87,7 @@ def experiments(
 
 def _experiment(
     block: Block,
-    means: Sequence[MeanScore],
+    subject: str,
     tables: Sequence[ScoreTable],
     numbers: Quantities,
     paths: Mapping[int, Values],
@@ -97,8 +96,10 @@ def _experiment(
 ) -> Experiment:
     descriptor = block.trials[0].stimulus.descriptor
     indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
-    told = tuple(mean for mean in means if mean.descriptor == descriptor and mean.index in indices)
-    score_of = {mean.index: mean.mean for mean in told}
+    means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
+    score_of = {mean.index: mean.mean for mean in means}
+    answers = score_matrix(tables, descriptor)
+    own = {index: score for index, score in answers.get(subject, {}).items() if len(answers) > 1 and index in indices}
     series = {
         name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
         for name, values in numbers.items()
@@ -113,13 +114,14 @@ def _experiment(
         indentation=block.indentation,
         scale_ends=block.scale_ends,
         indices=indices,
-        scores=told,
+        scores=means,
         answers=tuple(
-            Answers(subject, tuple(given.get(index) for index in indices))
-            for subject, given in score_matrix(tables, descriptor).items()
+            Answers(subject, tuple(given.get(index) for index in indices)) for subject, given in answers.items()
         ),
         score_relation=_related(score_of, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
+        own_relation=_related(own, predicted),
+        own_scores=own,
         rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
         response=response,
         paths=path_findings(

@@ -107,6 +107,24 @@ def test_scores_of_other_visits_are_joined_by_subject(session):
     assert [a.subject for a in made.experiments[0].answers] == ["P01", "P02", "P03"]
 
 
+def test_the_scores_of_whoever_made_the_strokes_stand_beside_the_mean_of_all(session, predicted):
+    recording, analysis, _ = session
+    own = score_table(recording)
+    alone = findings(recording, analysis, predicted[0], scores=[own]).experiments[0]
+    assert (alone.own_relation, alone.own_scores) == (None, {})  # the mean is the own one
+    more = findings(recording, analysis, predicted[0], scores=[own, visit("P02", 40.0)])
+    here = more.experiments[0]
+    given = {s.index: s.score for s in own.scores if s.descriptor == "stickiness"}
+    seds = {p.index: p.sed for p in more.predictions if p.experiment == here.name}
+    both = [(given[index], seds[index]) for index in given]
+    assert here.own_scores == given
+    assert here.own_relation.pearson == pytest.approx(np.corrcoef(np.transpose(both))[0, 1])
+    rows = [row[0].text for row in relation_table(more).groups[0].rows]
+    assert rows == ["mean score", "own score", "index"]
+    panel = relation_panel(here, [p for p in more.predictions if p.experiment == here.name], simulated=True)
+    assert {row[0]: row[panel.header.index("own score")] for row in panel.rows} == given
+
+
 def test_a_simulated_session_says_so_in_its_first_line(report):
     assert report.simulated
     assert report.head.startswith("SIMULATED: the transducer and the subject")

@@ -120,9 +120,9 @@ def _responses(report: Report) -> Plate:
 def _relations(report: Report) -> Plate:
     label = shown_response(report.response).label
     caption = (
-        f"Predicted {label} against mean score; each point is a stimulus with its index. Across: 95 % t interval. "
-        f"Upright: error of each {label} from the mesh, which all share. Line: least squares. r: Pearson's, interval "
-        f"by Fisher's z. Range: greatest less least, and its share of their middle. Beside it: from 0.{_model(report)}"
+        f"Predicted {label} against mean score, with the stimulus's index. Circles: scores of whoever made the "
+        f"strokes. Across: 95 % t interval. Upright: error of the mesh. Line: least squares. r: Pearson's, Fisher's z "
+        f"interval. Range: greatest less least, and its share of their middle.{_model(report)}"
     )
     panels = [
         relation_panel(e, [p for p in report.predictions if p.experiment == e.name], simulated=report.simulated)

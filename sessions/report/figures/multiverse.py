@@ -13,9 +13,9 @@ from sessions.statistics.multiverse import CHOICES, TOLD, PathFinding, by_choice
 
 CAPTION = (
     "Correlation of the predicted response with scores along every path of the analysis. Above: how many paths come "
-    "to which correlation; the dashed line is the usual path, which every other number here went. Below: what each "
-    "choice does, all other choices varied: line from the least to the greatest, upright mark at the median; a filled "
-    "diamond stands beside the usual choice. Medians that lie apart say that a choice matters."
+    "to which correlation; dashed: the usual path. Below: what each choice does, all others varied: line from the "
+    "least to the greatest, mark at the median, filled diamond at the usual choice. Medians that lie apart say that a "
+    "choice matters."
 )
 _BINS = 24
 

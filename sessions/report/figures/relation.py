@@ -32,6 +32,10 @@ def relation_panel(
     for mean, found in points:
         expected = shown.factor * (found[0] if related is None else _on_line(related, mean.mean))
         _point(figure_sheet, mean, found, shown, above=shown.factor * found[0] >= expected, rising=rising)
+        own = experiment.own_scores.get(mean.index)
+        if own is not None:
+            text = f"index {mean.index}: own score {own:.1f}, {shown.label} {shown.told(shown.factor * found[0])}"
+            axes.plot(own, shown.factor * found[0], "o", color=GREEN, mfc="none", ms=4, gid=figure_sheet.note(text))
     if related is not None:
         ends = [min(m.mean for m, _ in points), max(m.mean for m, _ in points)]
         axes.plot(ends, [shown.factor * _on_line(related, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
@@ -59,10 +63,14 @@ def relation_panel(
         "mean score",
         "95 % interval low",
         "95 % interval high",
+        "own score",
         f"{shown.label} [{shown.kept_unit}]",
         f"error estimate of {shown.label} [-]",
     )
-    rows = tuple((m.index, m.mean, m.low, m.high, found[0], _relative(found)) for m, found in points)
+    rows = tuple(
+        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), found[0], _relative(found))
+        for m, found in points
+    )
     return Panel(name, title, svg(figure_sheet, name, title, simulated=simulated), header, rows)
 
 

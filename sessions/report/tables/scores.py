@@ -68,7 +68,7 @@ def relation_table(report: Report) -> Table | None:
     notes = Notes()
     groups: list[Group] = []
     for e in report.experiments:
-        related = [("mean score", e.score_relation), ("index", e.index_relation)]
+        related = [("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation)]
         groups.append(Group(e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
     columns = (
         f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
@@ -76,9 +76,9 @@ def relation_table(report: Report) -> Table | None:
     )
     caption = (
         f"Relation of the predicted {shown.label} ({report.model}) to scores and to the stimuli's indices. "
-        "The forces are those of one subject: a case study. Intervals: Fisher's z, for rho as by Bonett and Wright "
-        "(2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its t interval. "
-        "Last column: r when the stimulus of that index is left out."
+        "The forces are those of one subject, whose scores are the own ones. Intervals: Fisher's z, for rho as by "
+        "Bonett and Wright (2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its "
+        "t interval. Last column: r when the stimulus of that index is left out."
     )
     return table("table-relation", caption, columns, groups, notes)
 
