@@ -246,7 +246,7 @@ def test_the_numbers_of_a_picture_are_on_the_page_itself(made, drawn):
     link = re.search(r'download="relation-stickiness.csv" href="data:text/csv;charset=utf-8;base64,([^"]*)"', made)
     rows = list(csv.reader(base64.b64decode(link[1]).decode().splitlines()))
     assert rows[0][0].startswith("# SIMULATED")
-    assert rows[2:] == [[str(value) for value in row] for row in panel.rows]
+    assert rows[2:] == [["" if value is None else str(value) for value in row] for row in panel.rows]
 
 
 @pytest.fixture(scope="module")
