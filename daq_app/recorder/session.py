@@ -134,7 +134,6 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
             writer,
             operator,
             bench.lent() if prepared.plan.forces else None,
-            prepared.clock,
             resumed=prepared.resumed,
             stop=operator.stop,
             progress=operator.progress,

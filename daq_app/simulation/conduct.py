@@ -47,7 +47,7 @@ def conduct(
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
         console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
-    end = run_session(plan, writer, operator, transducer, clock, settings=run, progress=show)
+    end = run_session(plan, writer, operator, transducer, settings=run, progress=show)
     if end.cause not in RESUMABLE:
         seal(writer.folder)
     return end

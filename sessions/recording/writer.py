@@ -55,7 +55,7 @@ class SessionWriter:
         self._connection = connection
         self._path = path
         self._identities = identities(path)
-        self._clock = clock
+        self.clock = clock
         self._blocks: list[ReadingBlock] = []  # handed over, not yet safe
         self._events: list[LoggedEvent] = []
         self._block_rows = 0
@@ -177,7 +177,7 @@ class SessionWriter:
         if len(block):
             self._blocks.append(block)
             self._readings += len(block)
-        if self._clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
+        if self.clock.now_ns() - self._acknowledged.time_ns >= COMMIT_EVERY_NS or self.waiting >= LARGEST_BLOCK:
             self.commit()
 
     def event(
@@ -197,7 +197,7 @@ class SessionWriter:
         self._check()
         event = LoggedEvent(
             self._event_count + 1,
-            self._clock.now_ns() if time_ns is None else time_ns,
+            self.clock.now_ns() if time_ns is None else time_ns,
             kind,
             trial,
             self._readings,
@@ -217,7 +217,7 @@ class SessionWriter:
         it is written to a new folder, which is `folder` from then on, and `must_end` tells. Raises RecordingError.
         """
         self._check()
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         try:
             rows = self._write_waiting()
         except sqlite3.Error as error:

@@ -328,11 +328,9 @@ def _run(
 
 
 def _run_part(plan: SessionPlan, player: _Player, writer: _Rewriter, resumed: Resumed | None) -> None:
-    transducer, clock, settings = player if plan.forces else None, player.clock, player.settings
+    transducer, settings = player if plan.forces else None, player.settings
     with suppress(_CutShort, _Again):  # as the part ends
-        end = run_session(
-            plan, writer, player, transducer, clock, settings=settings, resumed=resumed, stop=player.go_on
-        )
+        end = run_session(plan, writer, player, transducer, settings=settings, resumed=resumed, stop=player.go_on)
         if end.cause == "stopped" and not player.done:
             raise Stopped
 

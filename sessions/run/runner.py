@@ -92,14 +92,13 @@ def run_session(
     writer: SessionWriter,
     operator: Operator,
     transducer: Transducer | None,
-    clock: Clock,
     *,
     settings: RunnerSettings | None = None,
     resumed: Resumed | None = None,
     stop: Callable[[], Ending | None] = lambda: None,
     progress: Callable[[Status], None] = lambda _: None,
 ) -> SessionEnd:
-    """Run the session to its end, record all of it, and close the writer.
+    """Run the session to its end on the writer's clock, record all of it, and close the writer.
 
     The session ends when the machine does, when `stop` gives a reason or Ctrl-C is pressed, and when the transducer is
     lost: each time with a written end that names the reason. With `resumed` a session that was cut short goes on. The
@@ -109,7 +108,7 @@ def run_session(
     if plan.forces != (transducer is not None):
         raise ValueError("a visit with forces needs a transducer, and one without has none")
     with interruptions() as interrupted:
-        run = _Run(plan, writer, operator, transducer, clock, settings or RunnerSettings(), progress)
+        run = _Run(plan, writer, operator, transducer, writer.clock, settings or RunnerSettings(), progress)
         if resumed is not None:
             run.go_on(resumed)
         return run.to_the_end(interrupted, stop)

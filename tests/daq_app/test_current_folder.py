@@ -22,7 +22,6 @@ from solver.verification import processes
 
 PROGRAM = Path(__file__).parents[2]
 OURS = {"daq_app", "drivers", "sessions", "simulators", "solver"}
-NAMES = sorted(({*sys.stdlib_module_names, *packages_distributions()} | OURS) - {"__main__"})
 LATE = ("argparse", "drivers", "json", "numpy", "random", "sqlite3", "solver")  # Python itself has no need of them
 DEADLINE = 300.0  # loops that were never compiled on this machine take a minute or two [s]
 
@@ -32,7 +31,7 @@ def malicious(tmp_path, monkeypatch):
     """A current folder with a module of every name there is; each leaves a file beside it when it is run."""
     folder = tmp_path / "downloads"
     folder.mkdir()
-    for name in NAMES:
+    for name in ({*sys.stdlib_module_names, *packages_distributions()} | OURS) - {"__main__"}:
         if name.isidentifier():
             text = f"open({str(tmp_path / 'run')!r}, 'a').write({name!r} + ' ')\nraise SystemExit(77)\n"
             (folder / f"{name}.py").write_text(text)

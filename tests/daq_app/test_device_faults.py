@@ -55,7 +55,7 @@ def recorded(tmp_path, monkeypatch):
             def stop():
                 return ("stopped", "the test is over") if clock.now_ns() > until else None
 
-            end = run_session(planned, writer, Nobody(), bench.transducer, clock, stop=stop)
+            end = run_session(planned, writer, Nobody(), bench.transducer, stop=stop)
         return folder, end
 
     return record

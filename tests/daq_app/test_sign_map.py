@@ -69,7 +69,7 @@ def test_what_is_kept_is_not_computed_again_and_a_line_cut_short_is(tmp_path, mo
 
 def test_the_verb_prints_signs_map_shares_and_indices(tmp_path, capsys):
     keep = str(tmp_path / "keep.jsonl")
-    assert run(["sensitivity", "--samples", "2", "--keep", keep, "--json"]) == 0
+    assert run(["sensitivity", "--samples", "2", "--workers", "1", "--keep", keep, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["fingers"] == 28
     assert set(told["shares"]) == set(told["quantities"])

@@ -58,7 +58,7 @@ def record(folder, in_second_stroke):
         transducer.touches.append((clock.ns + 300_000_000, clock.ns + 1_300_000_000, NORMAL))
         return ()
 
-    run_session(short, writer, Hands(clock, transducer, {AskStroke: stroke}), transducer, clock)
+    run_session(short, writer, Hands(clock, transducer, {AskStroke: stroke}), transducer)
 
 
 def main():

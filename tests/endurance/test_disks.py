@@ -26,7 +26,7 @@ clock = SimulatedClock()
 folder = Path(sys.argv[1]) / "s"
 writer = SessionWriter.create(folder, PLAN, INFO, provenance(clock), clock=clock, reserve=RESERVE)
 device = StandIn(clock)
-end = run_session(PLAN, writer, Hands(clock, device), device, clock)
+end = run_session(PLAN, writer, Hands(clock, device), device)
 print(end.cause, end.readings, end.reason)
 shutil.copytree(folder, sys.argv[2])
 """

@@ -28,7 +28,7 @@ class OnADisk:
                 writer.safe = self.safe_events.extend
                 device = StandIn(clock)
                 self.end = run_session(
-                    PLAN, writer, Hands(clock, device), device, clock, progress=lambda status: self.told(status)
+                    PLAN, writer, Hands(clock, device), device, progress=lambda status: self.told(status)
                 )
             except RecordingError as error:
                 self.error = str(error)

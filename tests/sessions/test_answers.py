@@ -30,5 +30,5 @@ def test_the_plan_keeps_both_hands_and_leaves_them_open_where_nobody_stated_them
     stated = plan(PAPER, "S01", 3, forces=False, setting=VisitSetting(stroking_hand="right", answering_hand="left"))
     clock = SimulatedClock()
     writer = SessionWriter.create(tmp_path / "s", stated, None, provenance(clock), clock=clock)
-    run_session(stated, writer, Hands(clock), None, clock)
+    run_session(stated, writer, Hands(clock), None)
     assert Recording.open(tmp_path / "s").plan == stated

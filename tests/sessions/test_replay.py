@@ -62,7 +62,6 @@ def recorded(
         writer,
         hands(clock, device, instead),
         device,
-        clock,
         stop=lambda: ("stopped", "stopped by the user") if stop(device and device.sent) else None,
     )
     return Recording.open(folder)
@@ -392,7 +391,7 @@ def test_a_replayed_transducer_records_a_session_of_its_own(whole, tmp_path):
         def stroke(self, now, newtons=2.0):
             """Leave the stroking to the recording."""
 
-    end = run_session(planned, writer, Asking(clock, device), device, clock)
+    end = run_session(planned, writer, Asking(clock, device), device)
     again = Recording.open(tmp_path / "new")
     raw = whole.readings().raw
     assert end.readings > 0.9 * len(raw)

@@ -153,7 +153,7 @@ def test_a_visit_for_scores_only_has_no_readings_and_no_zero(tmp_path):
 def test_a_visit_with_forces_is_not_run_without_a_transducer(tmp_path):
     session = Session(tmp_path / "s")
     with pytest.raises(ValueError, match="needs a transducer"):
-        run_session(session.plan, session.writer, session.hands, None, session.clock)
+        run_session(session.plan, session.writer, session.hands, None)
     session.writer.close()
 
 

@@ -33,7 +33,7 @@ def session(request, tmp_path):
     clock = SimulatedClock()
     writer = SessionWriter.create(folder / "P01", planned, None, provenance(clock), subject_simulated=True, clock=clock)
     hands = Hands(clock, None, {AskScore: lambda _: [Scored(50.0)]})
-    run_session(planned, writer, hands, None, clock)
+    run_session(planned, writer, hands, None)
     seal(folder / "P01")
     return folder / "P01"
 

@@ -156,7 +156,7 @@ def scored_visit(folder, subject, *, sealed=True):
 
     path = folder / f"{subject}_scores"
     writer = SessionWriter.create(path, planned, None, provenance(clock), subject_simulated=True, clock=clock)
-    run_session(planned, writer, Hands(clock, None, {AskScore: judge}), None, clock)
+    run_session(planned, writer, Hands(clock, None, {AskScore: judge}), None)
     if sealed:
         seal(path)
     return path

@@ -27,7 +27,7 @@ class Session:
         self.folder = folder
 
     def run(self, **options):
-        self.end = run_session(self.plan, self.writer, self.hands, self.transducer, self.clock, **options)
+        self.end = run_session(self.plan, self.writer, self.hands, self.transducer, **options)
         return Recording.open(self.writer.folder)
 
 
@@ -49,5 +49,5 @@ def resume(folder, **transducer):
     at = resumption(recording.plan, recording.events)
     writer = SessionWriter.open(folder, told)
     resumed = Resumed(at, resumed_data(gap, device.info, {}), last)
-    end = run_session(recording.plan, writer, Hands(told, device), device, told, resumed=resumed)
+    end = run_session(recording.plan, writer, Hands(told, device), device, resumed=resumed)
     return end, Recording.open(folder)
