@@ -14,7 +14,7 @@ from daq_app.analyst.probe import Line, probe_words
 from daq_app.analyst.viewport import View
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
-from daq_app.qt.zoomed_plot import style_axis
+from daq_app.qt.zoomed_plot import name_axis, style_axis
 from daq_app.wording import tr
 
 pg: Any = pyqtgraph  # it has no types
@@ -24,6 +24,8 @@ SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
 STEP = 0.1  # of the picture's width that an arrow key moves it
 END_STEP = 0.2  # of `STEP`, by which an arrow key moves an end of a line
+LEAST = 110  # height of the finger, before the font's scale [px]
+BAR_LINES = 3.5  # of text: height of the colour bar
 LEAST_LINES = 2.2  # of words over a finger: with fewer of them the picture stays where it is
 NEAREST, FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
 # Black lines lie on the colours: magma begins a fifth above its dark end, and nought of a signed field is pale.
@@ -84,7 +86,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._shades = {signed: _shades(*what) for signed, what in MAPS.items()}
         self.setBackground(tokens.surface)
         self.setFrameShape(QFrame.Shape.NoFrame)
-        self.setMinimumSize(80, round(160 * scale))  # two stand beside each other
+        self._least = round(LEAST * scale)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setToolTip(
@@ -119,7 +121,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._bar.rounding = (high - low) / 100.0
         self._bar.setColorMap(pg.ColorMap(np.linspace(0.0, 1.0, SHADES), self._shades[look.field.signed]))
         self._bar.setLevels(look.range)
-        self._bar.getAxis("bottom").setLabel(look.field.axis)
         self._bar.setVisible(frame is not None)
         self._place()
         self._probe()
@@ -236,13 +237,19 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def _place(self) -> None:
         """Show the part that is looked at, or all of it at the foot of the box."""
-        self.ci.layout.setContentsMargins(0.0, self._above(), 0.0, 0.0)
+        above, line = self._above(), QFontMetricsF(self._font).height()
+        self.setMinimumSize(80, round(above + BAR_LINES * line) + self._least)  # two stand beside each other
+        self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
+        axis: Any = self._bar.getAxis("bottom")
+        words = QFontMetricsF(self._font).horizontalAdvance(self._look.field.axis)
+        name_axis(axis, self._look.field.axis if words < self.width() else f"[{self._look.field.unit}]")
         part, here = self.sight.part, self._box.rect()
         if part is None and self._fits and here.height() > 1.0:
             boxes = np.array([whole_box(frame, self._look) for frame in self._fits])
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
-            right, above = boxes.max(axis=0)[[1, 3]].tolist()
-            shown = View.fitted((left, right, below, above), 0.0, 0.0, here.width(), here.height())
+            right, high = boxes.max(axis=0)[[1, 3]].tolist()
+            room = max(here.height() - line - 2.0, 1.0)  # over a line of words under the tractions
+            shown = View.fitted((left, right, below, high), 0.0, 0.0, here.width(), room)
             x0, x1, y0, y1 = shown.visible(0.0, 0.0, here.width(), here.height())
             part = QRectF(x0, y0, x1 - x0, y1 - y0)
         if part is not None:
@@ -268,7 +275,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         line = QFontMetricsF(self._font).height()
         made = pg.ColorBarItem(width=line - 4.0, orientation="h", colorMapMenu=False, **pens)
         style_axis(made.getAxis("bottom"), self._tokens, self._font)
-        self.ci.layout.setRowFixedHeight(1, 3.5 * line)  # colours, ticks and the field's name keep their place
+        self.ci.layout.setRowFixedHeight(1, BAR_LINES * line)  # colours, ticks and the field's name keep their place
         made.hide()
         made.sigLevelsChangeFinished.connect(self._choose_range)
         return made

@@ -20,7 +20,8 @@ from daq_app.wording import tr, tr_noop
 Array = NDArray[np.float64]
 
 ARROWS, LONGEST = 22, 1.5  # tractions at most, and the longest of them [mm]
-NEAR = (4.6, -2.6, 4.4)  # half width, below and above of the close view [mm]
+TRACTIONS = LONGEST + 0.4  # below the surface: the arrows, and the line of what the skin does [mm]
+NEAR = (4.6, 4.4)  # half width and height above the surface of the close view [mm]
 COARSE = 40.0  # area of a triangle on the screen above which it is shaded in four [pixel2]: its steps would be seen
 STYLES = {"slip": Qt.PenStyle.SolidLine, "cap": Qt.PenStyle.DashLine, "stick": Qt.PenStyle.DotLine}
 STATE_WORDS = {"slip": tr_noop("slips"), "cap": tr_noop("slips at the bound"), "stick": tr_noop("sticks")}
@@ -38,15 +39,18 @@ class Look:
 
 
 def whole_box(frame: Frame, look: Look) -> Box:
-    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm]."""
+    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm].
+
+    A line of words finds room under it.
+    """
     if not look.near:
         x, y = frame.nodes[:, 0], frame.nodes[:, 1]
-        return float(x.min()) - 0.5, float(x.max()) + 0.5, -3.2, float(y.max()) + 0.3
+        return float(x.min()) - 0.5, float(x.max()) + 0.5, -TRACTIONS, float(y.max()) + 0.3
     places: list[float] = frame.contact.x.tolist()
     touching = [x for x, state in zip(places, frame.contact.state, strict=True) if state != "open"]
     middle = (min(touching) + max(touching)) / 2.0 if touching else 0.0
-    half, below, above = NEAR
-    return middle - half, middle + half, below, above
+    half, above = NEAR
+    return middle - half, middle + half, -TRACTIONS, above
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +180,6 @@ class FingerPainter:
             painter.setPen(QPen(ink, 3.0, STYLES[state], Qt.PenCapStyle.FlatCap))
             painter.drawLine(QPointF(ends[0] - 1.5, level), QPointF(ends[-1] + 1.5, level))
             words = tr(STATE_WORDS[state])
-            if ends[-1] - ends[0] > painter.fontMetrics().horizontalAdvance(words):
-                box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
+            box = QRectF(ends[0], level + 2, ends[-1] - ends[0], painter.fontMetrics().height())
+            if box.width() > painter.fontMetrics().horizontalAdvance(words) and self.box.contains(box):
                 painter.drawText(box, Qt.AlignmentFlag.AlignHCenter, words)

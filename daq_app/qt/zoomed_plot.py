@@ -24,6 +24,13 @@ def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: AN
     axis.enableAutoSIPrefix(False)
 
 
+def name_axis(axis: Any, words: str) -> None:  # noqa: ANN401  pyqtgraph has no types
+    """Name an axis in its middle, where pyqtgraph leaves a new name beside it until the axis has another size."""
+    if words != axis.labelText:
+        axis.setLabel(words)
+        axis.resizeEvent()
+
+
 class ZoomedPlot(pg.PlotWidget):
     """A plot in the colours of a theme; `reset` shows all of it, `read` says what stands at a place across."""
 
@@ -57,7 +64,7 @@ class ZoomedPlot(pg.PlotWidget):
     def name_across(self, words: str) -> None:
         """Name the horizontal axis in one or two lines, under its numbers."""
         axis: Any = self.getPlotItem().getAxis("bottom")
-        axis.setLabel(words)
+        name_axis(axis, words)
         above = axis.style["tickTextOffset"][1] + QFontMetricsF(axis.style["tickFont"]).height()
         axis.setHeight(round(above + axis.label.boundingRect().height()))
 

@@ -204,7 +204,7 @@ def _greatest_effect(found: Prediction) -> str:
     """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
     known = {name: one["estimate"] for name, one in found.model["left_out"].items() if one["estimate"] is not None}
     name = max(known, key=lambda one: known[one], default="")
-    return name and f"{name} {100 * known[name]:.2g} % of the SED"
+    return name and f"{name} {float(f'{100 * known[name]:.2g}'):g} % of the SED"
 
 
 def _unsettled(

@@ -25,9 +25,11 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.analyst import messages as m
+from daq_app.analyst.field_list import FIELD_CHOICES
 from daq_app.analyst.state import chosen
 from daq_app.qt import remembered, tokens
 from daq_app.qt.analyst_window import AnalystWindow
+from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.languages import translator
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.menus import about_box
@@ -51,6 +53,7 @@ SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
 SCALES = [1.0, 1.5, 2.0]
 DOCUMENT_MARGIN = 4  # around the name of an axis [px]
 ROUNDING = 2  # by which Qt's own size of a button may fall short of its text; its padding is wider [px]
+LONGEST_FIELD = max(range(len(FIELD_CHOICES)), key=lambda at: len(FIELD_CHOICES[at].axis))
 MODEL_SAYS = (
     "PROVISIONAL  SED 12.34 kPa; mesh, model: no estimate · at the measured force, 2.1 mm deep · small strain",
     "No full solve at finite strain · shown live 11.98 kPa. The load path turns back before the force is reached. "
@@ -281,6 +284,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
             tabs = {1: window.stroke.tabs, 2: window.model.tabs}.get(column)
             if tabs is not None:
                 tabs.setCurrentIndex(at)
+            window.model.fields.which.setCurrentIndex(LONGEST_FIELD)
             settle(application)
             assert cut_off(window) == []
             assert cut_axes(window) == []
@@ -308,6 +312,13 @@ def cut_axes(window):
             room = axis.size().height() if side == "left" else axis.size().width()
             if axis.label.isVisible() and axis.label.boundingRect().width() > room + ROUNDING:
                 found.append((axis.labelText, axis.label.boundingRect().width(), room))
+    for canvas in window.findChildren(FingerCanvas):
+        axis = canvas._bar.getAxis("bottom")
+        place = axis.label.mapRectToParent(axis.label.boundingRect())
+        if canvas.isVisible() and (
+            place.left() < -DOCUMENT_MARGIN or place.right() > axis.size().width() + DOCUMENT_MARGIN
+        ):
+            found.append((axis.labelText, place, axis.size()))
     return found
 
 
