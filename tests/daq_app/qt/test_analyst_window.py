@@ -542,7 +542,8 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
 
 def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
     window.take(m.Filmed(chosen(window.state).key, film()))
-    application.processEvents()  # the columns have found their widths
+    for _ in range(5):  # the columns have found their widths
+        application.processEvents()
     ranges, show = set(), window.model._moved
     window.model._moved = lambda at: (show(at), ranges.add(window.model.finger._look.range))
     window.model.write_film(tmp_path / "film.gif")
