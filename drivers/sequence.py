@@ -26,7 +26,7 @@ class Accounted:
     kept: NDArray[np.intp]  # (k,) their positions in the batch
     sequence: NDArray[np.int64]  # (k,) their numbers, unwrapped; a missing number is a lost record
     counter: NDArray[np.int64]  # (k,) the device's counter, unwrapped and never running backwards
-    held: bool  # the batch's last record is undecided: put it at the head of the next batch
+    undecided: bool  # the batch's last record: put it at the head of the next batch
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ class SequenceAccount:
         With `end` no further batch will come, and nothing is held back.
         """
         if len(numbers) == 0:
-            return Accounted(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), held=False)
+            return Accounted(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), undecided=False)
         return self._on_the_line(numbers, counters, received_ns) or self._one_by_one(
             [_Record(*record) for record in zip(numbers.tolist(), counters.tolist(), received_ns, strict=True)], end
         )
@@ -94,13 +94,13 @@ class SequenceAccount:
         self.lost += int(sequence[-1]) - self._sequence - len(numbers)
         self._sequence, self._counter = int(sequence[-1]), int(counter[-1])
         self._last = _Record(int(numbers[-1]), int(counters[-1]), received_ns[-1])
-        return Accounted(np.arange(len(numbers)), sequence, counter, held=False)
+        return Accounted(np.arange(len(numbers)), sequence, counter, undecided=False)
 
     def _one_by_one(self, records: list[_Record], end: bool) -> Accounted:
         """Judge each record on its own."""
         kept: list[int] = []
         places: list[tuple[int, int]] = []
-        held: int | None = None
+        undecided: int | None = None
 
         def keep(position: int) -> None:
             kept.append(position)
@@ -109,29 +109,29 @@ class SequenceAccount:
         for position, record in enumerate(records):
             relation = "off" if self._last is None else self._relation(self._last, record)
             if relation == "off":
-                if held is None:
-                    held = position
+                if undecided is None:
+                    undecided = position
                     continue
-                relation = self._relation(records[held], record, learning=True)
+                relation = self._relation(records[undecided], record, learning=True)
                 if relation == "off":
-                    self._reject(records[held])
-                    held = position
+                    self._reject(records[undecided])
+                    undecided = position
                     continue
                 if relation in ("next", "frozen"):
-                    self._adopt(records[held])
-                    keep(held)
-                    held = None
+                    self._adopt(records[undecided])
+                    keep(undecided)
+                    undecided = None
                     self._learn(record)
-            elif held is not None:
-                self._reject(records[held])
-                held = None
+            elif undecided is not None:
+                self._reject(records[undecided])
+                undecided = None
             if self._move(record, relation):
                 keep(position)
-        if end and held is not None:
-            self._reject(records[held])
-            held = None
+        if end and undecided is not None:
+            self._reject(records[undecided])
+            undecided = None
         table = np.array(places, np.int64).reshape(-1, 2)
-        return Accounted(np.array(kept, np.intp), table[:, 0], table[:, 1], held=held is not None)
+        return Accounted(np.array(kept, np.intp), table[:, 0], table[:, 1], undecided=undecided is not None)
 
     def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
         """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""

@@ -28,11 +28,11 @@ class SimulatedBus(_Backend):
     def __init__(self, boxes: Sequence[LabJackU6Box]) -> None:
         """Put the boxes on the bus."""
         self._boxes = tuple(boxes)
-        self._held: dict[int, object] = {}  # by the box's place: the handle that claimed it
+        self._claims: dict[int, object] = {}  # by the box's place: the handle that claimed it
 
-    def held(self) -> int:
+    def claims(self) -> int:
         """Return how many converters somebody holds."""
-        return len(self._held)
+        return len(self._claims)
 
     def enumerate_devices(self) -> Iterator[int]:
         """Return the places at which something is plugged in."""
@@ -115,8 +115,8 @@ class SimulatedBus(_Backend):
 
     def close_device(self, dev_handle: SimpleNamespace) -> None:
         """Give a handle back, and what it holds."""
-        if self._held.get(dev_handle.place) is dev_handle:
-            del self._held[dev_handle.place]
+        if self._claims.get(dev_handle.place) is dev_handle:
+            del self._claims[dev_handle.place]
 
     def set_configuration(self, dev_handle: SimpleNamespace, config_value: int) -> None:
         """Take the only configuration."""
@@ -129,7 +129,7 @@ class SimulatedBus(_Backend):
     def claim_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
         """Hold the device. Raises USBError when another handle does."""
         self._box(dev_handle)
-        if self._held.setdefault(dev_handle.place, dev_handle) is not dev_handle:
+        if self._claims.setdefault(dev_handle.place, dev_handle) is not dev_handle:
             raise _core.USBError("Resource busy", -6, errno.EBUSY)
 
     def release_interface(self, dev_handle: SimpleNamespace, intf: int) -> None:
@@ -172,7 +172,7 @@ def _start(bench: Bench, clock: Clock, faults: Faults, folder: Path) -> Simulate
     def forget() -> None:
         usb_link.BACKEND = None
 
-    return Simulated(uri, bench, box.now, unplug(faults), bus.held, forget)
+    return Simulated(uri, bench, box.now, unplug(faults), bus.claims, forget)
 
 
 SIMULATOR = Simulator("labjack-u6", _start, factor=2.0, statuses=(54, 55, 63))  # codes in a stream

@@ -96,8 +96,8 @@ def stored_afferent(recording: Recording) -> AfferentSettings | None:
 
 def _afferent_of(stored: Mapping[str, Any]) -> AfferentSettings | None:
     """Return the parameters of the afferent in a stored prediction; None where it has none. Raises SettingsError."""
-    held: Mapping[str, Any] | None = stored.get("afferent")
-    return None if held is None else from_table(held.get("settings") or {}, AfferentSettings, PREDICTION)
+    afferent: Mapping[str, Any] | None = stored.get("afferent")
+    return None if afferent is None else from_table(afferent.get("settings") or {}, AfferentSettings, PREDICTION)
 
 
 def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
@@ -218,8 +218,8 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 
 def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
     """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
-    held: Mapping[str, Any] = stored.get("bootstrap") or {}
-    return from_table(held.get("settings") or {}, BootstrapSettings, ANALYSIS)
+    bootstrap: Mapping[str, Any] = stored.get("bootstrap") or {}
+    return from_table(bootstrap.get("settings") or {}, BootstrapSettings, ANALYSIS)
 
 
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
@@ -229,12 +229,12 @@ def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:
     the rest is the program's.
     Raises SettingsError.
     """
-    held: Mapping[str, Any] = stored.get("settings") or stored
-    area = from_table(held.get("area") or {}, AreaLaw, "area")
-    seed = held.get("bootstrap_seed", 0)
+    settings: Mapping[str, Any] = stored.get("settings") or stored
+    area = from_table(settings.get("area") or {}, AreaLaw, "area")
+    seed = settings.get("bootstrap_seed", 0)
     if not isinstance(seed, int) or seed < 0:
         raise SettingsError(f"bootstrap_seed = {seed!r} is not allowed: a whole number from 0 on")
-    return AnalysisSettings(area=area, gain_error=checked_gain_error(held.get("gain_error")), bootstrap_seed=seed)
+    return AnalysisSettings(area=area, gain_error=checked_gain_error(settings.get("gain_error")), bootstrap_seed=seed)
 
 
 def is_current(stored: Mapping[str, Any], decisions: Decisions) -> bool:

@@ -142,9 +142,9 @@ def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
 
 
 def _stiffened(scene: Scene, factors: Mapping[str, float]) -> Scene:
-    held = scene.materials
-    changed = {name: replace(held.of(name), E=factor * held.of(name).E) for name, factor in factors.items()}
-    return replace(scene, materials=replace(held, **changed))
+    materials = scene.materials
+    changed = {name: replace(materials.of(name), E=factor * materials.of(name).E) for name, factor in factors.items()}
+    return replace(scene, materials=replace(materials, **changed))
 
 
 def answered(trial: Trial) -> Answer | str:
@@ -195,13 +195,13 @@ def answers_of(
 
 def _kept(keep: Path | None) -> dict[str, Any]:
     """Return the answers that a file holds; a line that a crash cut short is left out."""
-    held: dict[str, Any] = {}
+    answers: dict[str, Any] = {}
     if keep is not None and keep.exists():
         for line in keep.read_text(encoding="utf-8").splitlines():
             with suppress(ValueError, KeyError, TypeError):
                 one = json.loads(line)
-                held[one["key"]] = one["answer"]
-    return held
+                answers[one["key"]] = one["answer"]
+    return answers
 
 
 @contextmanager

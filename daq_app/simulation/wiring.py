@@ -228,7 +228,7 @@ def planted_surface(trial: Trial, planted: Planted = ()) -> Surface:
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
     alike = [surface for surface in surfaces if surface.descriptor == stimulus.descriptor]
-    surface = min(alike or surfaces, key=lambda held: abs(held.index - stimulus.known_index))
+    surface = min(alike or surfaces, key=lambda one: abs(one.index - stimulus.known_index))
     surface = replace(surface, direction=trial.direction)
     for descriptor, index, mu in planted:
         if (descriptor, index) == (stimulus.descriptor, stimulus.known_index):

@@ -102,7 +102,7 @@ class NetFtTransducer(ThreadedTransducer):
         self._account = SequenceAccount(self._step, self.info.counter_rate)
         self._watch = RateWatch(self.info.counter_rate, self.clock.factor, _SILENT_TICKS * self.clock.factor)
         self._breaks = self._changes = 0  # in the device's counter, and of it or the rate, so far
-        self._held: list[tuple[bytes, int]] = []
+        self._undecided: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
         self._settings = SettingsWatch(self.info, self._who, self.clock)
@@ -170,9 +170,9 @@ class NetFtTransducer(ThreadedTransducer):
 
     def digest(self, *, end: bool = False) -> None:
         """Turn pending datagrams into accounted readings. The lock is held."""
-        if not self._pending and not (end and self._held):
+        if not self._pending and not (end and self._undecided):
             return
-        arrived = self._held
+        arrived = self._undecided
         while self._pending:
             arrived.append(self._pending.popleft())
         decoded = decode([datagram for datagram, _ in arrived])
@@ -182,7 +182,7 @@ class NetFtTransducer(ThreadedTransducer):
         records = decoded.records
         numbers, counters = records["number"].astype(np.uint32), records["counter"].astype(np.uint32)
         verdict = self._account.take(numbers, counters, received_ns, end=end)
-        self._held = [arrived[origin[-1]]] if verdict.held else []
+        self._undecided = [arrived[origin[-1]]] if verdict.undecided else []
         if not len(verdict.kept):
             return
         if self._zero is None:
@@ -231,7 +231,7 @@ class NetFtTransducer(ThreadedTransducer):
     def never_came(self, seconds: float) -> str:
         """Return why a start failed."""
         health = self.health
-        if senseless := health.malformed + health.repeated + health.late + len(self._held):
+        if senseless := health.malformed + health.repeated + health.late + len(self._undecided):
             return (
                 f"{self.info.uri} sent {senseless} records within {seconds:.1f} s of which none is a reading: of a "
                 "wrong length, or numbers that stand still; switch the box off and on, and check the rdt port"

@@ -3,6 +3,7 @@
 import time
 from dataclasses import replace
 
+from daq_app.recorder.messages import Connect, People, StartSession
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.run.steps import AskBegin, AskFinish, AskMount, AskScore, Begin, Finish, Scored, StimulusMounted
@@ -21,6 +22,11 @@ class Desk:
         self.instead = instead or {}
         self.seen = []
         self.waiting = []
+
+    def begin(self, folder, people="simulated hand"):
+        """Open the simulated bench and begin the short session in `folder`."""
+        self.recorder.send(Connect("sim:?seed=7"))
+        self.recorder.send(StartSession(SHORT, str(folder), People(people, 7)))
 
     def until(self, wanted, number=1):
         """Go on until so many more reports of a kind came, and return the last."""

@@ -7,11 +7,11 @@ from pathlib import Path
 from urllib.parse import quote, unquote
 
 import pytest
-from desk import PACE, SHORT, Desk
+from desk import PACE, Desk
 
 from daq_app.cli.main import run
 from daq_app.recorder.client import Recorder
-from daq_app.recorder.messages import Connect, Device, People, Sealed, StartSession
+from daq_app.recorder.messages import Sealed
 from sessions.recording.provenance import without_home
 
 
@@ -27,9 +27,7 @@ def recorded(tmp_path_factory):
         folder = home / "recordings" / "P07"
         with Recorder.start(PACE) as recorder:
             desk = Desk(recorder)
-            recorder.send(Connect("sim:?seed=7"))
-            desk.until(Device)
-            recorder.send(StartSession(SHORT, str(folder), People("simulated people", 7)))
+            desk.begin(folder, "simulated people")
             desk.until(Sealed)
         assert run(["analyse", str(folder)]) in (0, 3)
     return folder

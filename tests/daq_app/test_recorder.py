@@ -163,8 +163,7 @@ def sockets_of(pid):
 
 def started(desk, folder, people="simulated hand"):
     """Have a session running, and return once its first stroke is felt."""
-    desk.recorder.send(Connect("sim:?seed=7"))
-    desk.recorder.send(StartSession(SHORT, str(folder), People(people, 7)))
+    desk.begin(folder, people)
     while desk.until(LoggedEvent).kind != "contact_onset":
         pass
 
@@ -282,9 +281,7 @@ def test_a_session_whose_folder_is_removed_stops_within_seconds_and_goes_on_in_t
     folder = tmp_path / "s"
     with Recorder.start(PACE) as recorder:
         desk = Desk(recorder)
-        recorder.send(Connect("sim:?seed=7"))
-        desk.until(Device)
-        recorder.send(StartSession(SHORT, str(folder), People("simulated hand", 7)))
+        desk.begin(folder)
         desk.until(AskStroke)
         shutil.rmtree(folder)
         ended = desk.until(SessionEnded)

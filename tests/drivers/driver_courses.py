@@ -80,7 +80,7 @@ def simulator(name):
 def handles(device, before=0):
     """Return how many handles are open beyond `before`; a simulated device needs a moment to hang up."""
     for _ in range(50):
-        count = len(list(Path("/dev/fd").iterdir())) + device.held() - before
+        count = len(list(Path("/dev/fd").iterdir())) + device.open_handles() - before
         if not before or count <= 0:
             break
         time.sleep(0.02)

@@ -70,7 +70,7 @@ def test_every_record_is_kept_lost_repeated_late_or_garbage_however_the_batches_
     for a, b in zip([0, *cuts], [*cuts, len(records)], strict=True):
         batch = head + records[a:b]
         verdict = take(judge, batch, end=b == len(records))
-        head = batch[-1:] if verdict.held else []
+        head = batch[-1:] if verdict.undecided else []
         sequence += verdict.sequence.tolist()
         counters += verdict.counter.tolist()
         assert [n % WRAP for n in sequence[len(sequence) - len(verdict.kept) :]] == [
@@ -146,8 +146,8 @@ def test_an_unknown_step_is_learned_from_the_first_two_records():
 
 def test_a_record_is_held_until_the_next_decides():
     judge = account()
-    assert take(judge, line(0, 1)).held
-    assert not take(judge, line(0, 2)).held
+    assert take(judge, line(0, 1)).undecided
+    assert not take(judge, line(0, 2)).undecided
 
 
 @pytest.mark.parametrize("first", [1, WRAP - 2])

@@ -159,8 +159,8 @@ def _fitted(
     options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
 ) -> _Outcome:
     """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""
-    held = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
-    if options.relaxation and not held:
+    holds = [(press, hold) for press, hold in zip(curves.presses, curves.holds, strict=True) if hold is not None]
+    if options.relaxation and not holds:
         raise FitError("No press is held: let the stage stand for half a second or more, or leave --relaxation out.")
     stated, _ = (None, "") if options.finger is None else finger_in(options.finger)
     finger = template(with_own_finger(PredictionOptions(scene=stated), plan))
@@ -168,7 +168,7 @@ def _fitted(
     model = press_model(finger, float(np.log(options.prior)), DEEPER * deepest(curves), options.mu, progress)
     if options.relaxation:
         finger_fit, rate = relaxing_fit(
-            model, [one for one, _ in held], [one for _, one in held], gain_error, options.seed
+            model, [one for one, _ in holds], [one for _, one in holds], gain_error, options.seed
         )
     else:
         finger_fit, rate = fit(model, curves.presses, gain_error, options.seed), None

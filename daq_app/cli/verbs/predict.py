@@ -155,10 +155,10 @@ def _without(row: TrialPrediction) -> Iterator[str]:
 
 def _print_once(console: Console, sentences: Iterable[tuple[str, str]]) -> None:
     """Print each sentence once, after the names of all that it holds for; each pair is a name and a sentence."""
-    names: defaultdict[str, list[str]] = defaultdict(list)
+    by_sentence: defaultdict[str, list[str]] = defaultdict(list)
     for name, sentence in sentences:
-        names[sentence].append(name)
-    console.say(*(f"{', '.join(held)}: {sentence}" for sentence, held in names.items()))
+        by_sentence[sentence].append(name)
+    console.say(*(f"{', '.join(names)}: {sentence}" for sentence, names in by_sentence.items()))
 
 
 def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:

@@ -70,7 +70,7 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
     """Return the tables of a language, and how many blocks have none yet. Raises WrongValue for the protocol's own."""
     if language == source.language:
         raise WrongValue(f"--language {language} is the protocol's own: its texts stand in the blocks")
-    held = {one.block: one for one in source.translations if one.language == language}
+    earlier = {one.block: one for one in source.translations if one.language == language}
     texts = [
         Translation(language, one.name, one.instruction, one.scale_ends, one.question or usual_question(one.descriptor))
         for one in source.blocks
@@ -79,10 +79,10 @@ def protocol_texts(source: Protocol, language: str) -> tuple[str, int]:
         texts.insert(0, Translation(language, PRE_EVALUATION, source.pre_evaluation.instruction))
     lines: list[str] = []
     for one in texts:
-        mark = "" if one.block in held else f"# to be translated from {source.language}\n"
-        table = toml_text(held.get(one.block, one)).replace('question = ""\n', "")
+        mark = "" if one.block in earlier else f"# to be translated from {source.language}\n"
+        table = toml_text(earlier.get(one.block, one)).replace('question = ""\n', "")
         lines.append(f"[[translations]]\n{mark}{table}")
-    return "\n".join(lines), sum(one.block not in held for one in texts)
+    return "\n".join(lines), sum(one.block not in earlier for one in texts)
 
 
 def window_texts() -> list[str]:
@@ -99,7 +99,7 @@ def window_texts() -> list[str]:
 
 def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[str, int]:
     """Return the .ts file of a language, and how many of the texts are not translated."""
-    held = translations(context, language)
+    earlier = translations(context, language)
     root = ElementTree.Element("TS", version="2.1", language=language, sourcelanguage=ENGLISH)
     group = ElementTree.SubElement(root, "context")
     ElementTree.SubElement(group, "name").text = context
@@ -108,7 +108,7 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
         message = ElementTree.SubElement(group, "message")
         ElementTree.SubElement(message, "source").text = text
         translation = ElementTree.SubElement(message, "translation")
-        translation.text = held.get(text, "")
+        translation.text = earlier.get(text, "")
         if not translation.text:
             translation.set("type", "unfinished")
             missing += 1
