@@ -187,6 +187,7 @@ SIMULATOR = Simulator(
     served(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
     factor=0.4,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
+    unshown=0.2,  # a sum of seven bits
     serial_line=True,
     at_start=True,
 )

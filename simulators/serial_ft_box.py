@@ -191,5 +191,6 @@ SIMULATOR = Simulator(
     served(lambda bench, clock, faults: SerialFtBox(bench, clock, faults=faults)),
     factor=2.0,
     statuses=tuple(range(1, 10)),
+    unshown=0.2,  # binary records have no checksum
     serial_line=True,
 )
