@@ -29,8 +29,8 @@ from solver.contact import SkinCompression, width
 from solver.element import Q2P1
 from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.failures import MIXED, NotConverged
-from solver.mesh.mesh import MeshError, distinct
-from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh, with_middles
+from solver.mesh.mesh import MeshError, distinct, with_middles
+from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene.scene import Scene
 from solver.scene.tables import Material, Materials, SceneError

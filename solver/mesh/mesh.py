@@ -132,7 +132,7 @@ def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool 
     Its underside is flat, or a circle of `radius` [mm] that touches the surface at x = 0; it may touch everywhere. Its
     top is held, or with `held` False nothing is.
     """
-    x, y = _with_middles(x_lines), _with_middles(y_lines)[::-1]
+    x, y = with_middles(x_lines), with_middles(y_lines)[::-1]
     bottom = 0.0 * x if np.isinf(radius) else radius - np.sqrt(radius**2 - x**2)
     part = y / y[0]
     points = np.empty((len(x), len(y), 2))
@@ -142,7 +142,8 @@ def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool 
     return grid_mesh(points, np.zeros(len(y) // 2, np.int64), slice(0, len(x)), top if held else top[:0])
 
 
-def _with_middles(lines: Array) -> Array:
+def with_middles(lines: Array) -> Array:
+    """Return the lines with one more in the middle of each gap."""
     out = np.empty(2 * len(lines) - 1)
     out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2.0
     return out

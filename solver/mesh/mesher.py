@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.mesh.mesh import Mesh, distinct, grid_mesh
+from solver.mesh.mesh import Mesh, distinct, grid_mesh, with_middles
 from solver.scene.tables import Finger, Receptor
 
 
@@ -266,13 +266,6 @@ def _fine(outline: Outline, sizing: Sizing) -> float:
 
 def _middles(lines: Array) -> Array:
     return (lines[1:] + lines[:-1]) / 2.0
-
-
-def with_middles(lines: Array) -> Array:
-    """Return the lines with one more in the middle of each gap."""
-    out = np.empty(2 * len(lines) - 1)
-    out[::2], out[1::2] = lines, _middles(lines)
-    return out
 
 
 def _counted(place: Array, size: Array) -> Array:

@@ -12,16 +12,9 @@ from solver.body.stiffness import Probes, local_coordinates
 from solver.contact import OPEN, SLIP
 from solver.element import Q2P1
 from solver.equilibrium.newton import Newton
-from solver.mesh.mesh import Mesh, grid_mesh
+from solver.mesh.mesh import Mesh, grid_mesh, with_middles
 
 NONE: Indices = np.zeros(0, np.int64)
-
-
-def with_middles(lines: Array) -> Array:
-    """Return lines between elements with one more in the middle of each gap."""
-    out = np.empty(2 * len(lines) - 1)
-    out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2
-    return out
 
 
 def graded(finest: float, growth: float, zone: float, end: float) -> Array:
