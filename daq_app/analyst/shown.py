@@ -97,7 +97,7 @@ def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[
         return []
     value, *error = found
     mesh = error[0] / abs(value) if error and value else None
-    told = shown.told(shown.factor * value) + errors_words(mesh)
+    told = shown.text(shown.factor * value) + errors_words(mesh)
     name = tr(
         "{response} {condition}, averaged over the ending",
         response=tr(shown.label),

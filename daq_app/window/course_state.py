@@ -28,7 +28,7 @@ Phase = Literal[
     "ended",
     "resuming",
 ]
-TOLD: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
+REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
 AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
@@ -152,7 +152,7 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
         case Status():
             moved = message.safe.time_ns != session.saved_ns
             saved = now if moved else session.saved
-            phase = cast("Phase", message.state) if message.state in TOLD else session.phase
+            phase = cast("Phase", message.state) if message.state in REPORTED else session.phase
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
             return _judged(session, trial, take, quality)

@@ -58,7 +58,7 @@ class AfferentSettings:
 
 
 # Unit ("": the quantity's own), standing, and what it rests on. "assumed": no authority is claimed for the number.
-TOLD: Mapping[str, tuple[str, str, str]] = {
+PARAMETERS: Mapping[str, tuple[str, str, str]] = {
     "threshold": ("", "assumed", _EDIN),
     "exponent": ("-", "assumed", "1: rate follows the quantity; 0.5 with an energy: rate follows strain"),
     "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
@@ -133,9 +133,9 @@ def spike_times(time: Array, rate: Array, draw: np.random.Generator, settings: A
     passed = np.concatenate([[0.0], np.cumsum((rate[1:] + rate[:-1]) / 2.0 * np.diff(time))])
     shape = settings.variation**-2
     thresholds = np.cumsum(draw.gamma(shape, 1.0 / shape, size=int(2 * passed[-1]) + 20))
-    found = np.interp(thresholds[thresholds < passed[-1]], passed, time)
+    spikes = np.interp(thresholds[thresholds < passed[-1]], passed, time)
     kept: list[float] = []
-    for spike in found.tolist():
+    for spike in spikes.tolist():
         if not kept or spike - kept[-1] >= settings.refractory:
             kept.append(spike)
     return np.array(kept)
@@ -153,7 +153,7 @@ def session_firing(
     if not sizes:
         return None, ()
     reference = float(np.median(sizes))
-    found: list[Firing] = []
+    firings: list[Firing] = []
     for number, row in enumerate(prediction.trials):
         value = _settled(row, chosen.quantity)
         if row.history is None or value is None:
@@ -170,8 +170,8 @@ def session_firing(
             peaks = [firing_rate(row.history.time, end / value * course, reference, chosen)[1] for end in ends]
             peak = float(peaks[0].max()), float(peaks[1].max())
             settled = _settled_rate(ends[0], reference, chosen), _settled_rate(ends[1], reference, chosen)
-        found.append(Firing(row.trial, time, rate, _settled_rate(value, reference, chosen), spikes, peak, settled))
-    return reference, tuple(found)
+        firings.append(Firing(row.trial, time, rate, _settled_rate(value, reference, chosen), spikes, peak, settled))
+    return reference, tuple(firings)
 
 
 def _settled(row: TrialPrediction, quantity: str) -> float | None:
@@ -196,7 +196,7 @@ def _settled_rate(value: float, reference: float, settings: AfferentSettings) ->
 
 def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -> dict[str, Any]:
     """Return the firing in each trial as plain data, with what it is and every parameter."""
-    reference, found = session_firing(prediction, settings)
+    reference, firings = session_firing(prediction, settings)
     return {
         "about": ABOUT.format(label=_named(settings).label),
         "quantity": settings.quantity,
@@ -204,7 +204,7 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
         "reference_sed": reference if settings.quantity == SED.name else None,  # its name before; for one release
         "settings": asdict(settings),
         "parameters": parameters(settings, reference),
-        "trials": [one.to_dict() for one in found],
+        "trials": [one.to_dict() for one in firings],
     }
 
 
@@ -213,19 +213,19 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
 
     `reference` is told with them where it is given, in the unit of the quantity.
     """
-    told: list[dict[str, Any]] = []
+    rows: list[dict[str, Any]] = []
     quantity, usual = _named(settings), usual_settings(settings.quantity)
     if reference is not None:
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
-        told.append(
+        rows.append(
             {"name": "reference", "value": reference, "unit": quantity.unit, "standing": "assumed", "basis": basis}
         )
-    for name, (unit, standing, basis) in TOLD.items():
+    for name, (unit, standing, basis) in PARAMETERS.items():
         value: float = getattr(settings, name)
         chosen = standing if value == getattr(usual, name) else "set"
         rests = f"{_THRESHOLDS[quantity.name][1]}; {basis}" if name == "threshold" else basis
-        told.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": chosen, "basis": rests})
-    return told
+        rows.append({"name": name, "value": value, "unit": unit or quantity.unit, "standing": chosen, "basis": rests})
+    return rows
 
 
 def usual_settings(quantity: str = SED.name) -> AfferentSettings:
@@ -241,7 +241,7 @@ def settings_with(changes: Mapping[str, float], seed: int = 0, quantity: str = S
     >>> settings_with({"static_gain": 30.0}).static_gain
     30.0
     """
-    names = [name for name in TOLD if name != "seed"]
+    names = [name for name in PARAMETERS if name != "seed"]
     for name, value in changes.items():
         if name not in names:
             raise ValueError(f"{name} is no parameter of the afferent: give one of {', '.join(names)}")

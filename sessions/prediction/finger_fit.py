@@ -151,10 +151,10 @@ class Likelihood:
         damping = np.full(len(contrast), 1e-3)
         for _ in range(ROUNDS):  # Levenberg and Marquardt, all contrasts at once
             moved = touch + _steps(jacobian, residual, damping)[:, 1:]
-            found = self._linear(spline, moved)
-            better = found[1] < misfit
-            gain = float(np.max(np.where(better, misfit - found[1], 0.0) / (misfit + self.floor)))
-            for old, new in zip((touch, mean, misfit, residual, jacobian), (moved, *found), strict=True):
+            spread = self._linear(spline, moved)
+            better = spread[1] < misfit
+            gain = float(np.max(np.where(better, misfit - spread[1], 0.0) / (misfit + self.floor)))
+            for old, new in zip((touch, mean, misfit, residual, jacobian), (moved, *spread), strict=True):
                 old[better] = new[better]
             damping = np.where(better, damping / 5.0, damping * 5.0)
             if gain < SETTLED:
@@ -199,8 +199,8 @@ class Likelihood:
         def jacobian(at: Array) -> Array:
             return self._at(at)[1] / scale[:, None]
 
-        found = least_squares(residual, start, jacobian, x_scale="jac").x
-        return found[:2], found[3:], float(found[2])
+        optimum = least_squares(residual, start, jacobian, x_scale="jac").x
+        return optimum[:2], optimum[3:], float(optimum[2])
 
     def _at(self, at: Array) -> tuple[Array, Array]:
         """Return residuals of forces, contacts and prior, and their Jacobian by both contrasts, mean and touches."""

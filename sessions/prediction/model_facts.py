@@ -29,16 +29,16 @@ _AUDITS = {  # 0 is perfect, but for the volume
 }
 
 
-def model_facts(found: SessionPrediction | None) -> tuple[tuple[str, str, str], ...]:
+def model_facts(prediction: SessionPrediction | None) -> tuple[tuple[str, str, str], ...]:
     """Return name, value and remark of each thing that the model holds; audits are the worst over all trials."""
-    solved = [] if found is None else [row.prediction for row in found.trials if row.prediction is not None]
-    if found is None or not solved:
+    solved = [] if prediction is None else [row.prediction for row in prediction.trials if row.prediction is not None]
+    if prediction is None or not solved:
         return ()
     first = solved[0]
     facts = [(name, str(value), "") for name, value in first.model.items() if name != "left_out"]
     facts += [(name, _values(asdict(getattr(first.scene, name))), units) for name, units in _SCENE.items()]
-    facts.append(("finger's width", f"{found.width:g} mm", found.width_origin))
-    facts.append(("τ max", _READINGS[found.options.tau_reading], ""))
+    facts.append(("finger's width", f"{prediction.width:g} mm", prediction.width_origin))
+    facts.append(("τ max", _READINGS[prediction.options.tau_reading], ""))
     facts.append((UNKNOWNS, f"{first.dofs} displacements", "one mesh for all trials"))
     audits = "; ".join(
         f"{_AUDITS.get(name, name.replace('_', ' '))}: {_worst(name, [p.audits for p in solved]):.2g}"
@@ -47,9 +47,9 @@ def model_facts(found: SessionPrediction | None) -> tuple[tuple[str, str, str], 
     return (*facts, ("audits", audits, "the worst over all trials; 0 is perfect, 1 for the volume ratio"))
 
 
-def _worst(audit: str, told: Sequence[Mapping[str, float]]) -> float:
+def _worst(audit: str, all_audits: Sequence[Mapping[str, float]]) -> float:
     """Return the least value of an audit whose name says that it has one, else the greatest."""
-    values = [audits[audit] for audits in told if audit in audits]
+    values = [audits[audit] for audits in all_audits if audit in audits]
     return (min(values) if "least" in audit or "smallest" in audit else max(values, key=abs)) + 0.0  # no minus zero
 
 

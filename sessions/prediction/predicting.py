@@ -45,37 +45,37 @@ def predict(
     asked = with_own_finger(options or PredictionOptions(), plan)
     prepared = prepared_cases(analysis, plan, asked)
     rows = [one.row for one in prepared]
-    told = watch or _unseen
+    report = watch or _unseen
     for number, one in enumerate(prepared):
         if one.scene is None:
-            told(number, one.row, None)
+            report(number, one.row, None)
     solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
     scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
     # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
     small = asked.kinematics == "small"
     depths = _depths(scenes, [_force_per_mm(prepared[n]) if small else None for n in solved])
     ways: dict[int, Way] = {}
-    found: dict[int, Prediction | SolveFailure] = {}
+    answers: dict[int, Prediction | SolveFailure] = {}
 
     def known(at: int) -> TrialPrediction:
-        return _filled(prepared[solved[at]], found[2 * at], found[2 * at + 1], depths[at])
+        return _filled(prepared[solved[at]], answers[2 * at], answers[2 * at + 1], depths[at])
 
     def seen(
         number: int, answer: Prediction | SolveFailure, finger: LinearFinger, march: tuple[Instant, ...] | None
     ) -> None:
-        found[number] = answer
+        answers[number] = answer
         at, back = divmod(number, 2)
         if not back:
             ways[at] = Way(scenes[at], finger, march)
-        elif 2 * at in found:
-            told(solved[at], known(at), ways.get(at))
+        elif 2 * at in answers:
+            report(solved[at], known(at), ways.get(at))
 
-    both = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
-    found |= dict(enumerate(solve_many(both, progress, seen if watch else None)))
+    pairs = [one for scene in scenes for one in (scene, quick(opposite(scene)))]
+    answers |= dict(enumerate(solve_many(pairs, progress, seen if watch else None)))
     for at, number in enumerate(solved):
         rows[number] = known(at)
         if not small:
-            told(number, rows[number], None)
+            report(number, rows[number], None)
     return SessionPrediction(
         simulated=analysis.simulated,
         trials=tuple(rows),
@@ -107,7 +107,7 @@ def _force_per_mm(prepared: Prepared) -> float | None:
 
 def _filled(
     prepared: Prepared,
-    found: Prediction | SolveFailure,
+    answer: Prediction | SolveFailure,
     back: Prediction | SolveFailure,
     depth: float | None,
 ) -> TrialPrediction:
@@ -131,22 +131,22 @@ def _filled(
             row, opposite_sed=back.sed_ending, opposite_error=known_error(back, back.error_estimate), opposite=back
         )
     row = replace(row, matching_depth=depth)
-    if isinstance(found, SolveFailure):
-        reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(found))
+    if isinstance(answer, SolveFailure):
+        reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(answer))
         return replace(row, reasons=reasons)
-    if found.nested is None:
+    if answer.nested is None:
         reasons["error_estimate"] = ERROR_NOT_KNOWN
     return replace(
         row,
-        sed=found.sed_ending,
-        error_estimate=known_error(found, found.error_estimate),
-        normal_per_mm=found.normal_force,
-        tangential_per_mm=found.tangential_force,
-        normal_force=found.normal_force * scene.finger.width,
-        tangential_force=found.tangential_force * scene.finger.width,
-        normal_force_error=known_error(found, found.normal_force_error),
-        tangential_force_error=known_error(found, found.tangential_force_error),
-        wall_s=found.wall_s,
-        prediction=found,
+        sed=answer.sed_ending,
+        error_estimate=known_error(answer, answer.error_estimate),
+        normal_per_mm=answer.normal_force,
+        tangential_per_mm=answer.tangential_force,
+        normal_force=answer.normal_force * scene.finger.width,
+        tangential_force=answer.tangential_force * scene.finger.width,
+        normal_force_error=known_error(answer, answer.normal_force_error),
+        tangential_force_error=known_error(answer, answer.tangential_force_error),
+        wall_s=answer.wall_s,
+        prediction=answer,
         reasons=reasons,
     )

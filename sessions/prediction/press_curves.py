@@ -70,14 +70,14 @@ def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings
     holds: list[HoldCurve | None] = []
     left_out: list[str] = []
     for trial, block in parts:
-        found = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
+        analysis = analyse_blocks([(trial, block)], recording.plan, recording.info, settings)
         clocks: Mapping[str, Array] = {
             "time_s": block.time,
             "received_ns": block.received_ns.astype(np.float64),
             "sequence": block.sequence.astype(np.float64),
         }
-        for stroke in found.strokes:
-            if not any(_holds(stroke, press.start) for press in found.presses):
+        for stroke in analysis.strokes:
+            if not any(_holds(stroke, press.start) for press in analysis.presses):
                 continue
             name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
             when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)

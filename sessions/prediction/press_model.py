@@ -115,13 +115,13 @@ def press_model(
     blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
     for at, finger in enumerate(blank.fingers(contrast)):
         _report(progress, at / count)
-        found = _pressed(finger, depth, 0.0)
-        force[at] = np.log([one.normal_force for one in found])
-        shares = stiffness_shares(found)[:, : len(LAYERS)]
+        presses = _pressed(finger, depth, 0.0)
+        force[at] = np.log([one.normal_force for one in presses])
+        shares = stiffness_shares(presses)[:, : len(LAYERS)]
         slope[at] = spread * CONTRASTS @ shares.T
-        width[at] = np.log([one.contact_width for one in found])
-        errors += [one.normal_force_error or 0.0 for one in found]
-        wide += np.array([one.contact_width_error or 0.0 for one in found]) / len(contrast)
+        width[at] = np.log([one.contact_width for one in presses])
+        errors += [one.normal_force_error or 0.0 for one in presses]
+        wide += np.array([one.contact_width_error or 0.0 for one in presses]) / len(contrast)
     basis = np.vstack(_basis(contrast, DEGREE))
     known = np.vstack([force, slope[:, 0], slope[:, 1]])
     coefficients = np.linalg.lstsq(basis, known, rcond=None)[0]
@@ -190,13 +190,13 @@ def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
         scenes = [replace(finger, friction=Friction(mu), loading=one, solve=Solve(evidence="quick")) for one in loads]
     except SceneError as unfit:
         raise FitError(f"The presses do not fit this finger: {unfit}") from unfit
-    found = [one for one in settled(scenes) if one is not None]
-    if len(found) < len(scenes):
+    states = [one for one in settled(scenes) if one is not None]
+    if len(states) < len(scenes):
         raise FitError(
             f"The model has no press of {depth[-1]:.2f} mm on this finger: leave out presses that are so deep, or give "
             "the finger's own dimensions with --finger."
         )
-    return found
+    return states
 
 
 def _report(progress: Progress | None, part: float) -> None:

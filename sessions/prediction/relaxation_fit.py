@@ -97,19 +97,19 @@ def relaxing_fit(
     turns: the relaxation for the finger, and the finger for forces out of which the relaxation was taken. Raises
     FitError where no press is held.
     """
-    found = fit(model, presses, gain_error, seed)
-    rate = relaxation(model, found, holds)
+    finger_fit = fit(model, presses, gain_error, seed)
+    rate = relaxation(model, finger_fit, holds)
     for _ in range(TURNS):
         before = rate.part.value
         calm = [
             one._replace(force=_rebinned(one, hold.at_once(rate.part.value, rate.time.value)))
             for one, hold in zip(presses, holds, strict=True)
         ]
-        found = fit(model, calm, gain_error, seed)
-        rate = relaxation(model, found, holds)
+        finger_fit = fit(model, calm, gain_error, seed)
+        rate = relaxation(model, finger_fit, holds)
         if abs(rate.part.value - before) < AGREED:
             break
-    return found, rate
+    return finger_fit, rate
 
 
 def _rebinned(press: LoadingCurve, hold: HoldCurve) -> Array:
@@ -118,7 +118,7 @@ def _rebinned(press: LoadingCurve, hold: HoldCurve) -> Array:
     return LoadingCurve.of(hold.displacement[way], hold.force[way], np.zeros(press.readings)).force
 
 
-def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
+def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:
     """Return how a finger relaxes in presses that are held.
 
     g is equally likely from 0 to 0.95 before, tau equally likely in its logarithm; a and the noise are integrated in
@@ -126,9 +126,9 @@ def relaxation(model: PressModel, found: FingerFit, presses: Sequence[HoldCurve]
     """
     if not presses:
         raise FitError("No press is held: let the stage stand for half a second or more before it lifts.")
-    stiffness = np.array([found.scene.materials.of(name).E for name in LAYERS])
+    stiffness = np.array([finger_fit.scene.materials.of(name).E for name in LAYERS])
     elastic = [
-        model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, found.touch, strict=True)
+        model.force(stiffness, one.displacement - touch) for one, touch in zip(presses, finger_fit.touch, strict=True)
     ]
     limits = (0.0, LARGEST_PART), (BLOCK, LONGEST * max(float(np.ptp(one.time)) for one in presses))
     bounds, rounds = limits, 0

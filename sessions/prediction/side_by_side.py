@@ -46,7 +46,7 @@ def with_alternatives(
         for number, variant in enumerate(asked)
     ]
     trials = tuple(
-        _with_depth(replace(row, alternatives=tuple(found[number] for found in along)), options)
+        _with_depth(replace(row, alternatives=tuple(one[number] for one in along)), options)
         for number, row in enumerate(prediction.trials)
     )
     return replace(prediction, trials=trials)
@@ -58,15 +58,15 @@ def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPredic
     The depth of `predict` is of a rough mesh; one question has one answer.
     """
     driven = Variant(options.kinematics, options.tau_reading, "force")
-    found = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
-    if found is None:
+    driven_row = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
+    if driven_row is None:
         return row
     reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
     return replace(
         row,
-        matching_depth=found.indentation,
-        matching_depth_error=found.indentation_error,
-        matching_depth_interval=None if found.interval is None else found.interval.indentation,
+        matching_depth=driven_row.indentation,
+        matching_depth_error=driven_row.indentation_error,
+        matching_depth_interval=None if driven_row.interval is None else driven_row.interval.indentation,
         reasons=reasons,
     )
 
@@ -77,25 +77,25 @@ def _along(
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
     known = _known(prediction, variant)
-    found = known or _solved(prediction, variant, _part(progress, 0.0, 0.8))
-    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, found, strict=True)]
+    answers = known or _solved(prediction, variant, _part(progress, 0.0, 0.8))
+    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
     if drawn is not None:
         before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
         if known is not None and None not in before:  # they are those of the trials themselves
             intervals: Sequence[SedInterval | None] = before
         else:
             scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-            intervals = intervals_of([one for _, one in found], drawn, scale, _part(progress, 0.8, 1.0))
+            intervals = intervals_of([one for _, one in answers], drawn, scale, _part(progress, 0.8, 1.0))
         out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
     return tuple(out)
 
 
-_Found = list[
+_Answers = list[
     tuple[float | None, Prediction | str]
 ]  # for each trial the tau_max [MPa] that the model got, and what of it
 
 
-def _known(prediction: SessionPrediction, variant: Variant) -> _Found | None:
+def _known(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
     """Return what was predicted anyway: at the planned depth, slid either way."""
     options = prediction.options
     if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
@@ -107,30 +107,32 @@ def _known(prediction: SessionPrediction, variant: Variant) -> _Found | None:
     return None
 
 
-def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Found:
+def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
     """Return the same of a variant that is solved now."""
     scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
     answers = iter(solved([scene for scene in scenes if not isinstance(scene, str)], progress))
     return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
 
 
-def _alternative(row: TrialPrediction, variant: Variant, tau_max: float | None, found: Prediction | str) -> Alternative:
-    if isinstance(found, str):
-        return replace(_none(row, variant, found), tau_max=tau_max)
-    width = found.scene.finger.width
+def _alternative(
+    row: TrialPrediction, variant: Variant, tau_max: float | None, answer: Prediction | str
+) -> Alternative:
+    if isinstance(answer, str):
+        return replace(_none(row, variant, answer), tau_max=tau_max)
+    width = answer.scene.finger.width
     return Alternative(
         variant,
         tau_max,
-        found.indentation,
-        found.sed_ending,
-        known_error(found, found.error_estimate),
-        found.normal_force * width,
-        found.tangential_force * width,
-        traction=traction_reached(found),
-        normal_force_error=known_error(found, found.normal_force_error),
-        tangential_force_error=known_error(found, found.tangential_force_error),
-        indentation_error=known_error(found, found.indentation_error),
-        doubt=doubt_of(found),
+        answer.indentation,
+        answer.sed_ending,
+        known_error(answer, answer.error_estimate),
+        answer.normal_force * width,
+        answer.tangential_force * width,
+        traction=traction_reached(answer),
+        normal_force_error=known_error(answer, answer.normal_force_error),
+        tangential_force_error=known_error(answer, answer.tangential_force_error),
+        indentation_error=known_error(answer, answer.indentation_error),
+        doubt=doubt_of(answer),
     )
 
 

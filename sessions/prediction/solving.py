@@ -69,25 +69,25 @@ def derivatives_by(slide: Nearby, scene: Scene) -> Mapping[str, Mapping[str, flo
     They are those of "sed" [MPa], of the whole finger's "normal_force" and "tangential_force" [N], and of the
     "indentation" [mm].
     """
-    found, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
+    derivatives, force, width = slide.derivatives(), scene.loading.normal_force, scene.finger.width
     per_mm = 0.0 if force is None else (scene.normal_force or 0.0) / force  # of a force as it is given
 
     def by(one: By, unit: float = 1.0) -> dict[str, float]:
         return {"mu": unit * one.mu, "tau_max": unit * one.tau_max, "force": unit * per_mm * (one.normal_force or 0.0)}
 
     return {
-        "sed": by(found.sed),
-        "normal_force": by(found.normal, width),
-        "tangential_force": by(found.tangential, width),
-        "indentation": by(found.indentation),
+        "sed": by(derivatives.sed),
+        "normal_force": by(derivatives.normal, width),
+        "tangential_force": by(derivatives.tangential, width),
+        "indentation": by(derivatives.indentation),
     }
 
 
-def traction_reached(found: Prediction) -> float:
+def traction_reached(prediction: Prediction) -> float:
     """Return the greatest friction traction on the skin [MPa]: any tau_max beyond it has the same solution."""
-    return float(abs(found.skin.traction).max())
+    return float(abs(prediction.skin.traction).max())
 
 
-def doubt_of(found: Prediction) -> str:
+def doubt_of(prediction: Prediction) -> str:
     """Return why numbers are not to be believed where the model was driven beyond its range, else ""."""
-    return inside_out(found.audits)
+    return inside_out(prediction.audits)

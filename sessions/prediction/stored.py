@@ -18,16 +18,16 @@ from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin
 from solver.response.fields import Fields, fields_of
 
-_NOT_TOLD = ("prediction", "opposite")  # of a row as plain data: all that the solver found
-_TOLD_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
+_NOT_STORED = ("prediction", "opposite")  # of a row as plain data: all that the solver found
+_STORED_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
 
 
 ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
 
-def known_error(found: Prediction, error: float | None) -> float | None:
+def known_error(prediction: Prediction, error: float | None) -> float | None:
     """Return a relative error of `found` [-], or None where its nested mesh has no such state to compare with."""
-    return None if found.nested is None else error
+    return None if prediction.nested is None else error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,12 +87,12 @@ class TrialPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_NOT_TOLD, *_TOLD_OTHERWISE)}
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in (*_NOT_STORED, *_STORED_OTHERWISE)}
         row["stimulus"] = None if self.stimulus is None else asdict(self.stimulus)
         row["reasons"] = dict(self.reasons)
         row["alternatives"] = [asdict(one) for one in self.alternatives]
-        told = {"interval": self.interval, "opposite_interval": self.opposite_interval}
-        row |= {name: asdict(one) for name, one in told.items() if one is not None}
+        optional = {"interval": self.interval, "opposite_interval": self.opposite_interval}
+        row |= {name: asdict(one) for name, one in optional.items() if one is not None}
         row["solver"] = None if self.prediction is None else self.prediction.to_dict()
         return row
 

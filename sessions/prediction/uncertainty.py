@@ -59,11 +59,11 @@ def with_intervals(
     column: list[Prediction | str] = [row.prediction or _why(row, "sed") for row in rows]
     if both_ways:
         column += [row.opposite or _why(row, "opposite_sed") for row in rows]
-    found = intervals_of(column, [*drawn, *drawn][: len(column)], tau_scale(prediction.options), progress)
-    back = found[len(rows) :] or [None] * len(rows)
+    intervals = intervals_of(column, [*drawn, *drawn][: len(column)], tau_scale(prediction.options), progress)
+    back = intervals[len(rows) :] or [None] * len(rows)
     trials = tuple(
         replace(row, interval=one, opposite_interval=other)
-        for row, one, other in zip(rows, found[: len(rows)], back, strict=True)
+        for row, one, other in zip(rows, intervals[: len(rows)], back, strict=True)
     )
     return replace(prediction, trials=trials)
 
@@ -80,8 +80,8 @@ def _draws(analysis: Analysis, row: TrialPrediction, settings: BootstrapSettings
     if row.stroke is None or row.mu is None or row.tau_max is None:
         return _why(row, "sed")
     rule = "maximum" if row.mu_rule == "maximum" else "mean over steady window"
-    found = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, settings)
-    return "the stroke is too short for an interval of its friction" if found is None else found
+    draws = friction_draws(analysis.strokes[row.stroke], row.stroke, rule, settings)
+    return "the stroke is too short for an interval of its friction" if draws is None else draws
 
 
 def _why(row: TrialPrediction, name: str) -> str:
@@ -95,50 +95,50 @@ def intervals_of(
 
     `scale` is what tau_max as drawn is multiplied by before the model gets it. Raises Cancelled.
     """
-    taken_up = slides([found for found in column if not isinstance(found, str)], progress)
+    taken_up = slides([answer for answer in column if not isinstance(answer, str)], progress)
     return [
-        SedInterval(None, None, None, reason=found)
-        if isinstance(found, str)
-        else _interval(found, next(taken_up), draws, scale)
-        for found, draws in zip(column, drawn, strict=True)
+        SedInterval(None, None, None, reason=answer)
+        if isinstance(answer, str)
+        else _interval(answer, next(taken_up), draws, scale)
+        for answer, draws in zip(column, drawn, strict=True)
     ]
 
 
-def _interval(found: Prediction, slide: Nearby | None, drawn: Drawn, scale: float) -> SedInterval:
+def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale: float) -> SedInterval:
     """Return the interval of the settled SED that was found."""
     if slide is None:
         return SedInterval(None, None, None, reason="the state found depends on the way to it")
-    loads = _loads(found.scene, drawn, scale)
+    loads = _loads(prediction.scene, drawn, scale)
     if isinstance(loads, str):
         return SedInterval(None, None, None, reason=loads)
-    names, draws, told = loads
-    by, width = derivatives_by(slide, found.scene), found.scene.finger.width
+    names, draws, means = loads
+    by, width = derivatives_by(slide, prediction.scene), prediction.scene.finger.width
 
     def along(number: str, value: float) -> Array:
-        return value + (draws - told) @ [by[number][name] for name in names]
+        return value + (draws - means) @ [by[number][name] for name in names]
 
-    carried = along("sed", found.sed_ending)
+    carried = along("sed", prediction.sed_ending)
     low, high = _ends(carried)
-    felt = by["sed"]
-    slopes = felt["mu"], felt["tau_max"], felt["force"] if "force" in names else None
+    sed_sensitivity = by["sed"]
+    slopes = sed_sensitivity["mu"], sed_sensitivity["tau_max"], sed_sensitivity["force"] if "force" in names else None
     whole = SedInterval(
         low,
         high,
         "derivatives",
         *slopes,
-        normal_force=_ends(along("normal_force", found.normal_force * width)),
-        tangential_force=_ends(along("tangential_force", found.tangential_force * width)),
-        indentation=_ends(along("indentation", found.indentation)),
+        normal_force=_ends(along("normal_force", prediction.normal_force * width)),
+        tangential_force=_ends(along("tangential_force", prediction.tangential_force * width)),
+        indentation=_ends(along("indentation", prediction.indentation)),
     )
 
     def solved(which: Indices) -> Array:
-        scenes = [with_loads(found.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
-        seds = slide.seds([found.scene, *scenes])[:, 0]
-        return found.sed_ending + (seds[1:] - seds[0])
+        scenes = [with_loads(prediction.scene, dict(zip(names, draw, strict=True))) for draw in draws[which].tolist()]
+        seds = slide.seds([prediction.scene, *scenes])[:, 0]
+        return prediction.sed_ending + (seds[1:] - seds[0])
 
     tried = _extremes(carried, draws)
     missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
-    if bool((missed <= max(MISS * (high - low), _FLAT * found.sed_ending)).all()):
+    if bool((missed <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return whole
     some = solved(_spread_out(carried))
     lost = int(np.isnan(some).sum())
@@ -165,14 +165,14 @@ def _loads(scene: Scene, drawn: Drawn, scale: float) -> tuple[tuple[str, ...], A
     if isinstance(drawn, str):
         return drawn
     names, columns = ["mu", "tau_max"], [np.maximum(drawn.mu, 0.0), drawn.tau_max * scale]
-    told = [scene.friction.mu, scene.friction.tau_max or 0.0]
+    means = [scene.friction.mu, scene.friction.tau_max or 0.0]
     if scene.loading.normal_force is not None:
         if drawn.normal_force is None:
             return "the stroke is too short for an interval of its normal force"
         names.append("force")
         columns.append(drawn.normal_force)
-        told.append(scene.loading.normal_force)
-    return tuple(names), np.stack(columns, axis=1), np.array(told)
+        means.append(scene.loading.normal_force)
+    return tuple(names), np.stack(columns, axis=1), np.array(means)
 
 
 def _extremes(carried: Array, draws: Array) -> Indices:

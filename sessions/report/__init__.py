@@ -80,13 +80,13 @@ def findings(
     `further` is what took more solves, or was asked for.
     """
     tables = joined((score_table(recording), *(scores or ())))
-    found = strokes(recording, analysis)
+    stroke_findings = strokes(recording, analysis)
     more = further or Further()
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
     others = [Path(table.session).name for table in tables[1:]]
-    numbers = quantities(predicted, found)
+    numbers = quantities(predicted, stroke_findings)
     judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area, more.response)
     return Report(
         title=_title(recording),
@@ -96,12 +96,12 @@ def findings(
         versions=tuple(Fact(name, version) for name, version in software_versions().items()),
         people=facts.people(recording, tables),
         apparatus=facts.apparatus(recording, analysis),
-        excluded=facts.excluded(recording, analysis, found, tables),
+        excluded=facts.excluded(recording, analysis, stroke_findings, tables),
         remarks=facts.remarks(recording, analysis, tables),
         flaws=flaws(analysis),
         experiments=with_psychometric(judged, recording, analysis),
         course=course(recording),
-        strokes=found,
+        strokes=stroke_findings,
         predictions=predicted,
         fields=fields(prediction),
         planted=tuple(planted or ()),

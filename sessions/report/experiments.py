@@ -38,12 +38,14 @@ def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[Strok
     return {name: {key: float(np.mean(all_of)) for key, all_of in values.items()} for name, values in given.items()}
 
 
-def with_psychometric(found: Sequence[Experiment], recording: Recording, analysis: Analysis) -> tuple[Experiment, ...]:
+def with_psychometric(
+    experiments: Sequence[Experiment], recording: Recording, analysis: Analysis
+) -> tuple[Experiment, ...]:
     """Return the experiments, those of blocks with a standard with the subject's psychometric function."""
     blocks = {block.name: block for block in recording.plan.blocks if block.standard is not None}
     return tuple(
         replace(one, psychometric=_psychometric(blocks[one.name], recording, analysis)) if one.name in blocks else one
-        for one in found
+        for one in experiments
     )
 
 

@@ -171,8 +171,8 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         facts += [Fact(f"transducer: {name}", value) for name, value in sorted(info.settings.items())]
     settings: Mapping[str, Mapping[str, Any]] = provenance.get("settings", {})
     facts += [
-        Fact(name, f"{told.get('value')} {told.get('unit', '')}".strip(), _ORIGIN.get(told.get("origin", "set"), ""))
-        for name, told in settings.items()
+        Fact(name, f"{words.get('value')} {words.get('unit', '')}".strip(), _ORIGIN.get(words.get("origin", "set"), ""))
+        for name, words in settings.items()
     ]
     if info is not None:
         facts.append(Fact("analysis", _settings(analysis.settings)))

@@ -20,18 +20,18 @@ _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_
 
 
 def predictions(
-    found: SessionPrediction | None, firing: Sequence[Firing] = (), undone: Set[int] = frozenset()
+    prediction: SessionPrediction | None, firing: Sequence[Firing] = (), undone: Set[int] = frozenset()
 ) -> tuple[PredictionFinding, ...]:
     """Return a finding for each trial, or for each stroke of a recording without trials.
 
     `undone` are the numbers of trials that the session did not come to.
     """
-    if found is None:
+    if prediction is None:
         return ()
     rates = {one.trial: one for one in firing}
     rows = (
         replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
-        for row in found.trials
+        for row in prediction.trials
     )
     return tuple(_with_more(finding_of(row), row, rates.get(row.trial)) for row in rows)
 
@@ -40,23 +40,23 @@ def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple
     """Return every parameter of the afferent with its value, and what it rests on."""
     facts = [
         Fact(
-            told["name"].replace("_", " "),
-            f"{1e3 * told['value']:.4g} kPa"
-            if told["unit"] == "MPa"
-            else f"{told['value']:g} {told['unit']}".removesuffix(" -"),
-            f"{told['standing']}: {told['basis']}",
+            parameter["name"].replace("_", " "),
+            f"{1e3 * parameter['value']:.4g} kPa"
+            if parameter["unit"] == "MPa"
+            else f"{parameter['value']:g} {parameter['unit']}".removesuffix(" -"),
+            f"{parameter['standing']}: {parameter['basis']}",
         )
-        for told in parameters(settings, reference)
+        for parameter in parameters(settings, reference)
     ]
     return () if reference is None else tuple(facts)
 
 
-def fields(found: SessionPrediction | None) -> tuple[Field, ...]:
+def fields(prediction: SessionPrediction | None) -> tuple[Field, ...]:
     """Return the settled finger of each experiment's greatest index that has a prediction."""
-    if found is None:
+    if prediction is None:
         return ()
     chosen: dict[str, TrialPrediction] = {}
-    for row in found.trials:
+    for row in prediction.trials:
         if row.prediction is not None and row.stimulus is not None and row.block is not None:
             before = chosen.get(row.block)
             if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
@@ -74,19 +74,19 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
     return f"{options.kinematics} strain, settled sliding, τ max {options.tau_reading}, contact area {area.law}"
 
 
-def modelled(found: SessionPrediction | None) -> tuple[Fact, ...]:
+def modelled(prediction: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return what the model holds, with the greatest residual of each audit over all trials."""
-    return tuple(Fact(*fact) for fact in model_facts(found))
+    return tuple(Fact(*fact) for fact in model_facts(prediction))
 
 
-def left_out(found: SessionPrediction | None) -> tuple[Fact, ...]:
+def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return what was left out, how much that may have changed the SED, and how this was estimated."""
-    solved = [] if found is None else [row.prediction for row in found.trials if row.prediction is not None]
-    told: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    solved = [] if stored is None else [row.prediction for row in stored.trials if row.prediction is not None]
+    by_effect: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
     for prediction in solved:
         for name, entry in prediction.model.get("left_out", {}).items():
-            told[name].append(entry)
-    facts = [Fact(name, _share(entries), entries[0]["how"]) for name, entries in told.items()]
+            by_effect[name].append(entry)
+    facts = [Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()]
     warned: dict[str, list[str]] = defaultdict(list)  # sentences that differ in their numbers only stand together
     for prediction in solved:
         for sentence in prediction.warnings:
@@ -104,7 +104,7 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
     for name, other in _FROM_ROW.items():
         if other in reasons:
             reasons.setdefault(name, reasons[other])
-    told: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "stroke": None if row.stroke is None else row.stroke + 1,
         "experiment": row.block or "",
         "index": None if row.stimulus is None else row.stimulus.index,
@@ -116,7 +116,7 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         "doubt": "" if row.prediction is None else doubt_of(row.prediction),
         "opposite_doubt": "" if row.opposite is None else doubt_of(row.opposite),
     }
-    return PredictionFinding(**{**same_fields(row, PredictionFinding), **told})
+    return PredictionFinding(**{**same_fields(row, PredictionFinding), **numbers})
 
 
 def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:

@@ -38,8 +38,8 @@ def summary(report: Report) -> tuple[str, ...]:
         sentences += psychometric_sentences(judged)
     for experiment in report.experiments:
         shown = shown_response(report.response)
-        told = [shown.of(p) for p in report.predictions if p.experiment == experiment.name]
-        values = [shown.factor * one[0] for one in told if one is not None]
+        responses = [shown.of(p) for p in report.predictions if p.experiment == experiment.name]
+        values = [shown.factor * one[0] for one in responses if one is not None]
         if values:
             sentences.append(_predicted(experiment, shown, (min(values), max(values)), report.model.split(",")[0]))
         if experiment.paths:

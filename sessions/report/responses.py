@@ -20,10 +20,10 @@ class ShownResponse:
     places: int  # decimals of a number shown
     step: str  # unit of a slope on scores or indices, which is a millionth of the kept one
 
-    def told(self, shown: float) -> str:
+    def text(self, shown: float) -> str:
         """Return a number of the shown unit with that unit.
 
-        >>> shown_response("sed").told(9.5528), shown_response("shear_along_skin").told(-0.25)
+        >>> shown_response("sed").text(9.5528), shown_response("shear_along_skin").text(-0.25)
         ('9.553 kPa', '−0.2500')
         """
         return digits(shown, self.places) + ("" if self.unit == "1" else f" {self.unit}")

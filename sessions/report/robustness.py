@@ -33,24 +33,24 @@ def robustness(report: Report) -> list[str]:
     ]
 
 
-def _in_variant(report: Report, variant: Variant, said: str, untried: str) -> str:
+def _in_variant(report: Report, variant: Variant, opening: str, untried: str) -> str:
     """Return r of the scores with the SED in a variant, for each experiment."""
 
     def sed(one: PredictionFinding) -> float | None:
-        return next((found.sed for found in one.alternatives if found.variant == variant), None)
+        return next((alternative.sed for alternative in one.alternatives if alternative.variant == variant), None)
 
     tried = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
-    told = [
-        f"{experiment.name} {_words(found)}, n = {found.n} {'stimulus' if found.n == 1 else 'stimuli'}"
+    parts = [
+        f"{experiment.name} {_words(related)}, n = {related.n} {'stimulus' if related.n == 1 else 'stimuli'}"
         for experiment in report.experiments
         if experiment.name in tried
-        for found in [_related(report, experiment, sed)]
+        for related in [_related(report, experiment, sed)]
     ]
-    return f"{said}: {'; '.join(told)}." if told else untried
+    return f"{opening}: {'; '.join(parts)}." if parts else untried
 
 
-def _words(found: Relation) -> str:
-    return str(found.reason) if found.pearson is None else f"r = {correlation(found.pearson)}{ends_of(found)}"
+def _words(related: Relation) -> str:
+    return str(related.reason) if related.pearson is None else f"r = {correlation(related.pearson)}{ends_of(related)}"
 
 
 def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
@@ -68,18 +68,18 @@ def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
 
 def _by_place(report: Report) -> str:
     """Return how far along the skin the ending may lie without another sign of r."""
-    told: list[str] = []
+    ranges: list[str] = []
     for experiment in report.experiments:
         by_place = {arc: _related(report, experiment, _at(arc)).pearson for arc in _places(report, experiment)}
         known = {arc: r for arc, r in by_place.items() if r is not None}
         if 0.0 in known:
             low, high = _alike(known)
-            told.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
-    if not told:
+            ranges.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
+    if not ranges:
         return "How the sign of r depends on the place of the ending is not known here."
     return (
         f"The sign of r stays the same if the ending is moved along the skin (tried up to {REACH:g} mm to each side, "
-        f"positive towards the tip): in {' and in '.join(told)}."
+        f"positive towards the tip): in {' and in '.join(ranges)}."
     )
 
 

@@ -23,11 +23,11 @@ STRETCHES = 700  # of the whole recording, each drawn by its least and its great
 def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ...]:
     """Return the strokes, numbered in order of time, with what their trials ask for."""
     planned = {trial.number: trial for trial in recording.plan.trials}
-    found: list[StrokeFinding] = []
+    findings: list[StrokeFinding] = []
     for position, stroke in enumerate(analysis.strokes):
         trial = None if stroke.trial is None else planned.get(stroke.trial)
         intervals = analysis.intervals[position]
-        told: dict[str, Any] = {
+        numbers: dict[str, Any] = {
             "number": position + 1,
             "experiment": "" if trial is None else trial.block,
             "index": None if trial is None else trial.stimulus.index,
@@ -40,8 +40,8 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
             "within": stroke.number,
             "decided": dict(stroke.decided),
         }
-        found.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **told}))
-    return tuple(found)
+        findings.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **numbers}))
+    return tuple(findings)
 
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:
@@ -65,9 +65,9 @@ def course(recording: Recording) -> Course | None:
     )
 
 
-def _reasons(stroke: Stroke, position: int, told: tuple[Flaw, ...]) -> dict[str, str]:
+def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
     """Return a sentence for every number withheld, by its name."""
-    sentences = {str(flaw.name): flaw.sentence for flaw in told if flaw.stroke == position}
+    sentences = {str(flaw.name): flaw.sentence for flaw in flaws if flaw.stroke == position}
     reasons = {number: sentences.get(name, name.replace("_", " ")) for number, name in stroke.reasons.items()}
     usual = {
         "trial": "the recording has no trials",

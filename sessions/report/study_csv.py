@@ -79,7 +79,7 @@ def columns_csv(study: StudyFindings) -> str:
     out = io.StringIO()
     first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
     rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
-    rows += [[_heading(name), *told] for name, told in {**_MEANING, **_RESPONSES}.items()]
+    rows += [[_heading(name), *meaning] for name, meaning in {**_MEANING, **_RESPONSES}.items()]
     write_rows(out, [*rows, ["excluded", "", _OWN["excluded"]]])
     return out.getvalue()
 
@@ -92,10 +92,10 @@ def paths_csv(study: StudyFindings) -> str:
     heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
     rows: list[list[object]] = [[*mark, "descriptor", *names, *heads]]
     for one in study.descriptors:
-        for found in one.paths:
-            numbers = (found.surfaces, found.trials, found.r, found.within, found.low, found.high)
-            told = [*(["yes"] if mark else []), one.descriptor, *(getattr(found.path, name) for name in names)]
-            rows.append([*told, "yes" if found.usual else "no", *(_plain(number) for number in numbers)])
+        for path in one.paths:
+            numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
+            cells = [*(["yes"] if mark else []), one.descriptor, *(getattr(path.path, name) for name in names)]
+            rows.append([*cells, "yes" if path.usual else "no", *(_plain(number) for number in numbers)])
     write_rows(out, rows)
     return out.getvalue()
 
@@ -109,8 +109,12 @@ def rivals_csv(study: StudyFindings) -> str:
     for one in study.descriptors:
         for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
             for rival in rivals:
-                found = rival.contrast
-                less = [None] * 5 if found is None else [found.difference, found.low, found.high, found.z, found.p]
+                contrast = rival.contrast
+                less = (
+                    [None] * 5
+                    if contrast is None
+                    else [contrast.difference, contrast.low, contrast.high, contrast.z, contrast.p]
+                )
                 numbers = [*(getattr(rival, name) for name in names), *less]
                 rows.append([*(["yes"] if mark else []), one.descriptor, kind, *(_plain(each) for each in numbers)])
     out = io.StringIO()
@@ -134,9 +138,9 @@ def trials_csv(study: StudyFindings) -> str:
             decision = decided(study.excluded, visit.subject, row.descriptor)
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
-            told = ["yes" if visit.simulated else "no"] if mark else []
+            cells = ["yes" if visit.simulated else "no"] if mark else []
             numbers = [*(getattr(row, name) for name in names), *map(row.responses.get, _RESPONSES)]
-            rows.append([*told, visit.session, visit.subject, *map(_plain, numbers), why])
+            rows.append([*cells, visit.session, visit.subject, *map(_plain, numbers), why])
     write_rows(out, rows)
     return out.getvalue()
 

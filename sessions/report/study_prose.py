@@ -27,21 +27,21 @@ def summary(study: StudyFindings) -> list[str]:
     """Return the findings in short, a sentence each."""
     subjects = {visit.subject for visit in study.visits}
     read = "was" if len(study.visits) == 1 else "were"
-    said = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
+    sentences = [f"{plural(len(study.visits), 'session')} of {plural(len(subjects), 'subject')} {read} read."]
     for one in study.descriptors:
-        said += _related(one, study)
-        said += scale_sentences(one)
-        said += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
-    said += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
+        sentences += _related(one, study)
+        sentences += scale_sentences(one)
+        sentences += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    sentences += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
     if study.friction is not None:
         f = study.friction
-        said.append(
+        sentences.append(
             f"Of {f.strokes} strokes the planted µ came back with a median error of "
             f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
             f"{f.covered} of {f.intervals} intervals of µ hold it, and those of one subject hold or miss together, for "
             "the error of a transducer's calibration is one for all its strokes."
         )
-    return said
+    return sentences
 
 
 def told_apart(study: StudyFindings) -> list[str]:
@@ -82,9 +82,9 @@ def _unrelated(one: DescriptorFindings, label: str) -> str:
 
 def _otherwise(one: DescriptorFindings, other: str) -> str:
     """Return what the same trials give at the other strain, as far as the many paths went there."""
-    usual = next((found.path for found in one.paths if found.usual), None)
+    usual = next((path.path for path in one.paths if path.usual), None)
     there = None if usual is None else replace(usual, kinematics=other)
-    tried = next((found for found in one.paths if found.path == there), None)
+    tried = next((path for path in one.paths if path.path == there), None)
     if tried is None:
         return f"at {other} strain, which was not tried here, the sign may differ"
     trials = plural(tried.trials, "trial")
@@ -108,61 +108,63 @@ def who(study: StudyFindings) -> list[Fact]:
 
 def excluded(study: StudyFindings) -> list[str]:
     """Return a sentence for all that was kept out of the results, by whom and why."""
-    said = [f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed]
-    said += [
+    sentences = [
+        f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed
+    ]
+    sentences += [
         f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
         for session, first in study.copies
     ]
-    said += [
+    sentences += [
         f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {_stopped(one.why)}"
         for one in study.excluded
         if _fits(study, one)
     ]
-    said += [
+    sentences += [
         f"Session {visit.session}: {_stopped(decision)}"
         for visit in study.visits
         for decision in visit.decisions
         if " is left out: " in decision
     ]
-    return [*said, *_missing(study)]
+    return [*sentences, *_missing(study)]
 
 
 def remarks(study: StudyFindings) -> list[str]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
-    said = [
+    sentences = [
         f"Session {visit.session}: {_stopped(decision)}"
         for visit in study.visits
         for decision in visit.decisions
         if " is left out: " not in decision
     ]
-    said += [
+    sentences += [
         f"Session {visit.session} ended before its last trial; what it holds counts."
         for visit in study.visits
         if not visit.complete
     ]
-    said += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
+    sentences += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
     for visit in study.visits:
         choices = sum(row.choice is not None for row in visit.rows)
         if choices:
-            said.append(
+            sentences.append(
                 f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
                 "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
             )
     for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
-        said += [f"{words}: {_listed(places)}."] if places else []
-    said += [
+        sentences += [f"{words}: {_listed(places)}."] if places else []
+    sentences += [
         f"A decision of {one.who} leaves out {_whats(one)} of subject {one.subject} ({one.why}), and no session read "
         "has such trials; see exclusions.toml."
         for one in study.excluded
         if not _fits(study, one)
     ]
-    said += [
+    sentences += [
         f"The {descriptor} scores of {subject} fall as the index rises (r = {correlation(r)}); the scale may have been "
         "used backwards."
         for subject, descriptor, r in study.reversed
     ]
-    return [*said, *_meshes(study)]
+    return [*sentences, *_meshes(study)]
 
 
 def _meshes(study: StudyFindings) -> list[str]:
@@ -176,7 +178,7 @@ def _meshes(study: StudyFindings) -> list[str]:
     if len(solved) < 2 or not errors:
         return []
     meshes = "; ".join(f"{value}: {_listed(sessions)}" for value, sessions in solved.items())
-    said = (
+    sentence = (
         f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as telling its own "
         "trials apart asks for. Within a subject all trials share one mesh; between subjects an SED may differ for its "
         f"mesh alone by as much as its estimated error, {_range_of(errors)} of it."
@@ -188,11 +190,11 @@ def _meshes(study: StudyFindings) -> list[str]:
         if s.response is not None and s.response.sd and study.response == SED.name  # whose errors these are
     ]
     if spreads:
-        said += (
+        sentence += (
             f" Standard deviations between subjects are {_range_of(spreads)} of the SED of a surface: where they are "
             "no larger than that error, part of them may be the mesh."
         )
-    return [said]
+    return [sentence]
 
 
 def _range_of(shares: Sequence[float]) -> str:
@@ -214,7 +216,7 @@ def _stopped(sentence: str) -> str:
 
 def _missing(study: StudyFindings) -> list[str]:
     """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
-    said: list[str] = []
+    sentences: list[str] = []
     alike: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for visit in study.visits:
         for row in visit.rows if visit.forces else ():
@@ -224,8 +226,8 @@ def _missing(study: StudyFindings) -> list[str]:
         first = "" if len({told for _, told in places}) == 1 else "of the first: "
         named = _listed([place for place, _ in places])
         why = f"{first}{_stopped(places[0][1])}"
-        said.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
-    return said
+        sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
+    return sentences
 
 
 def _listed(places: Sequence[str]) -> str:
@@ -234,25 +236,25 @@ def _listed(places: Sequence[str]) -> str:
 
 def sealed(study: StudyFindings) -> str:
     """Return whether predictions were sealed before scores."""
-    told = [(visit.session, visit.sealed) for visit in study.visits if visit.sealed]
-    if not told:
+    seals = [(visit.session, visit.sealed) for visit in study.visits if visit.sealed]
+    if not seals:
         return ""
     alike: defaultdict[str, list[str]] = defaultdict(list)
-    for session, sentence in told:
+    for session, sentence in seals:
         alike[sentence].append(session)
     if len(alike) == 1:
-        return f"In {'each' if len(told) > 1 else 'the one'} of {plural(len(told), 'session')}: {told[0][1]}"
+        return f"In {'each' if len(seals) > 1 else 'the one'} of {plural(len(seals), 'session')}: {seals[0][1]}"
     return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
 
 
 def modelled(study: StudyFindings) -> list[Fact]:
     """Return what was modelled; where sessions differ, each of the first few that do."""
-    told: defaultdict[str, dict[tuple[str, str], list[str]]] = defaultdict(dict)
+    effects: defaultdict[str, dict[tuple[str, str], list[str]]] = defaultdict(dict)
     for visit in study.visits:
         for name, value, remark in visit.model:
-            told[name].setdefault((value, remark), []).append(visit.session)
+            effects[name].setdefault((value, remark), []).append(visit.session)
     facts: list[Fact] = []
-    for name, values in told.items():
+    for name, values in effects.items():
         for (value, remark), sessions in list(values.items())[:_FEW]:
             whose = "" if len(values) == 1 else f"in {_listed(sessions)}"
             facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))

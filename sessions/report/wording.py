@@ -41,7 +41,7 @@ def with_error(value: float, error: float | None, least: int) -> str:
     return f"{digits(value, decimals)} ± {digits(error, decimals)}"
 
 
-def between(low: float, high: float, told: Callable[[float], str], unit: float = 1.0) -> str:
+def between(low: float, high: float, written: Callable[[float], str], unit: float = 1.0) -> str:
     """Return a range as `told` shows its ends, with more decimals where they would read alike.
 
     `unit` is what `told` multiplies a number by before it shows it.
@@ -49,10 +49,10 @@ def between(low: float, high: float, told: Callable[[float], str], unit: float =
     >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
     ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')
     """
-    if told(low) == told(high) and low != high:
+    if written(low) == written(high) and low != high:
         decimals = max(0, -math.floor(math.log10(unit * abs(high - low))))
         return f"{digits(unit * low, decimals)} to {digits(unit * high, decimals)}"
-    return f"{told(low)} to {told(high)}"
+    return f"{written(low)} to {written(high)}"
 
 
 def places(n: int) -> Callable[[float], str]:
@@ -136,7 +136,7 @@ def identifier(name: str) -> str:
     >>> identifier('relation a"b')
     'relation_20_a_22_b'
     """
-    return re.sub(r"[^A-Za-z0-9-]", lambda found: f"_{ord(found[0]):x}_", name)
+    return re.sub(r"[^A-Za-z0-9-]", lambda match: f"_{ord(match[0]):x}_", name)
 
 
 def p_value(p: float) -> str:

@@ -45,8 +45,8 @@ def crossed_deviance(
         left = total - half.T @ half
         fixed = np.linalg.solve(left[:2, :2], left[:2, 2])
         rest = float(left[2, 2] - left[:2, 2] @ fixed)
-        told = (across - wide.T @ half) @ np.append(-fixed, 1.0)  # Z' V^-1 of what the fixed terms leave
-        slope = np.diag(inner) - (wide**2).sum(axis=0) - n / rest * told**2
+        residual = (across - wide.T @ half) @ np.append(-fixed, 1.0)  # Z' V^-1 of what the fixed terms leave
+        slope = np.diag(inner) - (wide**2).sum(axis=0) - n / rest * residual**2
         value = 2.0 * float(np.log(np.diag(root)).sum()) + n * (1.0 + float(np.log(2.0 * np.pi * rest / n)))
         return value, 2.0 * spread * np.bincount(whose, slope)
 

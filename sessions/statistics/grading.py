@@ -27,8 +27,8 @@ def _sentence(answers: dict[int, float]) -> str:
     >>> _sentence({0: 3.0, 55: 62.0, 75: 58.0})
     'the grading does not hold: 75 was judged no higher than 55 (0: 3, 55: 62, 75: 58)'
     """
-    told = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
+    listed = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
     if len(answers) < 2:
-        return f"too few answers to see a grading ({told})"
+        return f"too few answers to see a grading ({listed})"
     wrong = [f"{b} was judged no higher than {a}" for a, b in pairwise(sorted(answers)) if answers[b] <= answers[a]]
-    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({told})"
+    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({listed})"

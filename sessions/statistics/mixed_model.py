@@ -82,8 +82,8 @@ def mixed_model(
     spread = np.sqrt(np.diag(fit.among)) / scale[:own]
     others = max(len(score) - len(names) - (count - 1) * own, 1)
     free = [count - 1, varies - 1, *([others] * len(names))] if slopes_differ else [None] * len(names)
-    found = zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free, strict=False)
-    terms = tuple(_term(name, estimate, error, dof) for name, estimate, error, dof in found)
+    estimates = zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free, strict=False)
+    terms = tuple(_term(name, estimate, error, dof) for name, estimate, error, dof in estimates)
     first, *common = covariates.values()
     differ = spreads(subjects, score, common, first) if slopes_differ else spreads(subjects, score, [first, *common])
     return MixedModel(

@@ -79,7 +79,7 @@ class Path:
 
 
 CHOICES = ("filter", "window", "mu", "area", "receptor", "kinematics")
-TOLD: Mapping[str, str] = {
+CHOICE_LABELS: Mapping[str, str] = {
     "filter": "cut-off of the forces' filter",
     "window": "steady window",
     "mu": "µ of the model",
@@ -126,9 +126,11 @@ def trial_paths(
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
     known = [row.prediction for row in prediction.trials if row.prediction is not None]
-    found = _solved(tuple(wanted), known, quantity, progress)
+    answers = _solved(tuple(wanted), known, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
-    return {trial: tuple(_value(found, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials}
+    return {
+        trial: tuple(_value(answers, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials
+    }
 
 
 def _without_receptor(path: Path) -> tuple[str, ...]:
@@ -165,8 +167,8 @@ def _varied(
     return replace(analysis, friction=tuple(friction))
 
 
-def _value(found: Mapping[Scene, Pair | None], scene: Scene | None, path: Path) -> float | None:
-    answer = None if scene is None else found.get(scene)
+def _value(answers: Mapping[Scene, Pair | None], scene: Scene | None, path: Path) -> float | None:
+    answer = None if scene is None else answers.get(scene)
     return None if answer is None else answer[RECEPTORS.index(path.receptor)]
 
 
@@ -186,14 +188,14 @@ def _solved(
     new = [kind for kind in first if kind not in held]
     answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
     held |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
-    found: dict[Scene, Pair | None] = {}
+    pairs: dict[Scene, Pair | None] = {}
     for kind, slide in zip(held, slides(list(held.values()), _part(progress, 0.5, 0.7)), strict=True):
-        found |= _near(slide, alike[kind], quantity)
-    rest = [scene for scene in scenes if scene not in found]
+        pairs |= _near(slide, alike[kind], quantity)
+    rest = [scene for scene in scenes if scene not in pairs]
     answers = [answer for answer in settled(rest, _part(progress, 0.7, 0.9)) if answer is not None]
     for answer, slide in zip(answers, slides(answers, _part(progress, 0.9, 1.0)), strict=True):
-        found |= _near(slide, [answer.scene], quantity)
-    return found
+        pairs |= _near(slide, [answer.scene], quantity)
+    return pairs
 
 
 def _near(slide: Nearby | None, scenes: Sequence[Scene], quantity: Quantity) -> Mapping[Scene, Pair]:
@@ -288,7 +290,7 @@ class Spread:
     """The correlations of some paths as a distribution."""
 
     paths: int
-    told: int  # of them with a correlation; the numbers below are theirs
+    correlated: int  # of them with a correlation; the numbers below are theirs
     distinct: int  # of these correlations, as many differ by more than `SAME`
     least: float
     lower: float  # quartile
@@ -308,7 +310,7 @@ def spread(values: Sequence[float | None]) -> Spread | None:
     """Return the distribution of correlations; None where there is none.
 
     >>> of = spread([0.5, None, 0.7, 0.701])
-    >>> of.median, of.told, of.distinct
+    >>> of.median, of.correlated, of.distinct
     (0.7, 3, 2)
     """
     held = sorted(value for value in values if value is not None)
@@ -333,11 +335,11 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread |
     Medians that lie far apart within a choice say that it matters.
     """
     values = correlations(findings)
-    told: list[tuple[str, str, Spread | None, bool]] = []
+    rows: list[tuple[str, str, Spread | None, bool]] = []
     for choice in CHOICES:
         names = dict.fromkeys(getattr(one.path, choice) for one in findings)
         usual = {getattr(one.path, choice) for one in findings if one.usual}
         for name in names:
             held = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
-            told.append((choice, name, spread(held), name in usual))
-    return tuple(told)
+            rows.append((choice, name, spread(held), name in usual))
+    return tuple(rows)

@@ -85,7 +85,7 @@ def _study(planted: Planted, people: int, count: int, rng: np.random.Generator) 
 
 def _verdict(subjects: Sequence[str], mu: Array, scores: Array) -> float:
     """Return the sign that the test finds, 0 where it finds none."""
-    found = repeated_correlation(subjects, mu.tolist(), scores.tolist())
-    if found is None or found.people_p is None or found.people_p >= ALPHA:
+    repeated = repeated_correlation(subjects, mu.tolist(), scores.tolist())
+    if repeated is None or repeated.people_p is None or repeated.people_p >= ALPHA:
         return 0.0
-    return math.copysign(1.0, found.r)
+    return math.copysign(1.0, repeated.r)

@@ -105,12 +105,12 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
     deviances = {name: _deviance(name, counted) for name in names}
     whole = {name: value for name, value in deviances.items() if not isinstance(value, str)}
     weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
-    found: list[Rival] = []
+    rivals: list[Rival] = []
     for name in names:
         told = deviances[name]
         rival = replace(_within(name, model, counted), weight=weights.get(name))
-        found.append(_because(rival, "weight", told if isinstance(told, str) else None))
-    return tuple(found)
+        rivals.append(_because(rival, "weight", told if isinstance(told, str) else None))
+    return tuple(rivals)
 
 
 def _ordered(model: str) -> tuple[str, ...]:
@@ -270,8 +270,8 @@ def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
     if min(len(set(subjects)), len(set(surfaces))) < 2 or len(trials) < 6:
         return "too few subjects, surfaces or trials for a model of five parameters"
     x, y = [trial.values[name] for trial in trials], [trial.score for trial in trials]
-    found = crossed_deviance(subjects, surfaces, y, x)
-    return "it does not vary, or the scores leave nothing to tell an error from" if found is None else found
+    deviance = crossed_deviance(subjects, surfaces, y, x)
+    return "it does not vary, or the scores leave nothing to tell an error from" if deviance is None else deviance
 
 
 def _means(

@@ -94,16 +94,16 @@ def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread
     Its lower end is 0 exactly where an F test does not tell the two apart.
     """
     tail = (1 - CONFIDENCE) / 2
-    found = first - second
+    difference = first - second
 
     def over(q: float, dof: int) -> float:
         return dof / float(special.chdtri(dof, 1 - q))
 
     f, g, h = float(special.fdtri(n, m, 1 - tail)), 1 - over(1 - tail, n), over(tail, m) - 1
-    both = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
-    low = found - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + both * first * second, 0.0))
+    covered = ((f - 1) ** 2 - (g * f) ** 2 - h * h) / f
+    low = difference - math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + covered * first * second, 0.0))
     f, g, h = float(special.fdtri(n, m, tail)), over(tail, n) - 1, 1 - over(1 - tail, m)
-    both = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
-    high = found + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + both * first * second, 0.0))
-    sd, least, greatest = (math.sqrt(max(square, 0.0)) for square in (found, low, high))
+    covered = ((1 - f) ** 2 - (g * f) ** 2 - h * h) / f
+    high = difference + math.sqrt(max((g * first) ** 2 + (h * second) ** 2 + covered * first * second, 0.0))
+    sd, least, greatest = (math.sqrt(max(square, 0.0)) for square in (difference, low, high))
     return Spread(sd, least, greatest)

@@ -162,7 +162,7 @@ def differences(table: Table) -> tuple[Difference, ...]:
     from scipy import stats
 
     indices = sorted({index for row in table.values() for index in row})
-    found: list[Difference] = []
+    rows: list[Difference] = []
     for a, b in itertools.combinations(indices, 2):
         steps = np.array([row[b] - row[a] for row in table.values() if a in row and b in row])
         if len(steps) < 3 or float(np.ptp(steps)) == 0.0:
@@ -170,9 +170,9 @@ def differences(table: Table) -> tuple[Difference, ...]:
         test = stats.ttest_1samp(steps, 0.0)
         low, high = test.confidence_interval(CONFIDENCE)
         p = float(test.pvalue)
-        found.append(Difference(a, b, len(steps), float(steps.mean()), float(low), float(high), p, p))
-    adjusted = holm([one.p for one in found])
-    return tuple(replace(one, p_holm=p) for one, p in zip(found, adjusted, strict=True))
+        rows.append(Difference(a, b, len(steps), float(steps.mean()), float(low), float(high), p, p))
+    adjusted = holm([one.p for one in rows])
+    return tuple(replace(one, p_holm=p) for one, p in zip(rows, adjusted, strict=True))
 
 
 def holm(ps: Sequence[float]) -> tuple[float, ...]:

@@ -241,7 +241,7 @@ def _width(scene: Scene, width: float) -> dict[str, Any]:
 COARSE = 0.5  # tolerance that asks for the coarsest mesh
 Answer = Prediction | SolveFailure
 Answers = Callable[[Sequence[Scene]], tuple[Answer, ...]]
-TOLD = "measured on a coarse mesh: change of the ending's SED "
+MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 
 def measured(found: Prediction, answers: Answers) -> Prediction:
@@ -284,13 +284,13 @@ def _difference(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
         return {
             "estimate": None,
             "from": {"limit_mu": other.limit_mu},
-            "how": f"{TOLD}{how}: no settled state is there",
+            "how": f"{MEASURED}{how}: no settled state is there",
         }
     if isinstance(other, SolveFailure):
-        return {"how": f"{TOLD}{how} was to be measured, but: {other}"}
+        return {"how": f"{MEASURED}{how} was to be measured, but: {other}"}
     change = abs(other.sed_ending / base.sed_ending - 1.0) if base.sed_ending else None
     numbers = {"without_MPa": base.sed_ending, "with_MPa": other.sed_ending}
-    return {"estimate": change, "from": numbers, "how": TOLD + how}
+    return {"estimate": change, "from": numbers, "how": MEASURED + how}
 
 
 def _beyond_errors(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
@@ -301,7 +301,7 @@ def _beyond_errors(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
     change, errors = found["estimate"], base.error_estimate + other.error_estimate
     if change > errors:
         return found
-    return {"how": f"{TOLD}{how}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"}
+    return {"how": f"{MEASURED}{how}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"}
 
 
 def _at_finite_strain(scene: Scene) -> Scene:

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from sessions.prediction.afferent import (
-    TOLD,
+    PARAMETERS,
     AfferentSettings,
     firing_rate,
     parameters,
@@ -121,7 +121,7 @@ def test_the_same_seed_gives_the_same_spikes_and_each_trial_its_own():
 
 
 def test_every_parameter_is_told_with_its_standing():
-    assert {*TOLD, "quantity"} == {field.name for field in fields(AfferentSettings)}
+    assert {*PARAMETERS, "quantity"} == {field.name for field in fields(AfferentSettings)}
     assert {one["standing"] for one in parameters(USUAL) if one["name"] != "seed"} == {"assumed"}
 
 

@@ -125,7 +125,7 @@ def test_one_path_is_the_usual_one_and_the_distribution_counts_them_all():
     assert usual.path.mu == "maximum"
     assert usual.r == pytest.approx(1.0)
     whole = spread(correlations(found))
-    assert (whole.paths, whole.told, whole.least, whole.greatest) == (len(SMALL), len(SMALL), -1.0, 1.0)
+    assert (whole.paths, whole.correlated, whole.least, whole.greatest) == (len(SMALL), len(SMALL), -1.0, 1.0)
     assert whole.distinct == 2  # of so many paths, one result for each receptor
 
 
@@ -134,4 +134,4 @@ def test_a_path_that_leaves_too_few_surfaces_gives_no_correlation_and_is_counted
     found = path_findings(trials, "small", within=False)
     assert [one.surfaces for one in found[:2]] == [3, 0]
     whole = spread(correlations(found))
-    assert (whole.paths, whole.told) == (len(SMALL), 1)
+    assert (whole.paths, whole.correlated) == (len(SMALL), 1)

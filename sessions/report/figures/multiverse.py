@@ -9,7 +9,7 @@ import numpy as np
 
 from sessions.report.figures.style import GREY, INK, PALE, Panel, look, sheet, svg
 from sessions.report.wording import correlation
-from sessions.statistics.multiverse import CHOICES, TOLD, PathFinding, by_choice, correlations
+from sessions.statistics.multiverse import CHOICE_LABELS, CHOICES, PathFinding, by_choice, correlations
 
 CAPTION = (
     "Correlation of the predicted response with scores along every path of the analysis. Above: how many paths come "
@@ -26,29 +26,29 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: 
     held = [value for value in values if value is not None]
     if not held:
         return None
-    told = by_choice(findings)
+    choices = by_choice(findings)
     usual = next((r for one, r in zip(findings, values, strict=True) if one.usual and r is not None), None)
     with look():
-        drawn = sheet(328, 190 + 13 * len(told), (1.0, 0.115 * len(told)))
+        drawn = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
         above, below = drawn.axes
         low, high = _ends(held)
         counts, edges = np.histogram(held, _BINS, (low, high))
         above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
         above.set_ylabel("paths [number]")
         above.set_title(f"{descriptor}: {len(held)} paths")
-        for y, (choice, name, of, is_usual) in enumerate(told):
+        for y, (choice, name, of, is_usual) in enumerate(choices):
             if of is None:
                 below.text(low, y, "none", fontsize=7, va="center", color=GREY)
             else:
-                words = f"{TOLD[choice]} {name}: median r {correlation(of.median)} of {of.told} paths"
+                words = f"{CHOICE_LABELS[choice]} {name}: median r {correlation(of.median)} of {of.correlated} paths"
                 below.plot([of.least, of.greatest], [y, y], color=GREY, linewidth=1.1)
                 below.plot(of.median, y, "|", color=INK, markersize=9, markeredgewidth=1.4, gid=drawn.note(words))
             if is_usual:
                 below.plot(low - 0.02 * (high - low), y, "D", color=INK, markersize=2.6, clip_on=False)
-        below.set_yticks(range(len(told)), [name for _, name, _, _ in told], fontsize=7)
-        below.set_ylim(len(told) - 0.4, -0.6)
-        for before in range(1, len(told)):
-            if told[before][0] != told[before - 1][0]:
+        below.set_yticks(range(len(choices)), [name for _, name, _, _ in choices], fontsize=7)
+        below.set_ylim(len(choices) - 0.4, -0.6)
+        for before in range(1, len(choices)):
+            if choices[before][0] != choices[before - 1][0]:
                 below.axhline(before - 0.5, color=PALE, linewidth=0.6)
         below.set_xlabel("correlation of SED with score [–]")
         for axes in drawn.axes:

@@ -21,25 +21,25 @@ def relation_panel(
     """Return the experiment's response against mean score with both errors, their line, r, its interval and n."""
     means = {mean.index: mean for mean in experiment.scores}
     shown = shown_response(experiment.response)
-    told = [(p, shown.of(p)) for p in predictions]
-    points = [(means[p.index], found) for p, found in told if found is not None and p.index in means]
+    pairs = [(p, shown.of(p)) for p in predictions]
+    points = [(means[p.index], numbers) for p, numbers in pairs if numbers is not None and p.index in means]
     if len(points) < 2:
         return None
     figure_sheet = _two_columns()
     axes, beside = figure_sheet.axes
     related = experiment.score_relation
     rising = related is not None and (related.slope or 0.0) > 0.0
-    for mean, found in points:
-        expected = shown.factor * (found[0] if related is None else _on_line(related, mean.mean))
-        _point(figure_sheet, mean, found, shown, above=shown.factor * found[0] >= expected, rising=rising)
+    for mean, numbers in points:
+        expected = shown.factor * (numbers[0] if related is None else _on_line(related, mean.mean))
+        _point(figure_sheet, mean, numbers, shown, above=shown.factor * numbers[0] >= expected, rising=rising)
         own = experiment.own_scores.get(mean.index)
         if own is not None:
-            text = f"index {mean.index}: own score {own:.1f}, {shown.label} {shown.told(shown.factor * found[0])}"
-            axes.plot(own, shown.factor * found[0], "o", color=GREEN, mfc="none", ms=4, gid=figure_sheet.note(text))
+            text = f"index {mean.index}: own score {own:.1f}, {shown.label} {shown.text(shown.factor * numbers[0])}"
+            axes.plot(own, shown.factor * numbers[0], "o", color=GREEN, mfc="none", ms=4, gid=figure_sheet.note(text))
     if related is not None:
         ends = [min(m.mean for m, _ in points), max(m.mean for m, _ in points)]
         axes.plot(ends, [shown.factor * _on_line(related, x) for x in ends], color=GREEN, linewidth=1.0, zorder=1)
-    values = [shown.factor * found[0] for _, found in points]
+    values = [shown.factor * numbers[0] for _, numbers in points]
     low, high = min(values), max(values)
     room = 0.18 * (high - low or abs(high))
     axes.set_ylim(low - room, high + room)
@@ -48,7 +48,7 @@ def relation_panel(
     axes.set_xlabel(f"mean score of {experiment.descriptor} [0–100]")
     axes.set_ylabel(f"predicted {shown.label} [{shown.unit}]")
     title = (
-        f"{relation_words(experiment)}\nrange of {shown.label}: {shown.told(high - low)} ({spread_share(low, high)})"
+        f"{relation_words(experiment)}\nrange of {shown.label}: {shown.text(high - low)} ({spread_share(low, high)})"
     )
     axes.set_title(f"{title}\n{rival_words(experiment.rivals)}".strip())
     beside.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
@@ -68,15 +68,15 @@ def relation_panel(
         f"error estimate of {shown.label} [-]",
     )
     rows = tuple(
-        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), found[0], _relative(found))
-        for m, found in points
+        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), numbers[0], _relative(numbers))
+        for m, numbers in points
     )
     return Panel(name, title, svg(figure_sheet, name, title, simulated=simulated), header, rows)
 
 
-def _relative(found: Numbers) -> float | None:
+def _relative(numbers: Numbers) -> float | None:
     """Return the error of a response by its size; None where there is none."""
-    return found[1] / abs(found[0]) if len(found) > 1 and found[0] else None
+    return numbers[1] / abs(numbers[0]) if len(numbers) > 1 and numbers[0] else None
 
 
 def relation_words(experiment: Experiment) -> str:
@@ -107,14 +107,14 @@ def _on_line(related: Relation, score: float) -> float:
     return related.intercept + related.slope * score
 
 
-def _point(drawn: Sheet, mean: MeanScore, found: Numbers, shown: ShownResponse, *, above: bool, rising: bool) -> None:
+def _point(drawn: Sheet, mean: MeanScore, numbers: Numbers, shown: ShownResponse, *, above: bool, rising: bool) -> None:
     """Draw one stimulus with both errors, its index on the side away from the line."""
     axes = drawn.axes[0]
-    value = shown.factor * found[0]
-    text = f"index {mean.index}: score {mean.mean:.1f}, {shown.label} {shown.told(value)}"
+    value = shown.factor * numbers[0]
+    text = f"index {mean.index}: score {mean.mean:.1f}, {shown.label} {shown.text(value)}"
     if mean.low is not None and mean.high is not None:
         axes.plot([mean.low, mean.high], [value, value], color=GREY, linewidth=0.8, zorder=2)
-    for error in (shown.factor * one for one in found[1:]):
+    for error in (shown.factor * one for one in numbers[1:]):
         axes.plot([mean.mean] * 2, [value - error, value + error], color=GREY, linewidth=0.8, zorder=2)
     axes.plot(mean.mean, value, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(text))
     right = above != rising  # away from the line

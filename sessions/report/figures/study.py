@@ -65,7 +65,7 @@ def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool)
         own = sorted((shown.factor * value, score, index) for of, index, value, score in one.points if of == subject)
         axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)
         for x, y, index in own if each else ():
-            words = f"subject {subject}, index {index}: {shown.label} {shown.told(x)}, score {y:.1f}"
+            words = f"subject {subject}, index {index}: {shown.label} {shown.text(x)}, score {y:.1f}"
             axes.plot(x, y, "o", color=GREY, markersize=2, gid=drawn.note(words))
         if not each:
             dots = [x for x, _, _ in own], [y for _, y, _ in own]
@@ -76,7 +76,7 @@ def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool)
         response = surface.response
         if response is not None and surface.index in means:
             x, y = shown.factor * response.mean, means[surface.index]
-            words = f"index {surface.index}: mean {shown.label} {shown.told(x)}, mean score {y:.1f}"
+            words = f"index {surface.index}: mean {shown.label} {shown.text(x)}, mean score {y:.1f}"
             axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(words))
             low, high = bars[surface.index]
             if response.low is not None and response.high is not None:

@@ -141,10 +141,10 @@ def _mixed(colour: str, towards: float) -> str:
 @contextmanager
 def in_pixels() -> Generator[dict[str, bytes]]:
     """Also draw every picture made meanwhile in pixels: yields PNGs by the pictures' names."""
-    found: dict[str, bytes] = {}
-    before = _PIXELS.set(found)
+    images: dict[str, bytes] = {}
+    before = _PIXELS.set(images)
     try:
-        yield found
+        yield images
     finally:
         _PIXELS.reset(before)
 
@@ -162,10 +162,10 @@ def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
     buffer = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name}):
         drawn.figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    if (found := _PIXELS.get()) is not None:
+    if (images := _PIXELS.get()) is not None:
         pixels = io.BytesIO()
         drawn.figure.savefig(pixels, format="png", dpi=DOTS, facecolor="white", metadata={"Software": None})
-        found[name] = pixels.getvalue()
+        images[name] = pixels.getvalue()
     return _finished(buffer.getvalue(), name, title, drawn.hover, simulated=simulated)
 
 

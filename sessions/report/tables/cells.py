@@ -79,19 +79,19 @@ class Notes:
         ends: tuple[float, float] | None,
         without: str | None = None,
         *,
-        told: Callable[[float], str] | None = None,
+        of_ends: Callable[[float], str] | None = None,
         unit: float = 1.0,
     ) -> Cell:
         """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
 
-        `told` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
+        `of_ends` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
         """
         if value is None:
             return self.number(None, shown, reason)
         if ends is None:
             why = f"no interval: {without or 'not computed'}"
             return Cell(shown(value), self.mark(why), why)
-        return Cell(shown(value), interval=between(*ends, told or shown, unit))
+        return Cell(shown(value), interval=between(*ends, of_ends or shown, unit))
 
     def interval(
         self, low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from sessions.report.tables.cells import Cell, Group, Row, Table, table
 from sessions.report.wording import NONE, correlation
-from sessions.statistics.multiverse import SAME, TOLD, PathFinding, Spread, by_choice, correlations, spread
+from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
 
 Named = tuple[str, Sequence[PathFinding]]
 
@@ -34,8 +34,9 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     if whole is None:
         return f"{start} none gives a correlation."
     return (
-        f"{start} {whole.told} give a correlation, from {correlation(whole.least)} to {correlation(whole.greatest)}, "
-        f"median {correlation(whole.median)}; {whole.distinct} of these differ by more than {SAME:g}."
+        f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
+        f"{correlation(whole.greatest)}, median {correlation(whole.median)}; "
+        f"{whole.distinct} of these differ by more than {SAME:g}."
     )
 
 
@@ -44,7 +45,7 @@ def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
     before = ""
     for choice, name, of, usual in by_choice(findings):
         held = sum(getattr(one.path, choice) == name for one in findings)
-        told = TOLD[choice] if choice != before else ""
+        told = CHOICE_LABELS[choice] if choice != before else ""
         rows.append((Cell(told), Cell(name), Cell("usual" if usual else ""), *_spread(of, held)))
         before = choice
     return tuple(rows)
@@ -54,4 +55,8 @@ def _spread(of: Spread | None, paths: int) -> Row:
     if of is None:
         return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(6)))
     numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
-    return (Cell(f"{of.told} of {paths}"), Cell(str(of.distinct)), *(Cell(correlation(value)) for value in numbers))
+    return (
+        Cell(f"{of.correlated} of {paths}"),
+        Cell(str(of.distinct)),
+        *(Cell(correlation(value)) for value in numbers),
+    )

@@ -86,7 +86,7 @@ def _sed(
 
     `star` marks an interval that was found otherwise than the others of its table.
     """
-    cell = notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, told=sed, unit=1e3)
+    cell = notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, of_ends=sed, unit=1e3)
     return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
 
 
@@ -111,9 +111,9 @@ def afferent_table(report: Report) -> Table | None:
     columns = f"{shown.label} [{shown.unit}] | peak rate [imp/s] | settled rate [imp/s]"
 
     def row(p: PredictionFinding) -> Row:
-        told = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
+        firing = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
         why, without = p.reasons.get("sed"), p.reasons.get("sed_interval") if published else _SED_ALONE
-        rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in told)
+        rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in firing)
         return (_stroked_sed(p, notes) if published else _responding(p, shown, notes), *rates)
 
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
@@ -129,10 +129,10 @@ def afferent_table(report: Report) -> Table | None:
 
 def _responding(p: PredictionFinding, shown: ShownResponse, notes: Notes) -> Cell:
     """Return a quantity at the ending in the unit shown, ± its error from the mesh."""
-    found = shown.of(p)
-    if not found:
+    numbers = shown.of(p)
+    if not numbers:
         return notes.number(None, str, p.reasons.get("sed"))
-    value, error = (shown.factor * number for number in (*found, 0.0)[:2])
+    value, error = (shown.factor * number for number in (*numbers, 0.0)[:2])
     return Cell(with_error(value, error, shown.places))
 
 
@@ -149,9 +149,9 @@ def beside_table(report: Report) -> Table | None:
             return _alone(notes, one.sed, sed, one.doubt)
         return _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
 
-    told = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
+    legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     caption = (
-        f"The same trials predicted otherwise, SED in kPa: {told}. ±: the solver's estimate of its error, from the "
+        f"The same trials predicted otherwise, SED in kPa: {legend}. ±: the solver's estimate of its error, from the "
         "mesh. Under it: the 95 % interval that the uncertainty of friction makes, and of the force where that drives "
         f"the model, {_HOW}. At one strain all trials of a column share a mesh. A dash says why."
     )
@@ -175,7 +175,7 @@ def beside_forces_table(report: Report) -> Table | None:
         value = None if one.sed is None else value
         if one.doubt and value is not None:
             return _alone(notes, value, places(2), one.doubt)
-        return notes.estimate(value, _with(error, 2), one.reason, ends, why, told=places(2))
+        return notes.estimate(value, _with(error, 2), one.reason, ends, why, of_ends=places(2))
 
     units = {
         one.variant.way: "mm" if one.variant.driven == "force" else "N"
@@ -230,7 +230,7 @@ def force_table(report: Report) -> Table | None:
             value, shown = getattr(p, name), places(decimals)
             if p.doubt and value is not None and name in _OF_STATE:
                 return _alone(notes, value, shown, p.doubt)
-            return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, told=shown)
+            return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, of_ends=shown)
 
         why = p.reasons.get("sed_interval")
         return (

@@ -15,12 +15,12 @@ LEAST_OF_A_MEAN = 2  # subjects
 Judged = tuple[str, Mapping[str, Psychometric], Means]  # what was judged, each subject's function, and means
 
 
-def psychometric_table(found: Iterable[Judged]) -> Table | None:
+def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
     """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
     notes = Notes()
     groups = [
         Group(name, (*(_row(who, one, notes) for who, one in functions.items()), *_mean_row(means, notes)))
-        for name, functions, means in found
+        for name, functions, means in judgements
         if functions
     ]
     caption = (
@@ -43,8 +43,8 @@ def compared_with_standard(report: Report) -> list[Judged]:
 
 def compared_in_study(study: StudyFindings) -> list[Judged]:
     """Return what the table of a study is made of: every subject's functions, and means over them."""
-    found = ((one.descriptor, one.constant_stimuli) for one in study.descriptors)
-    return [(name, one.functions, (one.pse, one.jnd)) for name, one in found if one is not None]
+    pairs = ((one.descriptor, one.constant_stimuli) for one in study.descriptors)
+    return [(name, one.functions, (one.pse, one.jnd)) for name, one in pairs if one is not None]
 
 
 def psychometric_sentences(judged: Judged) -> list[str]:
@@ -52,22 +52,22 @@ def psychometric_sentences(judged: Judged) -> list[str]:
     name, functions, (pse, jnd) = judged
     title = name[:1].upper() + name[1:]
     fitted = [one for one in functions.values() if one.pse is not None and one.jnd is not None]
-    said: list[str] = []
+    sentences: list[str] = []
     if len(functions) == 1:
-        said += [_of_one(title, one) for one in functions.values()]
+        sentences += [_of_one(title, one) for one in functions.values()]
     elif pse is not None and jnd is not None:
         equal = f"{digits(math.exp(pse.mean), 2)}{_range(_ends(pse), math.exp, 2)}"
         least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(_ends(jnd), _mean_percent, 0)}"
-        said.append(
+        sentences.append(
             f"{title}: over {pse.n} of {len(functions)} subjects the surface felt equal to the standard has {equal} "
             f"times its µ; over {jnd.n} the just noticeable difference is {least}."
         )
     elif functions:
-        said.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
+        sentences.append(f"{title}: no subject's answers give a psychometric function; the table says why.")
     falling = sum(not one.rises for one in fitted)
     if falling:
-        said.append(f"{title}: {falling} of {len(fitted)} subjects chose the surface of less µ more often.")
-    return said
+        sentences.append(f"{title}: {falling} of {len(fitted)} subjects chose the surface of less µ more often.")
+    return sentences
 
 
 def _of_one(title: str, one: Psychometric) -> str:
@@ -137,11 +137,11 @@ def _row(who: str, one: Psychometric, notes: Notes) -> Row:
     )
 
 
-def _cell(found: Profile | None, one: Psychometric, unit: Callable[[float], float], after: int, notes: Notes) -> Cell:
-    if found is None:
+def _cell(profile: Profile | None, one: Psychometric, unit: Callable[[float], float], after: int, notes: Notes) -> Cell:
+    if profile is None:
         return notes.number(None, str, one.reason or "orders are not known")
-    ends = None if found.low is None or found.high is None else (unit(found.low), unit(found.high))
-    sides = [f"above {digits(unit(found.low), after)}"] if found.low is not None else []
-    sides += [f"below {digits(unit(found.high), after)}"] if found.high is not None else []
+    ends = None if profile.low is None or profile.high is None else (unit(profile.low), unit(profile.high))
+    sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
+    sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []
     without = f"within what was compared the answers bound it {' and '.join(sides) or 'on neither side'}"
-    return notes.estimate(unit(found.value), places(after), None, ends, without)
+    return notes.estimate(unit(profile.value), places(after), None, ends, without)

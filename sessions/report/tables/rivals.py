@@ -52,9 +52,9 @@ def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: 
 def rival_words(rivals: Sequence[Rival]) -> str:
     """Return lines with the r of each measured rival for the title of a picture, "" where there is none."""
     measured = [rival for rival in rivals if rival.name not in RESPONSES]
-    told = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
-    unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in told]
-    return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if told else ""
+    correlations = [(rival.name, correlation(rival.r)) for rival in measured if rival.r is not None]
+    unbroken = [f"{name} {r}".replace(" ", "\N{NO-BREAK SPACE}") for name, r in correlations]
+    return fill(f"r of rivals: {', '.join(unbroken)}", _LINE) if correlations else ""
 
 
 def rivals_sentences(name: str, rivals: Sequence[Rival]) -> list[str]:
@@ -74,14 +74,14 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     names = _named([rival.name for rival in alike])
     needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
     each = [f"{_rounded(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
-    said = (
+    opening = (
         f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
         f"of scores can tell {them} apart from it; "
     )
     if not each:
-        return [f"{said}at the r seen here, no number of surfaces would."]
+        return [f"{opening}at the r seen here, no number of surfaces would."]
     return [
-        f"{said}at the r seen here, Steiger's test would need about {' to '.join(each)} surfaces for {POWER:.0%} "
+        f"{opening}at the r seen here, Steiger's test would need about {' to '.join(each)} surfaces for {POWER:.0%} "
         "power.".replace("%", "\N{NO-BREAK SPACE}%")
     ]
 
@@ -90,33 +90,33 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
     """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
     for rival in compared:
-        found = rival.contrast
-        if found is not None:
-            side = "more" if found.difference < 0.0 else "less"
-            sides[side if found.differs(_ALPHA) else "neither"].append(rival.name)
+        contrast = rival.contrast
+        if contrast is not None:
+            side = "more" if contrast.difference < 0.0 else "less"
+            sides[side if contrast.differs(_ALPHA) else "neither"].append(rival.name)
     if not compared:
         return [f"Of {name} the surfaces are too few, or r too near 1, to compare the {model} with any rival."]
-    told = [f"{_named(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]]
-    said = f"the scores follow {' and '.join(told)} (p < 0.05, not corrected)" if told else ""
+    followed = [f"{_named(sides[side])} {side} closely than the {model}" for side in ("more", "less") if sides[side]]
+    sentence = f"the scores follow {' and '.join(followed)} (p < 0.05, not corrected)" if followed else ""
     if sides["neither"]:
-        said += (
-            "; they" if said else "the scores"
+        sentence += (
+            "; they" if sentence else "the scores"
         ) + f" tell no difference between the {model} and {_named(sides['neither'])}"
-    return [f"On {name}, {said}."]
+    return [f"On {name}, {sentence}."]
 
 
 def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     why = rival.reasons.get
-    found = rival.contrast
+    contrast = rival.contrast
     ends = None if rival.low is None or rival.high is None else (rival.low, rival.high)
     given = None if rival.partial_low is None or rival.partial_high is None else (rival.partial_low, rival.partial_high)
     less = (Cell(NONE), Cell(NONE), Cell(NONE))
-    if found is not None:
-        inside = None if found.low is None or found.high is None else (found.low, found.high)
+    if contrast is not None:
+        inside = None if contrast.low is None or contrast.high is None else (contrast.low, contrast.high)
         less = (
-            notes.estimate(found.difference, correlation, None, inside),
-            _or_dash(None if found.z is None else digits(found.z, 2)),
-            _or_dash(None if found.p is None else p_value(found.p)),
+            notes.estimate(contrast.difference, correlation, None, inside),
+            _or_dash(None if contrast.z is None else digits(contrast.z, 2)),
+            _or_dash(None if contrast.p is None else p_value(contrast.p)),
         )
     elif rival.name != quantity:
         less = (notes.number(None, correlation, why("contrast")), *less[1:])

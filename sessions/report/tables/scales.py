@@ -53,11 +53,11 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
 
 def _latent(one: DescriptorFindings, kind: Judgement, index: int, notes: Notes) -> Cell:
     values = one.latent.get(kind)
-    found = None if values is None else values.get(index)
-    if found is None:
+    scaled = None if values is None else values.get(index)
+    if scaled is None:
         return notes.number(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
-    ends = None if found.low is None or found.high is None else (found.low, found.high)
-    return notes.estimate(found.value, places(2), None, ends, "too few subjects")
+    ends = None if scaled.low is None or scaled.high is None else (scaled.low, scaled.high)
+    return notes.estimate(scaled.value, places(2), None, ends, "too few subjects")
 
 
 def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:
@@ -67,16 +67,16 @@ def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:
     yield (Cell("first of two"), *(_value(scale, scale.first, notes) for scale in one.scales))
 
 
-def _value(scale: PairedScale, found: Ends | None, notes: Notes) -> Cell:
-    if found is None:
+def _value(scale: PairedScale, interval: Ends | None, notes: Notes) -> Cell:
+    if interval is None:
         return notes.number(None, str, scale.reason or "this surface was not chosen between")
-    ends = None if found.low is None or found.high is None else (found.low, found.high)
-    return notes.estimate(found.value, places(2), None, ends, scale.interval_reason or None)
+    ends = None if interval.low is None or interval.high is None else (interval.low, interval.high)
+    return notes.estimate(interval.value, places(2), None, ends, scale.interval_reason or None)
 
 
 def scale_sentences(one: DescriptorFindings) -> list[str]:
     """Return what choices and estimates of a descriptor say beside their tables."""
-    said: list[str] = []
+    sentences: list[str] = []
     name = one.descriptor[:1].upper() + one.descriptor[1:]
     if one.scales and one.scales[0].p is not None:
         fits = [
@@ -84,25 +84,25 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
             for scale in one.scales
             if scale.deviance is not None and scale.p is not None
         ]
-        said.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
+        sentences.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
     if one.consistence:
-        zeta = [found.zeta for found in one.consistence.values()]
+        zeta = [exponent.zeta for exponent in one.consistence.values()]
         orders = sum(value == CONSISTENT for value in zeta)
-        said.append(
+        sentences.append(
             f"{name}: {orders} of {len(zeta)} subjects chose by one order without a circle; mean coefficient of "
             f"consistence {digits(float(np.mean(zeta)), 2)}."
         )
-    found = one.exponent
-    if found is not None and found.plain is not None:
-        plain = found.plain
+    exponent = one.exponent
+    if exponent is not None and exponent.plain is not None:
+        plain = exponent.plain
         words = f"{digits(plain.estimate, 2)} ({digits(plain.low, 2)} to {digits(plain.high, 2)}) with µ taken as exact"
-        if found.both is not None:
-            value, low, high = found.both
+        if exponent.both is not None:
+            value, low, high = exponent.both
             words += f", {digits(value, 2)} ({digits(low, 2)} to {digits(high, 2)}) with errors in both"
-        said.append(f"{name}: estimates grow as a power of µ, with an exponent of {words}.")
-    elif found is not None and found.reason:
-        said.append(f"{name}: no exponent of the estimates by µ: {found.reason}.")
-    return said
+        sentences.append(f"{name}: estimates grow as a power of µ, with an exponent of {words}.")
+    elif exponent is not None and exponent.reason:
+        sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
+    return sentences
 
 
 def _p(p: float) -> str:

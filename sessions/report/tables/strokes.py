@@ -6,7 +6,7 @@ from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
 from sessions.report.tables.cells import Cell, Notes, Row, Table, grouped, table
 from sessions.report.wording import NONE, places, signed, tau
 
-Told = Callable[[float], str]
+Format = Callable[[float], str]
 
 _TOO_SHORT = "the stroke has too few readings"
 _WITHOUT = {
@@ -29,7 +29,7 @@ def stroke_table(report: Report) -> Table | None:
     columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
     def row(stroke: StrokeFinding) -> Row:
-        def cell(name: str, shown: Told, ends: Told | None = None, unit: float = 1.0) -> Cell:
+        def cell(name: str, shown: Format, ends: Format | None = None, unit: float = 1.0) -> Cell:
             return _estimate(notes, stroke, name, shown, ends, unit)
 
         return (
@@ -65,7 +65,7 @@ def course_table(report: Report) -> Table | None:
     )
 
     def row(stroke: StrokeFinding) -> Row:
-        def cell(name: str, shown: Told) -> Cell:
+        def cell(name: str, shown: Format) -> Cell:
             return _estimate(notes, stroke, name, shown)
 
         why = stroke.reasons.get("direction") or _TOO_SHORT
@@ -106,12 +106,14 @@ def _table(
 
 
 def _estimate(
-    notes: Notes, stroke: StrokeFinding, name: str, shown: Told, told: Told | None = None, unit: float = 1.0
+    notes: Notes, stroke: StrokeFinding, name: str, shown: Format, of_ends: Format | None = None, unit: float = 1.0
 ) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
     without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
     why = stroke.reasons.get(name) or _MISSING.get(name)
-    return notes.estimate(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, told=told, unit=unit)
+    return notes.estimate(
+        getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, of_ends=of_ends, unit=unit
+    )
 
 
 def planted_table(report: Report) -> Table | None:
@@ -120,7 +122,7 @@ def planted_table(report: Report) -> Table | None:
         return None
     notes = Notes()
     # Of several strokes in a trial the model gets the first.
-    found = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
+    strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
     given = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
         "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
@@ -128,14 +130,14 @@ def planted_table(report: Report) -> Table | None:
     )
 
     def row(p: Planted) -> Row:
-        stroke = found.get(p.trial)
+        stroke = strokes_by_trial.get(p.trial)
         cells: list[Cell] = [
             Cell(str(p.trial)),
             Cell(NONE if stroke is None or stroke.index is None else str(stroke.index)),
         ]
         prediction = given.get(p.trial)
         name, mu = model_mu(stroke, prediction)
-        quantities: tuple[tuple[str, float, float | None, Told, float], ...] = (
+        quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
             (name, p.mu, mu, places(3), 1.0),
             ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
             ("speed", p.speed, stroke.speed if stroke else None, places(1), 1.0),
@@ -150,7 +152,7 @@ def planted_table(report: Report) -> Table | None:
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
 
-    names = {p.trial: s.experiment for p in report.planted if (s := found.get(p.trial)) is not None}
+    names = {p.trial: s.experiment for p in report.planted if (s := strokes_by_trial.get(p.trial)) is not None}
     groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
     caption = (
         "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "

@@ -337,20 +337,20 @@ def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row
 
 def _within_subjects(
     name: str,
-    found: RepeatedCorrelation | None,
+    repeated: RepeatedCorrelation | None,
     adjusted: float | None = None,
     without: Sequence[tuple[str, float]] = (),
 ) -> Iterable[Row]:
     """Return the row of the correlation within subjects, where there is one."""
-    if found is not None:
+    if repeated is not None:
         yield (
             Cell(name),
-            Cell(f"{found.dof} d.f."),
-            Cell(correlation(found.r)),
-            range_cell(*(found.people or (None, None)), correlation),
+            Cell(f"{repeated.dof} d.f."),
+            Cell(correlation(repeated.r)),
+            range_cell(*(repeated.people or (None, None)), correlation),
             Cell(NONE),
             Cell(NONE),
-            _or_dash(found.people_p, p_value),
+            _or_dash(repeated.people_p, p_value),
             _or_dash(adjusted, p_value),
             _without(without),
         )

@@ -45,11 +45,11 @@ def _models(one: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, M
 
 def missing_models(study: StudyFindings) -> list[str]:
     """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
-    told: defaultdict[str, list[str]] = defaultdict(list)
+    by_reason: defaultdict[str, list[str]] = defaultdict(list)
     for one in study.descriptors:
         for what, model in _models(one, study):
             if isinstance(model, str):
-                told[model].append(f"{one.descriptor} on {what}")
+                by_reason[model].append(f"{one.descriptor} on {what}")
     related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
     return [
         *(
@@ -57,33 +57,33 @@ def missing_models(study: StudyFindings) -> list[str]:
             for name, r in related
             if r is not None and r.pearson is None
         ),
-        *(f"No mixed model of {', '.join(names)}: {why}." for why, names in told.items()),
+        *(f"No mixed model of {', '.join(names)}: {why}." for why, names in by_reason.items()),
     ]
 
 
 def missing_scores(study: StudyFindings) -> list[str]:
     """Return why there is no agreement, and no difference of surfaces: a sentence for each reason."""
-    told: list[str] = []
+    sentences: list[str] = []
     for one in study.descriptors:
         whole = sum(None not in answers for answers in one.answers.values())
         have = f"{one.descriptor} has {plural(whole, 'such subject')} and {plural(len(one.indices), 'surface')}"
         if not one.scores:
             continue
         if one.agreement is None:
-            told.append(
+            sentences.append(
                 f"No agreement on the order: it takes two subjects who scored each of three surfaces or more, not all "
                 f"alike; {have}."
             )
         if not one.within:
-            told.append(
+            sentences.append(
                 f"No intervals within subjects: they take two subjects who scored each of two surfaces; {have}."
             )
         if not one.differences:
-            told.append(
+            sentences.append(
                 f"No differences of surfaces of {one.descriptor}: they take three subjects who scored both, "
                 "not all with the same difference."
             )
-    return told
+    return sentences
 
 
 def _fitted(model: MixedModel) -> str:
@@ -97,8 +97,14 @@ def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
     middle = f"{digits(model.middle, 3)} {unit}" if first != INDEX else f"index {digits(50 + model.middle, 1)}"
 
     def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> Row:
-        told = NONE if p is None else p_value(p)
-        return Cell(name), Cell(unit), Cell(significant(estimate, 3)), range_cell(low, high, three_figures), Cell(told)
+        p_text = NONE if p is None else p_value(p)
+        return (
+            Cell(name),
+            Cell(unit),
+            Cell(significant(estimate, 3)),
+            range_cell(low, high, three_figures),
+            Cell(p_text),
+        )
 
     rows = [
         row(
@@ -112,12 +118,12 @@ def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
         for t in model.terms
     ]
     if model.spreads is not None:
-        told = (
+        caption = (
             (LEVELS, "points", model.spreads.level),
             ("spread of subjects' slopes", units[first], model.spreads.slope),
             (NOISE, "points", model.spreads.left),
         )
-        rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in told if s is not None]
+        rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in caption if s is not None]
     return tuple(rows)
 
 

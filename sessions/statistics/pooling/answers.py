@@ -66,14 +66,17 @@ def latent_scales(
         if row.standard is not None and row.mu:
             mu[row.index].append(math.log(row.mu))
     jnd = None if compared is None else compared.jnd
-    found: dict[Judgement, Mapping[int, Ends]] = {"scores": of_judgements(scores), "estimates": of_judgements(logs)}
+    by_judgement: dict[Judgement, Mapping[int, Ends]] = {
+        "scores": of_judgements(scores),
+        "estimates": of_judgements(logs),
+    }
     for scale in scales:
         if scale.model == "Thurstone V":
-            found["choices"] = scale.values
+            by_judgement["choices"] = scale.values
     if jnd is not None and jnd.low is not None and jnd.high is not None:
         middle = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(mu.items())}
-        found["comparisons"] = of_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
-    return {judgement: values for judgement, values in found.items() if values}
+        by_judgement["comparisons"] = of_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
+    return {judgement: values for judgement, values in by_judgement.items() if values}
 
 
 def exponent(trials: Sequence[tuple[Visit, TrialRow]]) -> Exponent | None:

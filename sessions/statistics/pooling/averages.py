@@ -48,12 +48,12 @@ def average(values: Sequence[float]) -> Average | None:
 
 def averages(table: Mapping[str, Mapping[int, float]]) -> dict[int, Average]:
     """Return the mean over subjects of each index, from subject -> index -> number."""
-    found: dict[int, Average] = {}
+    by_index: dict[int, Average] = {}
     for index in sorted({index for row in table.values() for index in row}):
         mean = average([row[index] for row in table.values() if index in row])
         if mean is not None:
-            found[index] = mean
-    return found
+            by_index[index] = mean
+    return by_index
 
 
 def estimates(trials: Sequence[tuple[Visit, TrialRow]], quantity: str) -> Estimates | None:

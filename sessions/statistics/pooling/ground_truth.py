@@ -84,15 +84,15 @@ def checked_planted(planted: object) -> dict[str, Any]:
     return cast("dict[str, Any]", planted)
 
 
-def recovered(found: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
+def recovered(descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
     """Return the planted effects on the score, and spreads, beside what the study finds of them.
 
     `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
     """
-    told: list[Recovered] = []
-    for one in found:
-        told += [*_slopes(one, planted["score"]), *_with_sed(one, planted), *_spreads(one, planted)]
-    return tuple(told)
+    rows: list[Recovered] = []
+    for one in descriptors:
+        rows += [*_slopes(one, planted["score"]), *_with_sed(one, planted), *_spreads(one, planted)]
+    return tuple(rows)
 
 
 def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[Recovered]:
@@ -112,10 +112,10 @@ def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recove
     people = planted.get("people")
     if not people:
         return []
-    told: list[Recovered] = []
+    rows: list[Recovered] = []
     if not isinstance(one.on_friction, str) and (differ := one.on_friction.spreads) is not None:
         by_index = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
-        told += [
+        rows += [
             _spread(one, name, sd, spread)
             for name, sd, spread in (
                 (LEVELS, people["offset_spread"], differ.level),
@@ -127,12 +127,12 @@ def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recove
     if one.fingers is not None:
         # A transducer's gains, of drag and of press, differ between visits as fingers do.
         sd = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
-        told.append(_spread(one, FINGERS, sd, one.fingers))
-    return told
+        rows.append(_spread(one, FINGERS, sd, one.fingers))
+    return rows
 
 
-def _spread(one: DescriptorFindings, name: str, planted: float, found: Spread) -> Recovered:
-    return Recovered(one.descriptor, name, planted, found.sd, found.low, found.high)
+def _spread(one: DescriptorFindings, name: str, planted: float, spread: Spread) -> Recovered:
+    return Recovered(one.descriptor, name, planted, spread.sd, spread.low, spread.high)
 
 
 def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
@@ -140,11 +140,11 @@ def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recov
     relation = planted.get("relation", {}).get(one.descriptor)
     if relation is None or one.repeated is None or one.repeated.people is None:
         return []
-    told = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
+    rows = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
     if not isinstance(one.on_response, str):
         term = one.on_response.term(SED_TERM)
-        told.append(Recovered(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
-    return told
+        rows.append(Recovered(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
+    return rows
 
 
 _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
@@ -156,35 +156,37 @@ def found_flaws(
     """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
     named = {visit.session: visit for visit in visits}
     backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
-    found: list[PlantedFlaw] = []
-    for session, told in spoilt.items():
+    rows_found: list[PlantedFlaw] = []
+    for session, faults in spoilt.items():
         visit = named.get(session)
         if visit is None:
-            found.append(PlantedFlaw(session, told["expected"], session in failed))
+            rows_found.append(PlantedFlaw(session, faults["expected"], session in failed))
             continue
         rows = {row.trial: row for row in visit.rows}
-        if any(told.get(name) and told[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
-            found.append(PlantedFlaw(session, told["expected"], found=False))  # a trial that the session does not have
+        if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
+            rows_found.append(
+                PlantedFlaw(session, faults["expected"], found=False)
+            )  # a trial that the session does not have
             continue
-        seen = [flaw in rows[told[name]].flaws for name, flaw in _FLAWS.items() if told.get(name)]
-        seen += [rows[told["unanswered"]].score is None] if told.get("unanswered") else []
-        seen += [rows[told["aborted"]].outcome == "open" and not visit.complete] if told.get("aborted") else []
-        seen += [visit.subject in backwards] if told.get("reversed") else []
-        found.append(PlantedFlaw(session, told["expected"], bool(seen) and all(seen)))
-    return tuple(found)
+        seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
+        seen += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []
+        seen += [rows[faults["aborted"]].outcome == "open" and not visit.complete] if faults.get("aborted") else []
+        seen += [visit.subject in backwards] if faults.get("reversed") else []
+        rows_found.append(PlantedFlaw(session, faults["expected"], bool(seen) and all(seen)))
+    return tuple(rows_found)
 
 
 def found_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
     """Return how the planted µ of the strokes was recovered; None where no stroke has both."""
     truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
-    found = [
+    rows = [
         (row, truth[visit.subject, row.trial])
         for visit in visits
         for row in visit.rows
         if row.mu is not None and (visit.subject, row.trial) in truth
     ]
-    if not found:
+    if not rows:
         return None
-    errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in found]
-    held = [row.mu_low <= mu <= row.mu_high for row, mu in found if row.mu_low is not None and row.mu_high is not None]
-    return PlantedFriction(len(found), float(np.median(errors)), max(errors), len(held), sum(held))
+    errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in rows]
+    held = [row.mu_low <= mu <= row.mu_high for row, mu in rows if row.mu_low is not None and row.mu_high is not None]
+    return PlantedFriction(len(rows), float(np.median(errors)), max(errors), len(held), sum(held))

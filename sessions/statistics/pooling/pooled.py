@@ -67,11 +67,11 @@ def pooled(
     kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
     tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
     asked = options or VisitOptions()
-    found = tuple(
+    descriptors = tuple(
         _descriptor(name, asked, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
         for name in dict.fromkeys(row.descriptor for _, row in kept)
     )
-    found = _with_holm(found)
+    descriptors = _with_holm(descriptors)
     return StudyFindings(
         simulated=_simulated(ordered),
         options=asked,
@@ -80,8 +80,8 @@ def pooled(
         copies=tuple(copies.items()),
         excluded=exclusions,
         reversed=reversed_subjects(tables),
-        descriptors=found,
-        effects=() if planted is None else recovered(found, planted),
+        descriptors=descriptors,
+        effects=() if planted is None else recovered(descriptors, planted),
         friction=None if planted is None else found_friction(ordered, planted["strokes"]),
         flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
         synthetic=None if planted is None else planted.get("seed"),
@@ -98,11 +98,11 @@ def _copies(visits: Sequence[Visit]) -> dict[str, str]:
     return {v.session: first[v.sha256] for v in visits if v.sha256 and first[v.sha256] != v.session}
 
 
-def _with_holm(found: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
-    ps = {one.descriptor: one.repeated.people_p for one in found if one.repeated is not None}
-    told = {descriptor: p for descriptor, p in ps.items() if p is not None}
-    adjusted = dict(zip(told, holm(list(told.values())), strict=True))
-    return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in found)
+def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
+    ps = {one.descriptor: one.repeated.people_p for one in descriptors if one.repeated is not None}
+    known = {descriptor: p for descriptor, p in ps.items() if p is not None}
+    adjusted = dict(zip(known, holm(list(known.values())), strict=True))
+    return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in descriptors)
 
 
 def _simulated(visits: Sequence[Visit]) -> str:
@@ -213,8 +213,8 @@ def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
     """Return how far subjects' friction differs from one another, of trials' subject, index and mu."""
     indices = sorted({index for _, index, _ in trials})
     surfaces = [[float(index == one) for _, index, _ in trials] for one in indices[1:]]
-    found = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
-    return None if found is None else found.level
+    variances = spreads([subject for subject, _, _ in trials], [math.log(mu) for _, _, mu in trials], surfaces)
+    return None if variances is None else variances.level
 
 
 def _surface(index: int, quantity: str, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
@@ -240,13 +240,13 @@ def _related(points: Sequence[tuple[str, int, float, float]]) -> Relation | None
 
 def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[str, float], ...]:
     """Return the correlation within subjects when each subject in turn is left out."""
-    told: list[tuple[str, float]] = []
+    rows: list[tuple[str, float]] = []
     for subject in dict.fromkeys(point[0] for point in points):
         others = [point for point in points if point[0] != subject]
-        found = repeated_correlation(*zip(*others, strict=True)) if others else None
-        if found is not None:
-            told.append((subject, found.r))
-    return tuple(told)
+        repeated = repeated_correlation(*zip(*others, strict=True)) if others else None
+        if repeated is not None:
+            rows.append((subject, repeated.r))
+    return tuple(rows)
 
 
 def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:

@@ -192,8 +192,8 @@ def _row(
         choice=record.choice,
         standard=None if block.standard is None else block.standard.known_index,
     )
-    told = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
-    flaws = tuple(str(name) for name in told)
+    flagged = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
+    flaws = tuple(str(name) for name in flagged)
     friction = next((one for one in analysis.friction if one.trial == trial.number), None)
     answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
     if friction is None:
@@ -243,7 +243,7 @@ def _with_prediction(row: TrialRow, answer: TrialPrediction) -> TrialRow:
         sed_high=None if interval is None else interval.high,
         sed_interval=NO_INTERVAL if interval is None else interval.reason or f"by {interval.method}",
         error_estimate=answer.error_estimate,
-        responses={name: found.value for name, found in answer.responses.items()},
+        responses={name: response.value for name, response in answer.responses.items()},
         model_normal_force=answer.normal_force,
         model_normal_force_error=answer.normal_force_error,
         matching_depth=answer.matching_depth,

@@ -85,5 +85,5 @@ class _Answered(NamedTuple):
         left = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
         freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
         unit = np.sqrt(2.0 * left / freedom)[:, None]
-        told = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
-        return np.where(told, means, np.nan) / np.where(told, unit, 1.0)
+        scattered = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
+        return np.where(scattered, means, np.nan) / np.where(scattered, unit, 1.0)

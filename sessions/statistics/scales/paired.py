@@ -199,11 +199,11 @@ def _bootstrap(counts: Array, model: Model, begin: Array, seed: int) -> tuple[Ar
     totals = np.tensordot(drawn.astype(np.float64), counts, axes=1)
     indices = range(counts.shape[2])
     fits = [None if _unbounded(total, indices) else _fit(total, model, begin) for total in totals]
-    found = [fit for fit in fits if fit is not None]
-    lost = RESAMPLES - len(found)
+    scales = [fit for fit in fits if fit is not None]
+    lost = RESAMPLES - len(scales)
     if lost > MOST_LOST * RESAMPLES:
         return np.zeros((0, 0)), f"{lost} of {RESAMPLES} draws of subjects have no finite scale"
-    return np.array(found), ""
+    return np.array(scales), ""
 
 
 def _ends(value: float, draws: Array | None) -> Ends:

@@ -168,11 +168,11 @@ class _Task:
         middle = float(np.mean(self.x)) - float(np.mean(rough)) / math.copysign(
             max(abs(slope), 1.0 / self.reach), slope
         )
-        found = [
+        optima = [
             self._at({}, np.array([middle, times * slope, 0.0, lapse, 0.01]), _PRECISE)
             for times, lapse in ((1.0, 0.01), (2.0, 0.15))
         ]
-        best, likelihood = max(found, key=lambda one: one[1])
+        best, likelihood = max(optima, key=lambda one: one[1])
         step = self._at({_SLOPE: math.copysign(self.steepest, best[_SLOPE])}, best)
         return step if step[1] > likelihood - _SAME else (best, likelihood)
 
@@ -219,10 +219,10 @@ class _Task:
             return -value - more, -slope * self.scale
 
         ends = list(zip(low, high, strict=True))
-        found = optimize.minimize(
+        optimum = optimize.minimize(
             lost, begin, jac=True, method="L-BFGS-B", bounds=ends, options={"ftol": precision, "gtol": 1e-9}
         )
-        return np.asarray(found.x, np.float64) * self.scale, -float(found.fun)
+        return np.asarray(optimum.x, np.float64) * self.scale, -float(optimum.fun)
 
     def _chances(self, at: Array) -> tuple[Array, Array]:
         """Return the chance of each level (n,), kept off 0 and 1, and its derivatives by the first four (n, 4)."""
