@@ -193,7 +193,7 @@ class CoursePanel(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Fold the picture of the subject's page where the plan needs the room."""
         super().resizeEvent(event)
-        self.mirror.set_room(self.height() >= self._roomy)
+        self.mirror.open.set_room(self.height() >= self._roomy)
 
 
 def _buttons(view: CourseView) -> tuple[Button, ...]:

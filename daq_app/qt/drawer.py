@@ -32,27 +32,12 @@ class Drawer(QSplitter):
             self.restoreState(sizes)
         self.handle(1).setAccessibleName(tr("edge of the drawer"))
         self.splitterMoved.connect(self._keep_sizes)
-        self._open = Openness(DRAWER)
-        self._place()
-
-    @property
-    def is_open(self) -> bool:
-        """Say whether the drawer is seen."""
-        return bool(self._open)
-
-    def set_room(self, room: bool) -> None:
-        """Say whether there is room for both."""
-        if self._open.set_room(room):
-            self._place()
-
-    def toggle(self) -> None:
-        """Open or close the drawer; where there is room for both this is remembered."""
-        self._open.toggle()
+        self.open = Openness(DRAWER, self._place)
         self._place()
 
     def _place(self) -> None:
-        self._drawer.setVisible(self.is_open)
-        self._main.setVisible(self._open.room or not self._open)
+        self._drawer.setVisible(bool(self.open))
+        self._main.setVisible(self.open.room or not self.open)
 
     def _keep_sizes(self) -> None:
         settings().setValue(DRAWER_SIZES, self.saveState())

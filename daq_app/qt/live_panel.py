@@ -111,17 +111,17 @@ class LivePanel(QFrame):
 
     def set_room(self, room: bool) -> None:
         """Say whether there is room for the stroke and an open drawer beside each other."""
-        self.drawer.set_room(room)
+        self.drawer.open.set_room(room)
         self._show_tab()
 
     def toggle_drawer(self) -> None:
         """Open or close the drawer, where readings are shown."""
         if self._forces_shown:
-            self.drawer.toggle()
+            self.drawer.open.toggle()
             self._show_tab()
 
     def _show_tab(self) -> None:
-        opened = self.drawer.is_open
+        opened = bool(self.drawer.open)
         self.tab.setText("▸\nD" if opened else "◂\nD")
         self.tab.setAccessibleName(
             tr("{word} the drawer: six axes, sample and finger", word=tr("close") if opened else tr("open"))

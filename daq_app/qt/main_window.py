@@ -196,7 +196,7 @@ class MainWindow(QMainWindow):
             "shorter": lambda: self.live.change_length(-1),
             "bench": self._fold_bench,
             "drawer": self.middle.toggle_drawer,
-            "mirror": self.course.mirror.toggle,
+            "mirror": self.course.mirror.open.toggle,
             "inspect": self.middle.toggle_inspection,
             "pilot": self._pilot,
             "preview": self._preview,

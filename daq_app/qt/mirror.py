@@ -26,29 +26,14 @@ class Mirror(QWidget):
         self._tokens, self._scale = tokens, scale
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
-        self._open = Openness(MIRROR)
+        self.open = Openness(MIRROR, self._place)
         self.picture: SubjectPicture | None = None  # made when it is first seen
-        self.tab = button("", tr("the subject's page"), self.toggle, "handle")
+        self.tab = button("", tr("the subject's page"), self.open.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(4)
         layout.addWidget(self.tab)
-        self._place()
-
-    @property
-    def is_open(self) -> bool:
-        """Say whether the picture is seen."""
-        return bool(self._open)
-
-    def set_room(self, room: bool) -> None:
-        """Say whether there is room for the picture."""
-        if self._open.set_room(room):
-            self._place()
-
-    def toggle(self) -> None:
-        """Open or fold the picture; where there is room for it this is remembered."""
-        self._open.toggle()
         self._place()
 
     def show_view(self, view: SubjectView | None, size: QSize) -> None:
@@ -63,14 +48,14 @@ class Mirror(QWidget):
             self.picture.set_tokens(tokens)
 
     def _place(self) -> None:
-        self.tab.setText(tr("The subject sees  V  {word}", word="▾" if self.is_open else "▸"))
-        self.tab.setAccessibleName(tr("{word} the subject's page", word=tr("fold") if self.is_open else tr("show")))
+        self.tab.setText(tr("The subject sees  V  {word}", word="▾" if self.open else "▸"))
+        self.tab.setAccessibleName(tr("{word} the subject's page", word=tr("fold") if self.open else tr("show")))
         if self.picture is not None:
-            self.picture.setVisible(self.is_open)
+            self.picture.setVisible(bool(self.open))
         self._draw()
 
     def _draw(self) -> None:
-        if self._view is None or not self.is_open:
+        if self._view is None or not self.open:
             return
         if self.picture is None:
             self.picture = SubjectPicture(self._tokens, self._scale, self._size)

@@ -77,6 +77,7 @@ class ModelColumn(QWidget):
         self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
         self.which.activated.connect(lambda: self._show_session())
+        self.session_errors = Wrapped("quiet")
         self.compared = ComparedView(self.other_wanted.emit, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         self.tabs = QTabWidget()
@@ -85,6 +86,7 @@ class ModelColumn(QWidget):
         inside = QVBoxLayout(session)
         inside.setContentsMargins(0, 0, 0, 0)
         inside.addWidget(self.which)
+        inside.addWidget(self.session_errors)
         inside.addWidget(self.picture, 1)
         for name, page in (
             (tr("Finger"), self._finger_page()),
@@ -117,6 +119,7 @@ class ModelColumn(QWidget):
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
         self.both.setVisible(state.compared is not None)
         self._paint()
+        self.session_errors.show_text(greatest_errors(state.report))
         self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
             names = [words for _, words in session_pictures(state.report)]

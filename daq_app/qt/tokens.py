@@ -121,28 +121,34 @@ def palette(t: Tokens) -> QPalette:
 
 def style_sheet(t: Tokens, scale: float) -> str:
     """Return the style sheet of every widget of the window."""
+    return _panels(t, scale) + _buttons(t, scale) + _fields(t)
 
-    def px(size: float) -> str:
-        return f"{round(size * scale)}px"
 
-    def tall(size: float, least: int) -> int:
-        """Return the least height of a button: that of a line of its type, 1.2 times its size in most fonts [px]."""
-        return max(least, round(1.2 * size * scale))
+def _px(size: float, scale: float) -> str:
+    return f"{round(size * scale)}px"
 
+
+def _tall(size: float, scale: float, least: int) -> str:
+    """Return the least height of a button: that of a line of its type, 1.2 times its size in most fonts."""
+    return f"{max(least, round(1.2 * size * scale))}px"
+
+
+def _panels(t: Tokens, scale: float) -> str:
+    """Return what grounds, frames and labels look like."""
     return f"""
-* {{ font-size: {px(TEXT)}; color: {t.text}; }}
+* {{ font-size: {_px(TEXT, scale)}; color: {t.text}; }}
 QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
 QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
 QFrame[role="card"] {{ border: 1px solid {t.line}; border-radius: 6px; }}
 QLabel {{ background: transparent; }}
-QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {px(SMALL)}; }}
-QLabel[role="tight"] {{ font-size: {px(SMALL)}; }}
-QLabel[role="value"] {{ font-size: {px(TEXT)}; }}
-QLabel[role="title"] {{ font-size: {px(TITLE)}; font-weight: 600; }}
-QLabel[role="section"] {{ color: {t.quiet}; font-size: {px(SMALL)}; font-weight: 600; }}
-QLabel[role="name"] {{ font-size: {px(TEXT)}; font-weight: 600; }}
-QLabel[role="headline"] {{ font-size: {px(HEADLINE)}; font-weight: 600; }}
+QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {_px(SMALL, scale)}; }}
+QLabel[role="tight"] {{ font-size: {_px(SMALL, scale)}; }}
+QLabel[role="value"] {{ font-size: {_px(TEXT, scale)}; }}
+QLabel[role="title"] {{ font-size: {_px(TITLE, scale)}; font-weight: 600; }}
+QLabel[role="section"] {{ color: {t.quiet}; font-size: {_px(SMALL, scale)}; font-weight: 600; }}
+QLabel[role="name"] {{ font-size: {_px(TEXT, scale)}; font-weight: 600; }}
+QLabel[role="headline"] {{ font-size: {_px(HEADLINE, scale)}; font-weight: 600; }}
 QLabel[role="simulated"] {{ color: {t.look}; font-weight: 700; border: 2px solid {t.look}; border-radius: 4px;
   padding: 2px 8px; }}
 QLabel[grade="wrong"] {{ color: {t.wrong}; font-weight: 600; }}
@@ -150,8 +156,13 @@ QLabel[grade="look"] {{ color: {t.look}; font-weight: 600; }}
 QFrame[role="banner"][grade="wrong"] {{ background: {t.wrong}; border-radius: 6px; }}
 QFrame[role="banner"][grade="wrong"] QLabel {{ color: {t.surface}; font-weight: 600; }}
 QFrame[role="banner"][grade="look"] {{ background: {t.surface}; border: 2px solid {t.look}; border-radius: 6px; }}
+"""
+
+
+def _buttons(t: Tokens, scale: float) -> str:
+    return f"""
 QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 6px;
-  min-height: {tall(TEXT, TARGET - 10)}px; padding: 4px 14px; }}
+  min-height: {_tall(TEXT, scale, TARGET - 10)}; padding: 4px 14px; }}
 QPushButton:hover {{ border-color: {t.quiet}; }}
 QPushButton:pressed {{ background: {t.line}; }}
 QComboBox:disabled {{ color: {t.quiet}; }}
@@ -160,23 +171,29 @@ QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: 
 QPushButton:focus, QLineEdit:focus, QPlainTextEdit:focus, QListWidget:focus, QTreeWidget:focus {{
   border: 2px solid {t.act}; }}
 QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; font-weight: 600;
-  font-size: {px(TITLE)}; min-height: {tall(TITLE, TARGET)}px; padding: 8px 28px; }}
+  font-size: {_px(TITLE, scale)}; min-height: {_tall(TITLE, scale, TARGET)}; padding: 8px 28px; }}
 QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
 QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
 QPushButton:checked {{ border: 2px solid {t.act}; }}
-QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {px(SMALL)}; background: transparent; border: none; }}
+QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {_px(SMALL, scale)}; background: transparent; border: none; }}
 QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; }}
-QMenuBar, QMenu {{ background: {t.surface}; }}
-QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
-QMenu::item:disabled {{ color: {t.quiet}; }}
 QPushButton[role="small"] {{ padding: 4px 4px; }}
-QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {px(SMALL)}; font-weight: 600; }}
+QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {_px(SMALL, scale)}; font-weight: 600; }}
 QPushButton[role="tile"][grade="wrong"] {{ color: {t.look}; border: 2px solid {t.look}; }}
 QPushButton[role="tile"][grade="current"] {{ border: 2px solid {t.text}; }}
 QPushButton[role="tile"][grade="coming"] {{ color: {t.quiet}; border-style: dashed; }}
 QPushButton[role="tile"]:checked {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; }}
 QPushButton[role="tile"]:focus {{ border: 2px solid {t.act}; }}
-QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {px(SMALL)}; }}
+QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {_px(SMALL, scale)}; }}
+"""
+
+
+def _fields(t: Tokens) -> str:
+    """Return what menus, fields, lists and bars look like."""
+    return f"""
+QMenuBar, QMenu {{ background: {t.surface}; }}
+QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
+QMenu::item:disabled {{ color: {t.quiet}; }}
 QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
   border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
   selection-color: {t.on_act}; }}

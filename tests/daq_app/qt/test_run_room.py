@@ -77,7 +77,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         assert live.tab.accessibleName().startswith("open the drawer")
         assert screens.settings().value(DRAWER) == "no"
         again = LivePanel(window.bridge.feed, window.bridge.model, tokens.LIGHT, 1.0)
-        assert not again.drawer.is_open
+        assert not again.drawer.open
         click(live.tab)
         assert live.map.isVisible()
         handle = live.drawer.handle(1)
@@ -182,9 +182,9 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
 
 def test_the_mirror_shows_the_subjects_page_without_the_answer_that_is_given(driver):
     window, mirror = driver.window, driver.window.course.mirror
-    mirror.set_room(room=True)
+    mirror.open.set_room(room=True)
     begin(driver, "P37")
-    assert mirror.is_open
+    assert mirror.open
     QTest.keyClick(window, Qt.Key.Key_Space)
     driver.phase("scoring")
     assert mirror.picture.isVisible()
