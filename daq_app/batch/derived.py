@@ -26,7 +26,7 @@ from sessions.strokes.bootstrap import intervals_document, stroke_intervals
 from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.contact_area import AreaLaw
 from sessions.strokes.decisions import Decisions
-from sessions.strokes.stored import check_analysis
+from sessions.strokes.stored import bootstrap_settings, check_analysis
 from sessions.toml_file import SettingsError, from_table
 
 ANALYSIS = "analysis.json"
@@ -219,7 +219,7 @@ def analysis_document(analysis: Analysis, bootstrap: BootstrapSettings | None = 
 def bootstrap_of(stored: Mapping[str, Any]) -> BootstrapSettings:
     """Return what the intervals of a stored analysis were drawn from. Raises SettingsError."""
     bootstrap: Mapping[str, Any] = stored.get("bootstrap") or {}
-    return from_table(bootstrap.get("settings") or {}, BootstrapSettings, ANALYSIS)
+    return bootstrap_settings(bootstrap.get("settings") or {})
 
 
 def settings_of(stored: Mapping[str, Any]) -> AnalysisSettings:

@@ -22,7 +22,7 @@ class BootstrapSettings:
     cross_talk: float = ASSUMED_GAIN_ERROR  # standard uncertainty of what each force shows of another [-]
     tilt: tuple[float, float] = (0.0, 0.0)  # tilt of the face's normal to +x and +y that is not levelled [degrees]
     tilt_error: tuple[float, float] = (TILT_PRIOR, TILT_PRIOR)  # its standard uncertainty [degrees]
-    tilt_origin: str = "assumed: since too few presses measure it"
+    tilt_origin: str = "assumed: too few presses to measure it"
     tilt_presses: int = 0  # that measured it: its error then follows Student's law, and holds cross-talk from N, too
     confidence: float = 0.95
     fewest_blocks: int = 4  # from which a spread is estimated

@@ -22,6 +22,7 @@ _NEWER = (
     *("onset_fewest", "onset_most", "onset_steep", "onset_reach"),
 )
 _DEFAULTS = {name: getattr(BootstrapSettings(), name) for name in _NEWER}
+_REPLACED = ("tilt_from_presses",)  # of documents from before 2026-11-25; `tilt_presses` says how many
 
 
 class _Intervals(msgspec.Struct):
@@ -54,6 +55,14 @@ def check_analysis(document: Mapping[str, Any]) -> None:
     beyond = [row.stroke for row in analysis.friction if not 0 <= row.stroke < len(analysis.strokes)]
     if beyond:
         raise SettingsError(f"it gives the friction of stroke {beyond[0]}, which it does not hold")
-    settings = {**_DEFAULTS, **analysis.bootstrap.settings}
-    complete({"settings": settings}, _Settings)
-    from_table(settings, BootstrapSettings, "bootstrap")
+    complete({"settings": {**_DEFAULTS, **analysis.bootstrap.settings}}, _Settings)
+    bootstrap_settings(analysis.bootstrap.settings)
+
+
+def bootstrap_settings(stored: Mapping[str, Any]) -> BootstrapSettings:
+    """Return the settings of stored intervals; what an older program did not draw has its default.
+
+    Raises SettingsError.
+    """
+    current = {name: value for name, value in stored.items() if name not in _REPLACED}
+    return from_table(current, BootstrapSettings, "bootstrap")

@@ -28,6 +28,7 @@ from sessions.recording.calibration_uncertainty import gain_error_set
 from sessions.report import findings
 from sessions.statistics.pooling.visit import VisitOptions, visit_of
 from sessions.strokes import AnalysisSettings, analyse
+from sessions.strokes.stored import bootstrap_settings, check_analysis
 from sessions.toml_file import SettingsError
 
 ROOT = Path(__file__).parents[2]
@@ -195,6 +196,17 @@ def test_an_exported_prediction_tells_its_model_and_friction_the_interval_of_the
     assert [tuple(row[name] for name in columns) for row in predictions] == [model, model]
     assert all(row["scene_sha256"] in (reported / "report.html").read_text() for row in predictions)
     assert all(int(row["dofs"]) > 100 for row in predictions)
+
+
+def test_an_analysis_of_an_older_program_keeps_the_settings_of_its_intervals(small):
+    run(["analyse", str(small), "--json"])
+    document = json.loads((small / "analysis.json").read_bytes())
+    settings = document["bootstrap"]["settings"]
+    now = bootstrap_settings(settings)
+    del settings["tilt_presses"]
+    settings["tilt_from_presses"] = False
+    check_analysis(document)
+    assert bootstrap_settings(settings) == now
 
 
 def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, capsys, tmp_path):
