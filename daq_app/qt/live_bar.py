@@ -16,6 +16,7 @@ from daq_app.wording import tr, tr_noop
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
+LEAST_FOR_ACTS = 150  # a lower panel has room for the numbers alone, before the font's scale [px]
 NAMES = {
     "N": tr_noop("Normal force"),
     "T": tr_noop("Tangential force"),
@@ -35,6 +36,9 @@ class LiveBar(QWidget):
         super().__init__()
         self._show_length = length
         self._forces_shown = True
+        self._held = False
+        self._short = False  # the buttons show their keys alone
+        self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self._scale = scale
         self.values: dict[str, QLabel] = {}
         self._pairs: list[tuple[QLabel, QLabel]] = []
@@ -73,9 +77,15 @@ class LiveBar(QWidget):
         self._forces_shown = shown
         self._fit()
 
+    def fit_into(self, height: int) -> None:
+        """Fold the buttons away where the panel is so low; their keys still serve."""
+        for made in (self.finite, self.length, self.hold):
+            made.setVisible(height >= LEAST_FOR_ACTS * self._scale)
+
     def show_held(self, held: bool) -> None:
         """Say whether the picture is held."""
-        self.hold.setText(tr("Held  H") if held else tr("Hold  H"))
+        self._held = held
+        self._show_words()
 
     def show_numbers(self, values: NDArray[np.float64]) -> None:
         """Show the means of the last readings (channels, n)."""
@@ -90,7 +100,7 @@ class LiveBar(QWidget):
                 self.values[channel].setAccessibleName(spoken(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Leave out the numbers that would be cut, the last first."""
+        """Leave out the numbers that would be cut, the last first, and words that buttons have no room for."""
         super().resizeEvent(event)
         self._fit()
 
@@ -99,8 +109,11 @@ class LiveBar(QWidget):
 
     def _fit(self) -> None:
         """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
-        acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
-        beside = self._forces_shown and self._needed(TITLE) + acts <= self.width()
+        if not self._short:
+            self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
+        self._short = self._acts > self.width()
+        self._show_words()
+        beside = self._forces_shown and self._needed(TITLE) + self._acts <= self.width()
         size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
         direction = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
         self._rows.setDirection(direction if self._forces_shown else QBoxLayout.Direction.LeftToRight)
@@ -114,6 +127,11 @@ class LiveBar(QWidget):
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
             for made in (caption, value):
                 made.setVisible(self._forces_shown and room >= 0)
+
+    def _show_words(self) -> None:
+        self.finite.setText("M" if self._short else tr("Finite  M"))
+        held = tr("Held  H") if self._held else tr("Hold  H")
+        self.hold.setText("H" if self._short else held)
 
     def _needed(self, size: int) -> int:
         """Return the width of all numbers in a type [px]."""

@@ -229,6 +229,7 @@ class LivePanel(QFrame):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Take the room there is; what there is none for is folded."""
         super().resizeEvent(event)
+        self.bar.fit_into(self.height())
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
         column = (*self.plots[:3], self._model_plot)
         for plot, shown in zip(column, (True, True, speed, model), strict=True):

@@ -74,7 +74,7 @@ class MainWindow(QMainWindow):
         self.notice = Notice(scale, bridge.send)
         self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
-        self.page = NewSessionPage(scale, bridge.send, self.act)
+        self.page = NewSessionPage(tokens, scale, bridge.send, self.act)
         self.course = CoursePanel(tokens, scale, bridge.send)
         self.middle = Middle(bridge, tokens, scale, self.act)
         self.live = self.middle.live
@@ -136,6 +136,7 @@ class MainWindow(QMainWindow):
         for part in (
             self.header,
             self.to_do,
+            self.page,
             self.course,
             self.middle,
             self.bench,
@@ -372,7 +373,7 @@ class MainWindow(QMainWindow):
 
     def _line_changed(self) -> None:
         if self.tablet is None:
-            self.page.show_line(millimetres(self.subject.screen()))
+            self.page.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
             self.page.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
         if self.bridge.view.course is None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import QEvent, QSignalBlocker, Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QPixmap, QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -25,7 +25,8 @@ from daq_app.qt.languages import missing_glyphs, name_of, translator
 from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
-from daq_app.qt.tokens import GRID, TARGET
+from daq_app.qt.thumbnail import Thumbnail
+from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.qt.transducer_row import TransducerRow
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import LanguageChosen, Message
@@ -58,7 +59,9 @@ class NewSessionPage(QFrame):
 
     changed = Signal()
 
-    def __init__(self, scale: float, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
+    def __init__(
+        self, tokens: Tokens, scale: float, send: Callable[[Message], None], act: Callable[[str], None]
+    ) -> None:
         """Show an empty form; `send` takes what is asked for, `act` what a button of the page stands for.
 
         Enter goes to the window, whose primary button begins.
@@ -121,6 +124,8 @@ class NewSessionPage(QFrame):
         self._ruler = button(
             tr("Check with a ruler  Ctrl+M"), tr("check the subject's line with a ruler"), lambda: act("ruler")
         )
+        self.thumbnail = Thumbnail(tokens, scale)
+        self._page_size = QSize(1000, 640)  # of the subject's window
         self.camera = QLabel()
         self.camera.setAccessibleName(tr("address and code for the tablet's camera"))
         self.camera.hide()
@@ -187,8 +192,13 @@ class NewSessionPage(QFrame):
         if not may and self.simulated.isChecked():
             self.people_score.setChecked(True)
 
-    def show_line(self, known: Millimetres) -> None:
-        """Say how far the length of the subject's line can be trusted."""
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self.thumbnail.set_tokens(tokens)
+
+    def show_line(self, known: Millimetres, size: QSize) -> None:
+        """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
+        self._page_size = size
         self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=known.words)
         self._show_screen()
 
@@ -208,6 +218,7 @@ class NewSessionPage(QFrame):
 
     def _show_screen(self) -> None:
         """Say what is worth knowing of the subject's screen: the line's length, and characters no font here has."""
+        self.thumbnail.show_form(self.form(), self._page_size)
         if not self._new_code.isHidden():
             self._screen = self._line_words  # the tablet has fonts of its own
             return
@@ -259,6 +270,7 @@ class NewSessionPage(QFrame):
         self.practice.setVisible("practice" in before)
         self._enrol.setVisible(found is not None and found.may_enrol)
         self._show_languages()
+        self._show_screen()
         for made in (self.protocol, self.seed):
             made.setEnabled(found is None)
             made.setToolTip("" if found is None else tr("the study's own: {protocol}", protocol=found.protocol))
@@ -410,6 +422,7 @@ class NewSessionPage(QFrame):
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
         field(layout, tr("Language that the subject reads"), self.language)
+        layout.addWidget(self.thumbnail)
         layout.addWidget(self._ruler)
         layout.addWidget(self.camera)
         layout.addWidget(self._new_code)

@@ -222,7 +222,7 @@ def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState
 def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bool:
     """Return whether a settled slide under a given force would be less deep under a little more force."""
     force = scene.normal_force
-    if force is None or scene.loading.direction == 0 or state.load.path_dependent:
+    if force is None or scene.loading.direction == 0 or state.sticking > 0.0:
         return False
     try:
         beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)

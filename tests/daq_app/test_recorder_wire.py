@@ -104,7 +104,7 @@ def test_a_report_that_cannot_be_told_does_not_keep_the_others_back():
     outbox.flush(60.0)
     bodies = Splitter().feed(os.read(reading, 65536))
     first, second = map(Codec(REPORTS).unpacked, bodies)
-    assert "could not be told" in first.sentence
+    assert "could not be sent" in first.sentence
     assert second == Failed("Tare", "no")
     os.close(reading)
     os.close(writing)

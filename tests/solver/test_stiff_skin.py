@@ -6,6 +6,7 @@ import pytest
 
 from solver import Friction, Loading, Materials, NoSteadyState, NotConverged, Prediction, Scene, Solve, solve
 from solver.response import solution
+from solver.response.answers import FiniteMeshing
 
 
 def stiffening(mu, tolerance=None):
@@ -26,13 +27,13 @@ def far_off(answer, **_):
 
 def meshing(monkeypatch, finer, *, missed=None):
     """Let all meshes but the coarsest end as `finer`; return the finenesses asked for, and what solves indeed."""
-    whole, asked = solution._Meshing.__call__, []
+    whole, asked = FiniteMeshing.answers, []
 
-    def solved(self, scenes, fineness, watch):
+    def solved(self, scenes, fineness, watch=None):
         asked.append(fineness)
         return whole(self, scenes, fineness, watch) if fineness <= 7 else [finer] * len(scenes)
 
-    monkeypatch.setattr(solution._Meshing, "__call__", solved)
+    monkeypatch.setattr(FiniteMeshing, "answers", solved)
     if missed is not None:
         monkeypatch.setattr(solution, "_missed", missed)
     return asked
