@@ -19,6 +19,7 @@ from sessions.run.replay import different_events, replay
 pytestmark = pytest.mark.qt
 
 ENTER, SPACE, ESCAPE = Qt.Key.Key_Return, Qt.Key.Key_Space, Qt.Key.Key_Escape
+PACE = 3.0  # a simulated hand strokes 1.2 s after a redo, and the undoing must come before it
 
 
 def begin(driver, subject="P07"):
