@@ -20,7 +20,7 @@ from solver.scene.published import STICKINESS
 PLANTED = ("mu", "tau_max", "sed", "shear_along_skin", "stretch_along_skin", "pressure")
 DECIDED = 0.95  # Akaike weight, as a posterior probability under equal priors
 JUDGEMENT = Judgement(rise=25.0, noise=4.0, level_sd=3.0)
-POOL = 60  # people whose strokes the model is asked of; each study draws its own from them
+POOL = 60  # simulated people whose strokes are predicted once; each study draws from them
 SPEEDS = (20.0, 16.0, 24.0, 18.0, 22.0, 15.0, 25.0, 19.0, 17.0, 23.0, 21.0, 16.5)  # [mm/s]
 WIDE_FORCES = (2.0, 4.5, 3.0, 6.5, 2.5, 5.0, 3.5, 6.0, 2.2, 4.0, 5.5, 3.2)  # in no order of friction [N]
 

@@ -70,7 +70,7 @@ class Header(QWidget):
         self._lamp.set_tokens(tokens)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Put the lamp under the subject where there is no room beside it."""
+        """Put the lamp below the subject where the strip is too narrow for one row."""
         super().resizeEvent(event)
         wide = self.width() >= self._one_row
         self._rows.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)

@@ -100,7 +100,7 @@ class LiveBar(QWidget):
                 self.values[channel].setAccessibleName(spoken(channel, text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Leave out the numbers that would be cut, the last first, and words that buttons have no room for."""
+        """Hide the last numbers, and shorten the buttons, where the bar is too narrow for them."""
         super().resizeEvent(event)
         self._fit()
 

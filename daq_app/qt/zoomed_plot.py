@@ -25,7 +25,7 @@ def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: AN
 
 
 def name_axis(axis: Any, words: str) -> None:  # noqa: ANN401  pyqtgraph has no types
-    """Name an axis in its middle, where pyqtgraph leaves a new name beside it until the axis has another size."""
+    """Set the label of an axis, centred: pyqtgraph centres a new label only when the axis is resized."""
     if words != axis.labelText:
         axis.setLabel(words)
         axis.resizeEvent()

@@ -25,15 +25,15 @@ _WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("ke
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """Where a box is, and the rate asked of it."""
+    """The address of a box and the settings that the address requests."""
 
     address: Address
     http_port: int
     rdt_port: int
     tcp_port: int
-    rate: int | None  # asked for in the address [Hz]; None leaves the box as it is
+    rate: int | None  # requested in the address [Hz]; None leaves the box as it is
     buffered: bool = False  # several records a datagram: fewer datagrams, later
-    set_bias: bool = False  # what is felt at opening reads as zero from then on
+    set_bias: bool = False  # the load at opening reads as zero from then on
     reset_latch: bool = False  # of the monitor condition
 
 

@@ -90,3 +90,8 @@ def names(analysis, grade=None):
 
 def with_info(**changes):
     return replace(INFO, **changes)
+
+
+T = times()  # [s]
+N = trapezium(T, 1.0, 3.0, 0.1, 2.0)  # [N] of the plain stroke
+PLAIN = stroke(T)

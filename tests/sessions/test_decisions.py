@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_strokes import INFO, SETTINGS, block, felt, plan, stroke, times, trapezium, trial, wrench
+from made_strokes import INFO, SETTINGS, T, block, felt, plan, stroke, times, trapezium, trial, wrench
 from recordings import ended
 
 from sessions.plan.plan import Frame
@@ -173,7 +173,6 @@ def test_what_is_in_force_follows_from_the_lines_whatever_the_order_of_deciding_
 # What decisions do
 
 
-T = times()
 SLOW = stroke(T, mu=0.5)  # touches at 1 s, lifts at 3 s, 25 mm/s, 2 N
 
 

@@ -9,7 +9,10 @@ from made_strokes import (
     COUNTS,
     HEIGHT,
     INFO,
+    PLAIN,
     SETTINGS,
+    N,
+    T,
     block,
     felt,
     plan,
@@ -28,9 +31,6 @@ from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.decisions import Decision, Decisions
 from sessions.strokes.flaws import Flaw, FlawName
 
-T = times()
-PLAIN = stroke(T)
-N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
 ALONG = 25.0 * (T - 2.0)
 HALF = 0.5 * np.ones_like(T)
 

@@ -5,27 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_strokes import (
-    SETTINGS,
-    analysed,
-    block,
-    felt,
-    names,
-    stroke,
-    times,
-    trapezium,
-    trial,
-    wrench,
-)
+from made_strokes import PLAIN, SETTINGS, N, T, analysed, block, felt, names, stroke, times, trapezium, trial, wrench
 
 from sessions.strokes import FlawName
 from sessions.strokes.friction import rule_for
 from sessions.strokes.settings import SystematicSettings
 from sessions.strokes.stroke_measures import EVERYTHING
-
-T = times()
-PLAIN = stroke(T)
-N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
 
 
 def sticking(mu=0.6, peak=None, stick=0.5):

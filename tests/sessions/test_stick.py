@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from made_strokes import analysed, block, felt, stroke, times, trapezium, wrench
+from made_strokes import N, T, analysed, block, felt, stroke, trapezium, wrench
 
 from sessions.strokes.break_away import Climb
-
-T = times()
-N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
 
 
 def climbing(ratio, slip):

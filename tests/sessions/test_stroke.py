@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from made_strokes import (
     COUNTS,
     HEIGHT,
+    PLAIN,
     SETTINGS,
+    T,
     analysed,
     block,
     felt,
@@ -29,9 +31,6 @@ from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, normal_force
 from sessions.strokes.sliding import movement, steady_window
 from sessions.strokes.stroke import StrokeCurve
-
-T = times()
-PLAIN = stroke(T)
 
 
 def steadily(**changes):

@@ -9,13 +9,13 @@ from made_strokes import (
     CALIBRATION,
     COUNTS,
     HEIGHT,
+    PLAIN,
+    N,
+    T,
     analysed,
     block,
     felt,
     names,
-    stroke,
-    times,
-    trapezium,
     with_info,
     wrench,
 )
@@ -23,10 +23,6 @@ from made_strokes import (
 from sessions.plan.plan import Frame
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
 from sessions.strokes.stroke_measures import EVERYTHING
-
-T = times()
-PLAIN = stroke(T)
-N = trapezium(T, 1.0, 3.0, 0.1, 2.0)
 
 
 def test_without_an_unloaded_stretch_there_are_no_numbers():
