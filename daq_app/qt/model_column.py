@@ -82,15 +82,9 @@ class ModelColumn(QWidget):
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("pictures"))
-        session = QWidget()
-        inside = QVBoxLayout(session)
-        inside.setContentsMargins(0, 0, 0, 0)
-        inside.addWidget(self.which)
-        inside.addWidget(self.session_errors)
-        inside.addWidget(self.picture, 1)
         for name, page in (
             (tr("Finger"), self._finger_page()),
-            (tr("Session"), session),
+            (tr("Session"), self._session_page()),
             (tr("Comparison"), self.compared),
             (tr("Scene"), self.scene),
         ):
@@ -99,6 +93,15 @@ class ModelColumn(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.tabs)
+
+    def _session_page(self) -> QWidget:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.which)
+        layout.addWidget(self.session_errors)
+        layout.addWidget(self.picture, 1)
+        return page
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""

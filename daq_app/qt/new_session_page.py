@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
-from PySide6.QtGui import QPixmap, QResizeEvent
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QButtonGroup,
@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QHBoxLayout,
-    QLabel,
     QRadioButton,
     QVBoxLayout,
     QWidget,
@@ -21,11 +20,9 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.card import CardFrame
 from daq_app.qt.cut_short import CutShort
-from daq_app.qt.languages import missing_glyphs, name_of, translator
 from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled, tick
-from daq_app.qt.score_line import LENGTH
+from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
-from daq_app.qt.thumbnail import Thumbnail
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.qt.transducer_row import TransducerRow
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
@@ -38,9 +35,7 @@ from daq_app.window.new_session import (
     enrolment,
     offered,
     place_of,
-    subject_texts,
 )
-from daq_app.window.subject_texts import SubjectText
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
@@ -90,7 +85,6 @@ class NewSessionPage(QFrame):
         self.seed.setPlaceholderText(tr("a new one"))
         self.height_above = entry(tr("height of the face above the transducer's origin in millimetres; may be empty"))
         self.height_above.setPlaceholderText(tr("as stated"))
-        self.language = choice(tr("language that the subject reads"))
         self.normal = choice(tr("axis of the transducer along which pressing is positive"))
         self.normal.addItems([tr("as stated"), *AXES])
         self.area = entry(tr("contact area of finger and surface in square millimetres; may be empty"))
@@ -111,9 +105,7 @@ class NewSessionPage(QFrame):
             pair[chosen].setChecked(True)
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
-        self._line_words = ""  # how far the length of the subject's line is known
-        self._tablet_missing = ""  # why the subject's page is on no tablet, where it should be
-        self._screen = ""  # with that, which characters of the texts no font here has
+        self.screen_fields = ScreenFields(tokens, scale, act)
         self._pilot = button(
             tr("Pilot  F5"), tr("pilot this protocol with simulated hand and answers"), lambda: act("pilot")
         )
@@ -121,20 +113,16 @@ class NewSessionPage(QFrame):
         self._preview = button(
             tr("Preview  F7"), tr("preview every page that the subject will see"), lambda: act("preview")
         )
-        self._ruler = button(
-            tr("Check with a ruler  Ctrl+M"), tr("check the subject's line with a ruler"), lambda: act("ruler")
-        )
-        self.thumbnail = Thumbnail(tokens, scale)
-        self._page_size = QSize(1000, 640)  # of the subject's window
-        self.camera = QLabel()
-        self.camera.setAccessibleName(tr("address and code for the tablet's camera"))
-        self.camera.hide()
-        self._new_code = button(tr("New code"), tr("let another tablet in, by a new code"), lambda: act("tablet"))
-        self._new_code.hide()
         self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrolled)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
         self._build(scale)
+        self._follow()
+        self._place_changed()
+        self._show_study()
+
+    def _follow(self) -> None:
+        """Let every field say that it has changed, and show what depends on it."""
         for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
             line.textChanged.connect(self.changed)
         for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
@@ -142,13 +130,10 @@ class NewSessionPage(QFrame):
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
-        self.language.currentIndexChanged.connect(self._show_screen)
-        self.language.currentIndexChanged.connect(self._speak)
-        self.language.currentIndexChanged.connect(self.changed)
+        for follow in (self._show_screen, self._speak, self.changed):
+            self.screen_fields.language.currentIndexChanged.connect(follow)
         for line in (self.study, self.folder):
             line.textChanged.connect(self._place_changed)
-        self._place_changed()
-        self._show_study()
 
     def form(self) -> SessionForm:
         """Return what stands on the page."""
@@ -162,13 +147,13 @@ class NewSessionPage(QFrame):
             answering_hand=HANDS[self.answering.currentIndex()][1],
             pre_evaluation=self.pre_evaluation.isVisibleTo(self) and self.pre_evaluation.isChecked(),
             practice=self.practice.isVisibleTo(self) and self.practice.isChecked(),
-            language=self.language.currentData() or "",
+            language=self.screen_fields.language.currentData() or "",
             forces=self.with_forces.isChecked(),
             height=self.height_above.text() if self._height.isVisibleTo(self) else "",
             normal=self.normal.currentText() if self._height.isVisibleTo(self) else "",
             area=self.area.text() if self.with_forces.isChecked() else "",
             simulated=self.simulated.isChecked(),
-            tablet=self._tablet_missing,
+            tablet=self.screen_fields.missing,
         )
 
     def show_bench(self, bench: Bench) -> None:
@@ -194,49 +179,28 @@ class NewSessionPage(QFrame):
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
-        self.thumbnail.set_tokens(tokens)
+        self.screen_fields.thumbnail.set_tokens(tokens)
 
     def show_line(self, known: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
-        self._page_size = size
-        self._line_words = tr("Line of {length:.0f} mm, {words}.", length=LENGTH, words=known.words)
+        self.screen_fields.show_line(known, size)
         self._show_screen()
 
     def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
-        """Say how the tablet is reached, or what is known of its line; `missing` is why no session can begin.
-
-        `picture` is its address for a camera (PNG), or empty.
-        """
-        self._line_words, self._tablet_missing = words, missing
-        shown = QPixmap()
-        shown.loadFromData(picture)
-        self.camera.setPixmap(shown)
-        self.camera.setVisible(bool(picture))
-        self._ruler.hide()  # there is one on the tablet's page
-        self._new_code.show()
+        """Do as `ScreenFields` says."""
+        self.screen_fields.show_tablet(words, missing, picture)
         self._show_screen()
 
     def _show_screen(self) -> None:
-        """Say what is worth knowing of the subject's screen: the line's length, and characters no font here has."""
-        self.thumbnail.show_form(self.form(), self._page_size)
-        if not self._new_code.isHidden():
-            self._screen = self._line_words  # the tablet has fonts of its own
-            return
-        _, texts = subject_texts(self.form())
-        words = translator(self.form().language or ENGLISH)
-        lost = missing_glyphs([*texts, *map(words, SubjectText)], self.font())
-        self._screen = (
-            tr("{words} No font here draws {lost}: install one that does.", words=self._line_words, lost=lost)
-            if lost
-            else self._line_words
-        )
+        self.screen_fields.show_form(self.form())
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
         form = self.form()
-        if anew or (form, bench, self._screen) != self._checked:
-            self._checked = (form, bench, self._screen)
-            self._cards = checklist(form, bench, self._screen)
+        screen = self.screen_fields.words
+        if anew or (form, bench, screen) != self._checked:
+            self._checked = (form, bench, screen)
+            self._cards = checklist(form, bench, screen)
             for card in self._cards:
                 self.frames[card.name].show_card(card)
         return self._cards
@@ -269,26 +233,15 @@ class NewSessionPage(QFrame):
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
         self._enrol.setVisible(found is not None and found.may_enrol)
-        self._show_languages()
+        self.screen_fields.offer_languages(self.form())
         self._show_screen()
         for made in (self.protocol, self.seed):
             made.setEnabled(found is None)
             made.setToolTip("" if found is None else tr("the study's own: {protocol}", protocol=found.protocol))
 
-    def _show_languages(self) -> None:
-        """Offer the languages of the protocol, keeping the one that was chosen where it is among them."""
-        offered_now, _ = subject_texts(self.form())
-        held = [self.language.itemData(at) for at in range(self.language.count())]
-        if list(offered_now) != held:
-            before = self.language.currentData()
-            self.language.clear()
-            for code in offered_now:
-                self.language.addItem(name_of(code), code)
-            self.language.setCurrentIndex(max(self.language.findData(before), 0))
-
     def _speak(self) -> None:
         """Let the subject's page speak the chosen language before there is a session."""
-        self._send(LanguageChosen(self.language.currentData() or ENGLISH))
+        self._send(LanguageChosen(self.screen_fields.language.currentData() or ENGLISH))
 
     def _enrolled(self) -> None:
         refused = enrolled(self.form())
@@ -421,11 +374,7 @@ class NewSessionPage(QFrame):
         layout.addWidget(self._area)
 
     def _build_screen(self, layout: QVBoxLayout) -> None:
-        field(layout, tr("Language that the subject reads"), self.language)
-        layout.addWidget(self.thumbnail)
-        layout.addWidget(self._ruler)
-        layout.addWidget(self.camera)
-        layout.addWidget(self._new_code)
+        layout.addWidget(self.screen_fields)
 
     def _build_disk(self, layout: QVBoxLayout) -> None:
         other = button("…", tr("choose the folder of sessions"), self._choose_folder)

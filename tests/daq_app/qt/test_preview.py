@@ -104,9 +104,9 @@ def test_a_protocol_that_cannot_be_read_says_why_in_the_window(driver, tmp_path)
 def test_the_subjects_page_speaks_the_chosen_language_before_a_session(driver):
     window, page = driver.window, driver.window.page
     page.protocol.setCurrentText("sensotact-friction")
-    page.language.setCurrentIndex(page.language.findData("ar"))
+    page.screen_fields.language.setCurrentIndex(page.screen_fields.language.findData("ar"))
     assert window.subject._title.text() == translator("ar")(SubjectText.WELCOME)
     assert window.subject.layoutDirection() == Qt.LayoutDirection.RightToLeft
-    page.language.setCurrentIndex(page.language.findData("en"))
+    page.screen_fields.language.setCurrentIndex(page.screen_fields.language.findData("en"))
     assert window.subject._title.text() == "Welcome"
     assert window.subject.layoutDirection() == Qt.LayoutDirection.LeftToRight

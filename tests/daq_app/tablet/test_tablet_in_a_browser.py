@@ -175,12 +175,12 @@ def test_other_kinds_of_answer_are_given_on_the_tablet_too(desk, protocol, give,
     driver, browser = desk
     window, server = driver.window, driver.window.tablet.server
     window.page.protocol.setCurrentText(protocol)
-    assert not window.page.camera.pixmap().isNull()
+    assert not window.page.screen_fields.camera.pixmap().isNull()
     browser.call("Page.navigate", url=server.link)  # as a camera reads it
     browser.until("document.readyState == 'complete' && ruling")
     assert browser.value("location.href") == f"{server.url}/"
     browser.click("skip")
-    driver.until(lambda: server.connected and window.page.camera.isHidden())
+    driver.until(lambda: server.connected and window.page.screen_fields.camera.isHidden())
     driver.until(lambda: not window.tablet.missing)
     window.act("primary")
     driver.phase("idle")
