@@ -195,6 +195,7 @@ class LivePlot(PaintedWidget):
         across = inside.width() / self._seconds
         painter.setFont(font(SMALL, self._type_scale))
         line = painter.fontMetrics().height()
+        free = inside.left()  # from where on no words stand yet
         for mark in self._marks:
             start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
             if mark.kind == "steady":
@@ -212,8 +213,9 @@ class LivePlot(PaintedWidget):
             if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
                 width = words.size().width()
                 left = start - width - 3 if onset else start + 3
-                if inside.left() <= left <= inside.right() - width:
+                if free <= left <= inside.right() - width:
                     painter.drawStaticText(QPointF(left, inside.top() + line), words)
+                    free = left + width
 
     def _colour(self, name: str) -> str:
         return name if name.startswith("#") else str(getattr(self.tokens, name))

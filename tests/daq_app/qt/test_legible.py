@@ -31,21 +31,26 @@ from daq_app.qt import remembered, tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.languages import translator
+from daq_app.qt.live_panel import PLOTS
+from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.menus import about_box
 from daq_app.qt.subject_preview import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.window.course_state import Mark
+from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.messages import Judged
 from daq_app.window.new_session import SessionForm
 from daq_app.window.preview import preview
 from daq_app.window.view import derive_view
 from daq_app.window.view_model import ModelWords
 from sessions.plan.protocols import protocol, protocol_names
-from tests.daq_app.qt.painted_text import cut_or_colliding, paints_by_hand
-from tests.daq_app.qt.test_analyst_window import SESSION, Nobody, example, film
+from tests.daq_app.qt.painted_text import cut_or_colliding, painted_texts, paints_by_hand
+from tests.daq_app.qt.review.examples import SESSION, Nobody, film
 from tests.daq_app.qt.test_window_for_everybody import contrast
 from tests.daq_app.session_messages import BAD, CLOSING, MOUNT, PAUSED, SCORE, after
+from tests.sessions.report_example import example
 
 pytestmark = pytest.mark.qt
 PACE = 1.0  # no test here waits for a session
@@ -345,3 +350,15 @@ def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, lang
             assert cut_off(window) == [], page.name
     window.hide()
     window.deleteLater()
+
+
+@pytest.mark.usefixtures("application")
+def test_the_words_of_a_lift_and_of_the_next_onset_never_lie_on_each_other():
+    plot = LivePlot(*PLOTS[0], tokens.LIGHT, 1.0)
+    plot.resize(220, 160)
+    time = np.linspace(0.0, 10.0, 50)
+    for gap in np.linspace(0.1, 4.0, 40):
+        marks = [Mark("onset", 2.5, 2.5), Mark("lift", 4.0, 4.0), Mark("onset", 4.0 + gap, 4.0 + gap)]
+        plot.show_columns(Columns(time, np.zeros((len(CHANNELS), 50))), 10.0, marks, 0.0)
+        assert not cut_or_colliding(plot)
+    assert [text.words for text in painted_texts(plot)].count("onset") == 2

@@ -1,0 +1,66 @@
+"""A recorded session, work that is never done, and made fingers and histories for tests of Review."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+
+from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
+from daq_app.analyst.raw import RawReadings
+
+SESSION = Path(__file__).parents[3] / "data" / "sessions" / "version-1" / "sealed"
+
+
+class Nobody:
+    """Work that is never done; what was asked for is kept."""
+
+    def __init__(self):
+        self.asked = []
+
+    def poll(self):
+        return ()
+
+    def ask(self, asked):
+        self.asked.append(asked)
+
+    def close(self):
+        """Do nothing."""
+
+
+def until(application, condition):
+    end = time.monotonic() + 120.0  # of a machine that hangs, not of a slow one
+    while not condition():
+        assert time.monotonic() < end
+        application.processEvents()
+        time.sleep(0.005)
+
+
+def frame(sed):
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    contact = Contact(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
+    return Frame(square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.array([sed, sed]))
+
+
+PARTS, ARCS = Parts(np.array([[0, 1, 2]]), np.array([[0, 0, 1, 1, 2, 2, 2, 2]]), np.array([1])), np.array([0.0, 1.0])
+
+
+def film(**more):
+    told = [Instant(0.1 * i, 1.0, 0.0 if i < 2 else 0.5, 0.001 * i, 1.0, 0.1, 3, i) for i in range(4)]
+    return Film(PARTS, tuple(frame(0.001 * i) for i in range(4)), tuple(told), ARCS, **more)
+
+
+def raw(stroke, n=50):
+    time_s = np.linspace(stroke.onset - 0.1, stroke.lift + 0.1, n)
+    whole = np.arange(n)
+    return RawReadings(
+        "here", "counts", whole + 7, whole, whole, whole, time_s, np.ones((n, 6)), time_s, time_s, "zero"
+    )
+
+
+def drag(application, widget, begin, end, held=Qt.KeyboardModifier.NoModifier):
+    QTest.mousePress(widget, Qt.MouseButton.LeftButton, held, begin)
+    QTest.mouseMove(widget, end)
+    application.processEvents()
+    QTest.mouseRelease(widget, Qt.MouseButton.LeftButton, held, end)

@@ -1,0 +1,319 @@
+"""Review, driven as a person does, on a recorded session that is analysed by the real work."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pyqtgraph
+import pytest
+from PySide6.QtCore import QItemSelection, QItemSelectionModel, QPoint, QPointF, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.lineage import lineage
+from daq_app.analyst.seen import finger_words
+from daq_app.analyst.shown import condition, numbers, points
+from daq_app.analyst.state import chosen, rows
+from daq_app.qt.analyst_window import AnalystWindow
+from daq_app.qt.lineage_label import LineageLabel
+from daq_app.qt.tokens import LIGHT
+from sessions.report.contents import Fact
+from tests.daq_app.qt.review.examples import SESSION, film, raw, until
+from tests.sessions.report_example import example
+
+CONTROLS = (QAbstractButton, QComboBox, QLineEdit, QListWidget, QSlider)
+
+
+def test_a_point_of_prediction_against_score_chooses_its_trial_in_every_column(window):
+    point = points(window.state)[-1]
+    spot = next(s for s in window.trials.points.points() if s.data() == point.row)
+    window.trials._point_clicked(None, [spot])
+    assert window.trials.list.currentRow() == point.row
+    assert window.stroke.stroke.accessibleName().endswith(f"stroke {chosen(window.state).stroke.number}")
+    assert m.Choose(point.row) in window._work.asked
+
+
+def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_among_the_numbers(window):
+    report = example()
+    pressures = {said.stroke: -0.001 * at for at, said in enumerate(report.predictions, 1)}  # [MPa]
+    told = (replace(said, responses={"pressure": (pressures[said.stroke], 2e-7)}) for said in report.predictions)
+    window.take(m.Found("predicted", replace(report, predictions=tuple(told))))
+    responses = window.trials.responses
+    responses.setCurrentText("pressure [kPa]")
+    responses.activated.emit(responses.currentIndex())
+    listed = rows(window.state)
+    assert [point.response for point in points(window.state)] == pytest.approx(
+        [1e3 * pressures[listed[point.row].stroke.number] for point in points(window.state)]
+    )
+    assert sorted(spot.pos().y() for spot in window.trials.points.points()) == sorted(
+        point.response for point in points(window.state)
+    )
+    row = next(at for at, line in enumerate(listed) if line.stroke is not None and line.stroke.number in pressures)
+    window.take(m.Choose(row))
+    shown = f"{abs(1e3 * pressures[listed[row].stroke.number]):.3f}"
+    name = f"pressure {condition(report, listed[row].prediction)}, averaged over the ending"
+    assert dict(numbers(window.state))[name].startswith(f"−{shown} kPa ± ")
+    assert dict(numbers(window.state))[name].endswith(" % by the mesh; model: no estimate")
+    responses.setCurrentIndex(0)
+    responses.activated.emit(0)
+    assert name not in dict(numbers(window.state))
+
+
+def test_the_table_of_all_strokes_chooses_a_trial_and_the_scene_tells_what_the_model_was_given(window):
+    table = window.stroke.friction
+    assert len(table.texts()) == len(window.state.report.strokes)
+    table.go_to(3)
+    assert window.state.row == 3
+    said = chosen(window.state).prediction
+    cells = {name: value for name, value, _ in window.model.scene.texts()}
+    assert cells["µ of this trial"] == f"{said.mu:.4f}"
+    assert cells["indentation"] == f"{said.indentation:.3g} mm"
+
+
+def test_a_click_on_the_head_sorts_by_value_and_a_line_still_chooses_its_trial(window):
+    table = window.stroke.friction
+    table.sortByColumn(2, Qt.SortOrder.AscendingOrder)
+    shown = [float(line[2]) for line in table.texts()]
+    assert shown == sorted(shown)
+    least = min(window.state.report.strokes, key=lambda stroke: stroke.mu_dynamic)
+    table.setCurrentIndex(table.model().index(0, 0))
+    assert chosen(window.state).stroke.number == least.number
+    table.sortByColumn(-1, Qt.SortOrder.AscendingOrder)
+    assert [line[0] for line in table.texts()] == [str(s.trial) for s in window.state.report.strokes]
+
+
+def test_ctrl_c_copies_the_selected_range_as_tab_separated_values(window):
+    table = window.stroke.friction
+    model = table.model()
+    table.selectionModel().select(
+        QItemSelection(model.index(0, 1), model.index(1, 2)), QItemSelectionModel.SelectionFlag.ClearAndSelect
+    )
+    QTest.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    first, second = table.texts()[:2]
+    assert QGuiApplication.clipboard().text() == f"{first[1]}\t{first[2]}\n{second[1]}\t{second[2]}"
+
+
+def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model(window):
+    effects = (Fact("viscosity", "below 0.01 to 4 % of the SED"), Fact("warning", "99 mm"), Fact("bone", "2 %"))
+    report = replace(example(), model="small strain, settled sliding, τ max mean", left_out=effects)
+    window.take(m.Found("predicted", report))
+    [said] = [row.prediction for row in rows(window.state)[:1]]
+    condition = f"SED at {said.indentation:.3g} mm, small strain"
+    error = f"{1000 * said.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
+    assert said.error_estimate == pytest.approx(0.001)
+    assert f"{condition} {error}" in finger_words(window.state)
+    assert dict(numbers(window.state))[f"{condition}, averaged over the ending"] == error
+    assert f"{condition} {error}" in [link.words for link in lineage(window.state)]
+
+
+def test_the_wheel_zooms_a_stroke_and_home_or_a_double_click_shows_all_of_it_again(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    whole = plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def shown():
+        application.processEvents()
+        return plot.getPlotItem().getViewBox().viewRange()[0]
+
+    def zoom():
+        plot.getPlotItem().getViewBox().scaleBy((0.2, 0.2))
+        assert shown() != pytest.approx(whole)
+
+    zoom()
+    window.take(m.Idle())
+    assert shown() != pytest.approx(whole)  # news of something else leaves the zoom
+    QTest.keyClick(window, Qt.Key.Key_Home)
+    assert shown() == pytest.approx(whole)
+    zoom()
+    QTest.mouseDClick(plot.viewport(), Qt.MouseButton.LeftButton)
+    assert shown() == pytest.approx(whole)
+
+
+def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
+    window.take(m.Step(0.5, "predicting"))
+    window.stop.click()
+    assert window._work.asked[-1] == m.Stop()
+    window.take(m.Cancelled())
+    assert "kept" in window.state.told
+    assert window.trials.list.count() == len(rows(window.state))
+
+
+def test_an_edge_is_moved_by_keys_and_recorded_with_enter(window):
+    stroke = chosen(window.state).stroke
+    handle = window.stroke.stroke.handles["steady begin"]
+    window.stroke.decisions.by.setText("E02")
+    window.stroke.decisions.why.setText("a ramp")
+    handle.setFocus()
+    QTest.keyClick(handle, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    QTest.keyClick(handle, Qt.Key.Key_Left)
+    assert not any(isinstance(asked, m.Move) for asked in window._work.asked)
+    QTest.keyClick(handle, Qt.Key.Key_Return)
+    moved = window._work.asked[-1]
+    assert (moved.stroke, moved.edge, moved.by, moved.why) == (stroke.number, "steady begin", "E02", "a ramp")
+    assert moved.time == pytest.approx(stroke.steady[0] + 0.045)
+
+
+def test_an_edge_that_is_dragged_is_recorded_where_it_is_let_go_and_escape_takes_a_key_back(
+    application, window, monkeypatch
+):
+    monkeypatch.setitem(pyqtgraph.CONFIG_OPTIONS, "mouseRateLimit", 0)  # this mouse is quicker than any hand
+    stroke = chosen(window.state).stroke
+    view = window.stroke.stroke
+    for _ in range(3):  # axes take their width when they are painted
+        window.grab()
+        application.processEvents()
+    plot, line = view._plots[1], view._lines["steady begin"][1]
+    box = plot.getPlotItem().getViewBox()
+    at = [plot.mapFromScene(box.mapViewToScene(QPointF(line.value() + by, box.viewRange()[1][0]))) for by in (0.0, 0.2)]
+    places = [at[0] + (at[1] - at[0]) * step / 5 - QPoint(0, 20) for step in range(6)]
+    mouse = plot.viewport()
+    QTest.mouseMove(mouse, places[0])
+    QTest.mousePress(mouse, Qt.MouseButton.LeftButton, pos=places[0])
+    for place in places[1:]:
+        QTest.mouseMove(mouse, place)
+        application.processEvents()
+    assert not any(isinstance(asked, m.Move) for asked in window._work.asked)
+    QTest.mouseRelease(mouse, Qt.MouseButton.LeftButton, pos=places[-1])
+    moved = window._work.asked[-1]
+    pixel = box.viewPixelSize()[0]
+    assert (moved.edge, moved.time) == ("steady begin", pytest.approx(stroke.steady[0] + 0.2, abs=2 * pixel))
+    window.take(m.Problem("The disk is full."))  # it was not recorded: the edge goes back
+    assert line.value() == pytest.approx(stroke.steady[0] - stroke.trace.origin)
+    handle = view.handles["onset"]
+    before = handle.text()
+    QTest.keyClick(handle, Qt.Key.Key_Left)
+    assert handle.text() != before
+    QTest.keyClick(handle, Qt.Key.Key_Escape)
+    assert handle.text() == before
+
+
+def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
+    held, bar = Qt.KeyboardModifier.ControlModifier, window.stroke.decisions
+    assert not bar.undo.isEnabled()
+    QTest.keyClick(window, Qt.Key.Key_Z, held)
+    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    window.take(
+        m.Found("predicted", example(), m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",)))
+    )
+    assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
+    assert bar.undo.accessibleName() == "undo lift of trial 2, Ctrl+Z"
+    assert bar.redo.accessibleName() == "redo steady of trial 3, Ctrl+Shift+Z"
+    QTest.keyClick(window, Qt.Key.Key_Z, held)
+    window.take(m.Found("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
+    assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
+    QTest.keyClick(window, Qt.Key.Key_Z, held | Qt.KeyboardModifier.ShiftModifier)
+    assert [asked.again for asked in window._work.asked if isinstance(asked, m.Undo)] == [False, True]
+
+
+def test_the_pointer_over_a_stroke_reads_time_forces_and_friction(application, window):
+    view = window.stroke.stroke
+    plot = view._plots[0]
+    view.show_all()
+    application.processEvents()
+    trace = chosen(window.state).stroke.trace
+    i = len(trace.time) // 2
+    at = plot.getPlotItem().getViewBox().mapViewToScene(QPointF(trace.time[i], trace.normal[i]))
+    QTest.mouseMove(plot.viewport(), plot.mapFromScene(at))
+    application.processEvents()
+    pattern = r"([\d.]+) s · N ([\d.]+) N · T ([\d.]+) N · µ ([\d.]+)"
+    time_s, normal, tangential, mu = map(float, re.fullmatch(pattern, plot.words.text()).groups())
+    assert plot.words.isVisible()
+    near = list(np.round(trace.time, 3)).index(time_s)
+    assert abs(near - i) <= 1
+    assert (normal, tangential, mu) == pytest.approx(
+        (trace.normal[near], trace.tangential[near], trace.mu[near]), rel=1e-3
+    )
+
+
+def test_readings_are_replayed_with_play_pause_speed_seek_and_step(window):
+    stroke = chosen(window.state).stroke
+    window.take(m.Read(stroke.number, raw(stroke)))
+    player, view = window.stroke.player, window.stroke.stroke
+    player.seek(20)
+    assert len(view._recorded[0].getData()[0]) == 21
+    QTest.keyClick(player, Qt.Key.Key_Right)
+    assert len(view._recorded[0].getData()[0]) == 22
+    player.speed.setCurrentIndex(0)
+    player.speed.activated.emit(0)
+    player.toggle()
+    assert player.playing
+    player.toggle()
+    QTest.keyClick(player, Qt.Key.Key_End)
+    assert len(view._recorded[0].getData()[0]) == 50
+
+
+def test_every_link_of_the_way_back_is_followed_by_keys(application, window):
+    way = LineageLabel(LIGHT)
+    way.show_links(lineage(window.state))
+    way.show()
+    way.activateWindow()
+    way.setFocus()
+    application.processEvents()
+    followed = []
+    way.followed.connect(followed.append)
+    for _ in range(6):
+        QTest.keyClick(way, Qt.Key.Key_Tab)
+        QTest.keyClick(way, Qt.Key.Key_Return)
+    way.close()
+    assert followed == ["session", "trial", "prediction", "friction", "window", "readings"]
+
+
+def test_the_way_back_ends_at_the_first_raw_reading_of_the_steady_window(window):
+    stroke = chosen(window.state).stroke
+    window.take(m.Read(stroke.number, raw(stroke)))
+    window._follow("readings")
+    table = window.stroke.readings.table
+    row = table.currentIndex().row()
+    assert [table.model().index(at, 0).data() for at in (row - 1, row)] == ["", "steady"]
+    assert table.model().index(row, 1).data() == str(row + 7)
+
+
+def test_a_second_session_is_shown_beside_the_first(window):
+    window.take(m.Compared("other", example()))
+    table = window.model.compared.table
+    assert len(table.texts()) == len({(p.experiment, p.index) for p in window.state.report.predictions})
+    assert {line[3] for line in table.texts()} == {"+0.000"}
+    assert m.Draw("compared") in window._work.asked
+
+
+def test_every_control_has_a_name_and_tab_reaches_it(window):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    found = [w for kind in CONTROLS for w in window.findChildren(kind)]
+    controls = [w for w in found if not isinstance(w.parent(), QComboBox | QAbstractScrollArea)]
+    ours = [w for w in controls if w.parent().metaObject().className() != "QTabBar"]
+    assert [w for w in ours if not w.accessibleName().strip()] == []
+    window.activateWindow()
+    window.trials.list.setFocus()
+    seen = set()
+    for _ in range(80):
+        focused = window.focusWidget()
+        seen.add(focused)
+        window.focusNextChild()
+    QTest.keyClick(window, Qt.Key.Key_F1)
+    assert window.keys.isVisible()
+    QTest.keyClick(window, Qt.Key.Key_Escape)
+    assert not window.keys.isVisible()
+    reachable = [w for w in ours if w.isVisible() and w.isEnabled() and w.focusPolicy() & Qt.FocusPolicy.TabFocus]
+    assert [w.accessibleName() for w in reachable if w not in seen] == []
+
+
+def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(application, window):
+    for size in ((3840, 2160), (1366, 768), (911, 512), (683, 384)):
+        window.resize(*size)
+        application.processEvents()
+        assert (window.width(), window.height()) == size
+        parts = [w for w in (window.way, *window._parts, window.report, window.stop, window.export) if w.isVisible()]
+        boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in parts]
+        for i, box in enumerate(boxes):
+            assert window.rect().contains(box)
+            assert not any(box.intersects(other) for other in boxes[i + 1 :])
+
+
+def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
+    window = AnalystWindow(SESSION, LIGHT)
+    until(application, lambda: window.state.stage != "opening" or window.state.step is None)
+    assert window.state.report is not None, window.state.told
+    assert window.state.report.session == SESSION.name
+    window.close()

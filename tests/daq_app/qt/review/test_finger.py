@@ -1,0 +1,320 @@
+"""The finger in Review: viewport, fields, probe, history, films and a second finger beside it."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtTest import QTest
+from qt_events import wheel
+
+from daq_app.analyst import messages as m
+from daq_app.analyst.field_list import FIELD_CHOICES
+from daq_app.analyst.frame import Finger
+from daq_app.analyst.state import chosen, rows
+from daq_app.qt.field_bar import ALL_TRIALS, FIXED
+from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
+from tests.sessions.report_example import example
+
+
+def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
+    key = chosen(window.state).key
+    window.model.history.click()
+    assert window._work.asked[-1] == m.ShowHistory(key)
+    window.take(m.Filmed(key, film()))
+    player, canvas = window.model.player, window.model.finger
+    assert "Step 4 of 4" in canvas.accessibleName()
+    assert "kPa; mesh, model: no estimate" in canvas.accessibleName()
+    for _ in range(3):
+        QTest.keyClick(player, Qt.Key.Key_Left)
+    assert "pressing down" in canvas.accessibleName()
+    QTest.keyClick(player, Qt.Key.Key_Space)
+    assert player.playing
+    QTest.keyClick(player, Qt.Key.Key_Space)
+    assert not player.playing
+    window.model.near.click()
+    assert not canvas.grab().isNull()
+
+
+def small_finger(application, window):
+    """Return the canvas with the triangle of `film`, its settled state, and where it paints a place [mm]."""
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    application.processEvents()
+    canvas = window.model.finger
+    canvas.sight.look_at(None)
+    canvas.sight.set_line(None)
+
+    def pixel(x, y):
+        return QPointF(*canvas.view().placed(np.array([[x, y]]))[0]).toPoint()
+
+    return canvas, pixel
+
+
+def test_the_wheel_zooms_the_finger_about_the_pointer_and_home_or_a_double_click_shows_all(application, window):
+    canvas, pixel = small_finger(application, window)
+    whole, at = canvas.view(), pixel(0.5, 0.25)
+    wheel(application, canvas.viewport(), at, 3)
+    assert canvas.view().per_mm == pytest.approx(1.02**45 * whole.per_mm)  # as pyqtgraph documents its wheel
+    assert canvas.view().place(at.x(), at.y()) == pytest.approx(whole.place(at.x(), at.y()))
+    QTest.keyClick(canvas, Qt.Key.Key_Home)
+    assert canvas.view() == whole
+    QTest.keyClick(canvas, Qt.Key.Key_Plus)
+    assert canvas.view().per_mm == pytest.approx(1.25 * whole.per_mm)
+    QTest.keyClick(canvas, Qt.Key.Key_Minus)
+    assert canvas.view().per_mm == pytest.approx(whole.per_mm)
+    QTest.keyClick(canvas, Qt.Key.Key_Right)
+    assert canvas.view().x > whole.x
+    QTest.mouseDClick(canvas.viewport(), Qt.MouseButton.LeftButton)
+    assert canvas.view() == whole
+
+
+def test_a_drag_moves_the_finger_and_the_next_step_of_its_history_leaves_it_there(application, window):
+    canvas, _ = small_finger(application, window)
+    before = canvas.view()
+    drag(application, canvas.viewport(), QPoint(60, 80), QPoint(90, 60))
+    after = canvas.view()
+    assert (before.x - after.x) * before.per_mm == pytest.approx(30.0)
+    assert (before.y - after.y) * before.per_mm == pytest.approx(20.0)
+    QTest.keyClick(window.model.player, Qt.Key.Key_Left)
+    assert canvas.view() == after
+    assert canvas.sight.line is None
+
+
+def test_a_line_is_drawn_moved_and_taken_away_by_keys(application, window):
+    canvas, _ = small_finger(application, window)
+    view, press = canvas.view(), lambda key, held: QTest.keyClick(canvas, key, held)
+    for _ in range(5):
+        press(Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    press(Qt.Key.Key_Up, Qt.KeyboardModifier.ControlModifier)
+    assert canvas.view() == view  # the picture stays where it is
+    (x, y), (to_x, to_y) = canvas.sight.line
+    assert (to_x - x) * view.per_mm == pytest.approx(5 * 0.02 * canvas.width())
+    assert (y - to_y) * view.per_mm == pytest.approx(0.02 * canvas.width())
+    QTest.keyClick(canvas, Qt.Key.Key_Delete)
+    assert canvas.sight.line is None
+
+
+def test_the_probe_says_the_field_its_unit_the_place_and_the_tissue_under_the_pointer(application, window):
+    canvas, pixel = small_finger(application, window)
+    at = pixel(0.25, 0.25)
+    QTest.mouseMove(canvas.viewport(), at)
+    application.processEvents()
+    words = window.model.probe.accessibleName()
+    assert words.startswith("SED 3 kPa · x 0.2")
+    assert words.endswith("dermis")
+    QTest.keyClick(window.model.player, Qt.Key.Key_Left)  # another state under the pointer at rest
+    assert window.model.probe.accessibleName().startswith("SED 2 kPa · x 0.2")
+    QTest.mouseMove(canvas.viewport(), pixel(0.9, 0.9))
+    application.processEvents()
+    assert window.model.probe.accessibleName().endswith("no tissue")
+
+
+def test_a_line_that_is_drawn_with_shift_plots_the_field_along_it(application, window):
+    canvas, pixel = small_finger(application, window)
+    drag(application, canvas.viewport(), pixel(0.1, 0.3), pixel(0.6, 0.3), Qt.KeyboardModifier.ShiftModifier)
+    ((place, values),) = window.model.plot.values
+    assert place[-1] == pytest.approx(0.5, abs=2.0 / canvas.view().per_mm)
+    np.testing.assert_allclose(values, 3.0)
+    assert window.model.plot.plot.accessibleName() == "SED [kPa]: from A to B [mm]"
+
+
+def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees_them(application, window):
+    canvas, _ = small_finger(application, window)
+    fields = window.model.fields
+    fields.ranges.setCurrentIndex(FIXED)
+    fields.low.setValue(1.0)
+    fields.high.setValue(2.5)
+    for _ in range(2):
+        assert canvas._look.range == (1.0, 2.5)
+        QTest.keyClick(window.model.player, Qt.Key.Key_Left)
+    canvas._bar.region.setRegion((63, 207))  # as a handle of the colour bar is dragged, a quarter of the way to its end
+    canvas._bar.region.sigRegionChangeFinished.emit(canvas._bar.region)
+    assert fields.mode == FIXED
+    assert canvas._look.range == pytest.approx((1.0, fields.high.value()), abs=0.015)
+    assert fields.high.value() > 2.5
+    fields.high.setValue(2.5)
+    fields.low.setValue(2.5)  # no range: the automatic one is shown
+    assert canvas._look.range != (2.5, 2.5)
+    fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    assert fields.mode == ALL_TRIALS
+    assert canvas._look.field.unit == "mm"
+    assert not canvas.grab().isNull()
+    fields.which.setCurrentIndex(0)
+
+
+def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(window):
+    key = chosen(window.state).key
+    window.take(m.Filmed(key, film(lost=(0.5, 0.5)), "The drag wedges it."))
+    words = window.model.why.text()
+    assert "is step 4: at 0.300 s" in words
+    assert words.endswith("The drag wedges it.")
+    assert window.model.finger._look.lost == (0.5, 0.5)
+    window.model.player.step(-1)
+    assert window.model.finger._look.lost is None
+
+
+def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
+    report = example()
+    first = replace(report.predictions[0], sed=None, reasons={"sed": "It wedges."})
+    window.take(m.Found("predicted", replace(report, predictions=(first, *report.predictions[1:]))))
+    at = next(i for i, row in enumerate(rows(window.state)) if row.prediction is first)
+    window.ask(m.Choose(at))
+    assert m.ShowHistory(rows(window.state)[at].key) in window._work.asked
+    assert "It wedges." in window.model.finger.accessibleName()
+
+
+def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_formats(window, monkeypatch):
+    assert not any(isinstance(asked, m.Draw) for asked in window._work.asked)
+    window.model.tabs.setCurrentIndex(1)
+    assert [asked.name for asked in window._work.asked if isinstance(asked, m.Draw)] == ["course"]
+    window.take(m.Drawn("course", "forces", window.grab().toImage() and b"\x89PNG"))
+    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
+    for made in window.model.picture.save.buttons:
+        made.click()
+    written = [asked for asked in window._work.asked if isinstance(asked, m.Write)]
+    assert [(one.what, one.path) for one in written] == [
+        ("picture course", f"out/picture.{ending}") for ending in ("svg", "png", "csv")
+    ]
+
+
+def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simulated(window, monkeypatch, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
+    field, canvas = FIELD_CHOICES[-1], window.model.finger
+    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
+    for made in window.model.save.buttons:
+        made.click()
+        assert window._words.accessibleName().startswith("Saved: ")
+    assert not any(isinstance(asked, m.Write) for asked in window._work.asked)
+    with Image.open(tmp_path / "u.png") as written:
+        assert written.size == (2 * canvas.width(), 2 * canvas.height())
+    assert "SIMULATED" in (tmp_path / "u.svg").read_text()
+    head, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
+    assert (head[:11], names) == ("# SIMULATED", f"x [mm],y [mm],{field.axis}")
+    shown = canvas.frame
+    table = np.array([line.split(",") for line in numbers], float)
+    np.testing.assert_allclose(table, np.column_stack([shown.nodes, field.of(shown)]), rtol=1e-8)
+    monkeypatch.setattr(
+        "daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
+    )
+    window.model.save.buttons[0].click()
+    assert window._words.accessibleName().endswith("choose another folder.")
+    window.model.fields.which.setCurrentIndex(0)
+
+
+def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colours(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    for _ in range(5):  # the columns have found their widths
+        application.processEvents()
+    ranges, show = set(), window.model._moved
+    window.model._moved = lambda at: (show(at), ranges.add(window.model.finger._look.range))
+    window.model.write_film(tmp_path / "film.gif")
+    until(application, lambda: "Saved" in window._words.accessibleName())
+    window.model._moved = show
+    with Image.open(tmp_path / "film.gif") as written:
+        assert (written.n_frames, written.info["duration"]) == (4, 100)
+        assert written.size == (window.model.finger.width(), window.model.finger.height())
+    assert len(ranges) == 1
+    assert "Step 4 of 4" in window.model.finger.accessibleName()
+
+
+def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.write_film(tmp_path / "film.mp4")
+    until(application, lambda: "Saved" in window._words.accessibleName())
+    finger = window.model.finger
+    width, height = finger.width() // 2 * 2, finger.height() // 2 * 2
+    read = [
+        imageio_ffmpeg.get_ffmpeg_exe(),
+        "-i",
+        str(tmp_path / "film.mp4"),
+        "-f",
+        "rawvideo",
+        "-pix_fmt",
+        "rgb24",
+        "-",
+    ]
+    done = subprocess.run(read, capture_output=True, check=True)
+    assert re.search(rf"Video: h264.*{width}x{height}.* 10 fps", done.stderr.decode())
+    pictures = np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
+    assert len(pictures) == 4
+    assert np.std(pictures[-1]) > 10.0  # there is something to see
+
+
+def test_a_film_as_mp4_without_its_encoder_is_one_sentence(application, window, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    window.model.write_film(tmp_path / "film.mp4")
+    until(application, lambda: "daq-app[film]" in window._words.accessibleName())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_film_that_is_cancelled_leaves_no_file(application, window, tmp_path):
+    window.take(m.Filmed(chosen(window.state).key, film()))
+    writer = window.model.write_film(tmp_path / "film.gif")
+    writer._dialog.cancel()
+    until(application, lambda: "The film was cancelled" in window._words.accessibleName())
+    assert list(tmp_path.iterdir()) == []
+
+
+def two_fingers(application, window, factor=1.5):
+    """Show the settled finger of the chosen trial beside one of another session with `factor` times its SED."""
+    row = chosen(window.state)
+    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    other = Finger(PARTS, frame(0.002 * factor), ARCS)
+    window.take(m.Compared("other", replace(example(), session="later"), {row.key: other}))
+    window.model.tabs.setCurrentIndex(0)
+    application.processEvents()
+    return window.model.finger, window.model.other
+
+
+def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(application, window):
+    first, second = two_fingers(application, window)
+    assert first.isVisible()
+    assert second.isVisible()
+    assert abs(first.width() - second.width()) <= 1
+    assert second.accessibleName().startswith("B  later")
+    wheel(application, second.viewport(), QPoint(60, 90), 2)
+    shown = [(canvas.view().x, canvas.view().y, canvas.view().per_mm) for canvas in (first, second)]
+    assert shown[0] == pytest.approx(shown[1], rel=0.01)  # one may be a pixel wider
+    assert first._look.range == second._look.range
+    drag(application, first.viewport(), QPoint(60, 90), QPoint(90, 90), Qt.KeyboardModifier.ShiftModifier)
+    assert second.sight.line == first.sight.line is not None
+    window.model.both.click()
+    assert not second.isVisible()
+    first.sight.set_line(None)
+    first.sight.look_at(None)
+
+
+def test_the_pointer_over_one_finger_reads_both(application, window):
+    first, _ = two_fingers(application, window)
+    inside = QPointF(*first.view().placed(np.array([[0.2, 0.2]]))[0]).toPoint()
+    QTest.mouseMove(first.viewport(), inside)
+    application.processEvents()
+    said = window.model.probe.accessibleName().split("  |  ")
+    assert [words.split(" · ")[0] for words in said] == ["SED 2 kPa", "SED 3 kPa"]
+
+
+def test_the_plot_under_two_fingers_has_a_curve_of_each(application, window):
+    two_fingers(application, window)
+    plot = window.model.plot
+    plot.source.setCurrentIndex(0)
+    (_, own), (_, others) = plot.values
+    np.testing.assert_allclose(others, 1.5 * own)
+    assert plot._read(1.0) == "1.000 mm · A 2 kPa   1.000 mm · B 3 kPa"
+
+
+def test_a_stimulus_that_the_compared_session_lacks_has_a_sentence_in_place_of_a_finger(application, window):
+    row = chosen(window.state)
+    window.take(m.Answered(row.prediction, Finger(PARTS, frame(0.002), ARCS)))
+    gone = row.prediction.experiment, row.prediction.index
+    rest = tuple(p for p in example().predictions if (p.experiment, p.index) != gone)
+    window.take(m.Compared("other", replace(example(), session="later", predictions=rest)))
+    window.model.tabs.setCurrentIndex(0)
+    application.processEvents()
+    assert window.model.other.accessibleName() == "B  later has no answer to this stimulus."
