@@ -1,8 +1,9 @@
 """What the analyst's window asks of the work, and what the work says."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Literal
+
+from msgspec import Struct, field
 
 from daq_app.analyst.frame import Film, Finger
 from daq_app.analyst.raw import RawReadings
@@ -17,8 +18,7 @@ Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a pre
 # ---- what the work says
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(Struct, frozen=True):
     """Work goes on."""
 
     part: float  # of all of it, 0 to 1
@@ -27,16 +27,14 @@ class Step:
     load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
 
 
-@dataclass(frozen=True, slots=True)
-class History:
+class History(Struct, frozen=True):
     """The decisions that can be undone, the last one first, and those that can be redone, the first one first."""
 
     done: tuple[str, ...] = ()  # each in words
     undone: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(Struct, frozen=True):
     """What is known of the session now: its strokes alone, or the model's answers too."""
 
     stage: Literal["analysed", "predicted"]
@@ -44,16 +42,14 @@ class Found:
     history: History = History()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Answered:
+class Answered(Struct, frozen=True, eq=False):
     """The model's answer to one trial."""
 
     finding: PredictionFinding
     finger: Finger | None  # None where there is no answer
 
 
-@dataclass(frozen=True, slots=True)
-class Drawn:
+class Drawn(Struct, frozen=True):
     """A picture of the session; `png` is empty where there are no numbers for it."""
 
     name: str
@@ -61,8 +57,7 @@ class Drawn:
     png: bytes
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Filmed:
+class Filmed(Struct, frozen=True, eq=False):
     """The history of one trial's finger."""
 
     key: Key
@@ -70,16 +65,14 @@ class Filmed:
     why: str = ""  # why it ends before a settled state; "" where it has one
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Read:
+class Read(Struct, frozen=True, eq=False):
     """The readings around one stroke, as they were recorded."""
 
     stroke: int  # its number
     readings: RawReadings
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Compared:
+class Compared(Struct, frozen=True, eq=False):
     """Another session, analysed and predicted alike."""
 
     folder: str
@@ -87,49 +80,42 @@ class Compared:
     fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])  # the settled ones
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(Struct, frozen=True):
     """A report, an export or a picture is whole."""
 
     path: str
 
 
-@dataclass(frozen=True, slots=True)
-class Decided:
+class Decided(Struct, frozen=True):
     """A decision is recorded, undone or redone, and every number follows."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(Struct, frozen=True):
     """Something could not be done; what was known before stays."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class Cancelled:
+class Cancelled(Struct, frozen=True):
     """Somebody stopped the work; what was done before stays."""
 
 
-@dataclass(frozen=True, slots=True)
-class Idle:
+class Idle(Struct, frozen=True):
     """All that was asked for is done."""
 
 
 # ---- what the window asks
 
 
-@dataclass(frozen=True, slots=True)
-class Choose:
+class Choose(Struct, frozen=True):
     """Somebody chose a trial, or a stroke of a recording without trials."""
 
     row: int
 
 
-@dataclass(frozen=True, slots=True)
-class Move:
+class Move(Struct, frozen=True):
     """Somebody moved an edge of a stroke's windows."""
 
     stroke: int  # its number
@@ -139,64 +125,55 @@ class Move:
     why: str
 
 
-@dataclass(frozen=True, slots=True)
-class Undo:
+class Undo(Struct, frozen=True):
     """The last decision is taken back, or with `again` the last taking back."""
 
     by: str
     again: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Respond:
+class Respond(Struct, frozen=True):
     """Another quantity at the ending is held against the scores."""
 
     response: str  # one of `solver.quantities`
 
 
-@dataclass(frozen=True, slots=True)
-class Draw:
+class Draw(Struct, frozen=True):
     """Asks for a picture of the session."""
 
     name: str
 
 
-@dataclass(frozen=True, slots=True)
-class ShowHistory:
+class ShowHistory(Struct, frozen=True):
     """Asks for the way of one trial's finger."""
 
     key: Key
 
 
-@dataclass(frozen=True, slots=True)
-class ShowReadings:
+class ShowReadings(Struct, frozen=True):
     """Asks for the readings around one stroke."""
 
     stroke: int  # its number
 
 
-@dataclass(frozen=True, slots=True)
-class Compare:
+class Compare(Struct, frozen=True):
     """Asks for another session beside this one."""
 
     folder: str
 
 
-@dataclass(frozen=True, slots=True)
-class Write:
+class Write(Struct, frozen=True):
     """Asks for a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" of what `pictures` names."""
 
     what: str
     path: str
 
 
-@dataclass(frozen=True, slots=True)
-class GoOn:
+class GoOn(Struct, frozen=True):
     """What was stopped goes on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(Struct, frozen=True):
     """Whatever is being done is stopped."""
 
 

@@ -6,10 +6,11 @@ recorder sends every command of `sessions.run.steps` (what they are asked for), 
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from msgspec import Struct, field
 from numpy.typing import NDArray
 
 from drivers.loads import Level
@@ -26,27 +27,23 @@ Kind = Literal["people", "simulated hand", "simulated people"]
 # ---- to the recorder
 
 
-@dataclass(frozen=True, slots=True)
-class Connect:
+class Connect(Struct, frozen=True):
     """Open the transducer at this address and show what it measures; one that was open before is closed."""
 
     uri: str
 
 
-@dataclass(frozen=True, slots=True)
-class Disconnect:
+class Disconnect(Struct, frozen=True):
     """Close the transducer."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tare:
+class Tare(Struct, frozen=True):
     """Measure the zero of the bench with nothing touching, for what is shown live. Not during a session."""
 
     duration: float = 1.0  # [s, device time]
 
 
-@dataclass(frozen=True, slots=True)
-class AcknowledgeOverloads:
+class AcknowledgeOverloads(Struct, frozen=True):
     """Somebody has seen the overloads: forget the greatest loads."""
 
 
@@ -62,8 +59,7 @@ class People:
     planted: tuple[tuple[str, int, float], ...] = ()  # descriptor, index and friction of simulated surfaces [-]
 
 
-@dataclass(frozen=True, slots=True)
-class StartSession:
+class StartSession(Struct, frozen=True):
     """Begin a session in `folder`, which is made or is empty; with forces the transducer that is open records it."""
 
     plan: SessionPlan
@@ -73,8 +69,7 @@ class StartSession:
     any_folder: bool = False  # also on a network drive or in a synchronised folder; this is recorded
 
 
-@dataclass(frozen=True, slots=True)
-class ResumeSession:
+class ResumeSession(Struct, frozen=True):
     """Go on with the session in `folder`, that was cut short: at the same trial, with the people it began with."""
 
     folder: str
@@ -82,13 +77,11 @@ class ResumeSession:
     people: People | None = None  # None: those it began with
 
 
-@dataclass(frozen=True, slots=True)
-class Stop:
+class Stop(Struct, frozen=True):
     """End at once what is being done, session included, with a written end."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shutdown:
+class Shutdown(Struct, frozen=True):
     """End the session, if one runs, then the process."""
 
 
@@ -99,21 +92,18 @@ Request = (
 # ---- from the recorder
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Device:
+class Device(Struct, frozen=True, eq=False):
     """The transducer is open."""
 
     info: TransducerInfo
     frame: Frame | None  # how its axes lie to the face, where a simulated or recorded bench knows; else None
 
 
-@dataclass(frozen=True, slots=True)
-class NoDevice:
+class NoDevice(Struct, frozen=True):
     """No transducer is open now."""
 
 
-@dataclass(frozen=True, slots=True)
-class HealthReport:
+class HealthReport(Struct, frozen=True):
     """Four times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
 
     health: Health  # totals since the stream began
@@ -128,8 +118,7 @@ class HealthReport:
     level: Level = "fine"  # of the peaks: latched until acknowledged
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Live:
+class Live(Struct, frozen=True, eq=False):
     """What was measured since the last such message, every reading of it; at most 60 a second."""
 
     stream: int  # grows where time and sequence begin anew
@@ -142,8 +131,7 @@ class Live:
     left_out: int = 0  # readings before these that were not sent, because the client did not fetch them
 
 
-@dataclass(frozen=True, slots=True)
-class Tared:
+class Tared(Struct, frozen=True):
     """The zero of the bench was measured, and is subtracted from what is shown live from now on."""
 
     mean: Six  # raw units
@@ -153,8 +141,7 @@ class Tared:
     duration: float  # [s]
 
 
-@dataclass(frozen=True, slots=True)
-class SessionBegun:
+class SessionBegun(Struct, frozen=True):
     """A session is being recorded."""
 
     folder: str
@@ -168,8 +155,7 @@ class SessionBegun:
     events: tuple[LoggedEvent, ...] = ()  # all that was recorded before, of a session that goes on
 
 
-@dataclass(frozen=True, slots=True)
-class SessionEnded:
+class SessionEnded(Struct, frozen=True):
     """A session has its written end; what was recorded is safe."""
 
     folder: str
@@ -177,22 +163,19 @@ class SessionEnded:
     resumable: bool  # it can go on, and is not sealed by itself
 
 
-@dataclass(frozen=True, slots=True)
-class Sealing:
+class Sealing(Struct, frozen=True):
     """The sealed copy of a session is being made; the live file is whole already. The recorder is silent meanwhile."""
 
     folder: str
 
 
-@dataclass(frozen=True, slots=True)
-class Sealed:
+class Sealed(Struct, frozen=True):
     """A session was sealed."""
 
     folder: str
 
 
-@dataclass(frozen=True, slots=True)
-class Failed:
+class Failed(Struct, frozen=True):
     """A request could not be met; nothing else has changed."""
 
     request: str  # its name
@@ -200,23 +183,20 @@ class Failed:
     kind: str = ""  # name of the exception, for an exit code
 
 
-@dataclass(frozen=True, slots=True)
-class LinkDown:
+class LinkDown(Struct, frozen=True):
     """The transducer no longer answers. It is tried again every second."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LinkBack:
+class LinkBack(Struct, frozen=True, eq=False):
     """The transducer answers again."""
 
     info: TransducerInfo
     same: bool  # it is the one that was open before, set and calibrated alike
 
 
-@dataclass(frozen=True, slots=True)
-class Gone:
+class Gone(Struct, frozen=True):
     """The recorder's process has ended; said by the client itself, once, as the last message."""
 
     requested: bool  # by us

@@ -5,7 +5,8 @@ import signal
 import threading
 import time
 from collections import deque
-from dataclasses import replace
+
+from msgspec import structs
 
 from daq_app.recorder.messages import REPORTS, REQUESTS, Failed, HealthReport, Live, Report, Request, Shutdown, Stop
 from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
@@ -99,7 +100,7 @@ class Outbox:
                     return
                 self._live += 1
             if isinstance(report, Live) and self._left_out:
-                report = replace(report, left_out=self._left_out)
+                report = structs.replace(report, left_out=self._left_out)
                 self._left_out = 0
             self._waiting.append(report)
             self._idle.clear()

@@ -1,6 +1,6 @@
 """What the window tells its own state, beside what goes to and comes from the recorder."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
@@ -9,42 +9,36 @@ from daq_app.window.stroke_quality import Quality
 from drivers.catalog import Probe
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
+class Tick(Struct, frozen=True):
     """Time has passed."""
 
     now: float  # [s] of the machine's monotonic clock
 
 
-@dataclass(frozen=True, slots=True)
-class Searching:
+class Searching(Struct, frozen=True):
     """Devices are being looked for."""
 
 
-@dataclass(frozen=True, slots=True)
-class DevicesFound:
+class DevicesFound(Struct, frozen=True):
     """What answered when devices were looked for."""
 
     found: tuple[Probe, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Loaded:
+class Loaded(Struct, frozen=True):
     """How far the readings that have just come load the transducer."""
 
     load: Load
 
 
-@dataclass(frozen=True, slots=True)
-class LifeKnown:
+class LifeKnown(Struct, frozen=True):
     """What a serial number has been through was looked up."""
 
     serial: str
     life: Life | None
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
+class Judged(Struct, frozen=True):
     """The last stroke was looked at."""
 
     trial: int
@@ -52,25 +46,21 @@ class Judged:
     quality: Quality
 
 
-@dataclass(frozen=True, slots=True)
-class Dismissed:
+class Dismissed(Struct, frozen=True):
     """The experimenter has read the sentence of a failure."""
 
 
-@dataclass(frozen=True, slots=True)
-class NewSession:
+class NewSession(Struct, frozen=True):
     """The experimenter leaves a session that has ended, for the page where the next is begun."""
 
 
-@dataclass(frozen=True, slots=True)
-class DrawingFailed:
+class DrawingFailed(Struct, frozen=True):
     """A picture could not be drawn; the recording is not touched by it."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class LanguageChosen:
+class LanguageChosen(Struct, frozen=True):
     """The language that the next session's subject reads was chosen."""
 
     language: str

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, cast, get_args
 
 import msgspec
@@ -44,7 +43,7 @@ def kind_of(event: Event) -> str:
 
 def data_of(event: Event) -> dict[str, Any]:
     """Return what an event holds as JSON can: numbers that are none become texts such as "nan"."""
-    return cast("dict[str, Any]", _plain(asdict(event)))
+    return cast("dict[str, Any]", _plain(msgspec.structs.asdict(event)))
 
 
 def event_of(logged: LoggedEvent) -> Event | None:

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from msgspec import structs
+
 from sessions.plan.plan import SessionPlan
 from sessions.run import steps
 from sessions.run.answers import AnswerEvent, problem
@@ -173,7 +175,7 @@ def _again(state: State, event: steps.Redo | steps.UndoRedo) -> Step:
     after, commands = _repeated(state, event.reason)
     between_takes = isinstance(state, Scoring | Settling | Mounting | Resting | Closing)
     if between_takes and after != state and isinstance(after, Mounting | Taring | Ready):
-        after = replace(after, place=replace(after.place, before_redo=state))
+        after = structs.replace(after, place=replace(after.place, before_redo=state))
     return after, commands
 
 
@@ -213,7 +215,7 @@ def _redo_undone(state: State) -> Step:
         else:
             restored.append(steps.LeaveOut(number, UNDONE))
         then = replace(then.at(index).with_progress(replace(was, takes=takes)), index=then.index)
-    after, commands = _gone_back(replace(before, place=then))
+    after, commands = _gone_back(structs.replace(before, place=then))
     return after, (*_discarding(state, UNDONE), *restored, *commands)
 
 

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+from msgspec import Struct
+
 from sessions.plan.adaptive import with_comparison
 from sessions.plan.plan import Block, Choice, SessionPlan, Stimulus, Trial
 
@@ -92,84 +94,62 @@ class Place:
         return replace(self, progress=(*self.progress[: self.index], progress, *self.progress[self.index + 1 :]))
 
 
-@dataclass(frozen=True, slots=True)
-class Idle:
+class _State(Struct, frozen=True):
+    """A state of a session that has not ended."""
+
+    place: Place
+
+
+class Idle(_State, frozen=True):
     """All is set up; the session has not begun."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Mounting:
+class Mounting(_State, frozen=True):
     """The experimenter puts the trial's stimulus on; no take is open."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Taring:
+class Taring(_State, frozen=True):
     """A take has begun; the zero is measured with nothing touching."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Ready:
+class Ready(_State, frozen=True):
     """The subject may stroke."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Stroking:
+class Stroking(_State, frozen=True):
     """The finger touches."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Scoring:
+class Scoring(_State, frozen=True):
     """The stroke is done and the subject judges."""
 
-    place: Place
     touching: bool = False  # True during a further stroke
     strokes: int = 1  # begun in this take
     settled: bool = False  # the finger has been off long enough for the take to end
 
 
-@dataclass(frozen=True, slots=True)
-class Settling:
+class Settling(_State, frozen=True):
     """All of the trial is done; the take runs on until the finger has been off for a moment."""
 
-    place: Place
     touching: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Resting:
+class Resting(_State, frozen=True):
     """A rest that the plan asks for, before the trial in hand; no take is open."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Paused:
+class Paused(_State, frozen=True):
     """Nothing is asked of anybody. No take is open, but for one whose stroke is done and waits for its answer."""
 
-    place: Place
     scoring: bool
     strokes: int = 1  # begun in the take that waits
 
 
-@dataclass(frozen=True, slots=True)
-class Closing:
+class Closing(_State, frozen=True):
     """Every trial is done; the last can still be repeated."""
 
-    place: Place
 
-
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(Struct, frozen=True):
     """The session is over."""
 
     reason: str

@@ -1,26 +1,23 @@
 """What may happen in the course of a session, and what is to be done: events and commands. All of it is data."""
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from sessions.plan.plan import Block, Choice, Hand, Trial
 
 # ---- what may happen
 
 
-@dataclass(frozen=True, slots=True)
-class Begin:
+class Begin(Struct, frozen=True):
     """The experimenter begins the session."""
 
 
-@dataclass(frozen=True, slots=True)
-class StimulusMounted:
+class StimulusMounted(Struct, frozen=True):
     """The experimenter has put a stimulus on."""
 
     code: str  # as read off its back
 
 
-@dataclass(frozen=True, slots=True)
-class Zeroed:
+class Zeroed(Struct, frozen=True):
     """An unloaded stretch of readings was measured. The readings themselves are never altered."""
 
     mean: tuple[float, ...] = ()  # (6,) raw units
@@ -33,36 +30,32 @@ class Zeroed:
     noise: float = 0.0  # standard deviation of N [N]
 
 
-@dataclass(frozen=True, slots=True)
-class ContactOnset:
+class _Detected(Struct, frozen=True):
+    """The live detector saw something in the readings."""
+
+    time: float = 0.0  # [s, device time]
+    noticed: float = 0.0  # reading at which it was certain [s, device time]
+
+
+class ContactOnset(_Detected, frozen=True):
     """The live detector saw the finger touch."""
 
-    time: float = 0.0  # [s, device time]
-    noticed: float = 0.0  # reading at which it was certain [s, device time]
 
-
-@dataclass(frozen=True, slots=True)
-class FingerLifted:
+class FingerLifted(_Detected, frozen=True):
     """The live detector saw the finger leave."""
 
-    time: float = 0.0  # [s, device time]
-    noticed: float = 0.0  # reading at which it was certain [s, device time]
 
-
-@dataclass(frozen=True, slots=True)
-class Settled:
+class Settled(Struct, frozen=True):
     """The finger has been off for a moment since the last lift, so that the take may end."""
 
     time: float = 0.0  # of the reading at which it had [s, device time]
 
 
-@dataclass(frozen=True, slots=True)
-class StrokeDone:
+class StrokeDone(Struct, frozen=True):
     """The experimenter says that the stroke is done, in a visit without a transducer."""
 
 
-@dataclass(frozen=True, slots=True)
-class Scored:
+class Scored(Struct, frozen=True):
     """The subject has judged on the line. What an input device cannot tell is empty or None."""
 
     score: float | None  # 0 to 100; None: the subject gave no answer
@@ -73,8 +66,7 @@ class Scored:
     input_device: str | None = None  # such as a pen, a finger on the screen
 
 
-@dataclass(frozen=True, slots=True)
-class MagnitudeEstimate:
+class MagnitudeEstimate(Struct, frozen=True):
     """The subject has given a number on a scale of its own (free modulus)."""
 
     number: float | None  # above 0; None: the subject gave no answer
@@ -84,8 +76,7 @@ class MagnitudeEstimate:
     input_device: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class PairedChoice:
+class PairedChoice(Struct, frozen=True):
     """The subject has said which of two stimuli has more of what is asked."""
 
     choice: Choice | None  # None: the subject gave no answer
@@ -95,15 +86,13 @@ class PairedChoice:
     input_device: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(Struct, frozen=True):
     """The experimenter writes something down; nothing else changes."""
 
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Redo:
+class Redo(Struct, frozen=True):
     """The trial in hand is to be done again; just before a trial begins, the one before it.
 
     Of two stimuli that are compared both are presented again.
@@ -112,42 +101,35 @@ class Redo:
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class UndoRedo:
+class UndoRedo(Struct, frozen=True):
     """The last redo was a mistake: what it discarded counts again. Meant until the next stroke."""
 
 
-@dataclass(frozen=True, slots=True)
-class Skip:
+class Skip(Struct, frozen=True):
     """The trial in hand is to be left out, and with the first of two that are compared also the second."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Pause:
+class Pause(Struct, frozen=True):
     """Everybody rests."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(Struct, frozen=True):
     """The experimenter goes on, after a pause or a rest."""
 
 
-@dataclass(frozen=True, slots=True)
-class RestOver:
+class RestOver(Struct, frozen=True):
     """The time of a rest is up."""
 
 
-@dataclass(frozen=True, slots=True)
-class Abort:
+class Abort(Struct, frozen=True):
     """The session ends now."""
 
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Finish:
+class Finish(Struct, frozen=True):
     """The experimenter ends a session whose trials are all done."""
 
 
@@ -176,48 +158,45 @@ Event = (
 # ---- what is to be done
 
 
-@dataclass(frozen=True, slots=True)
-class AskBegin:
+class AskBegin(Struct, frozen=True):
     """Wait for the experimenter to begin."""
 
 
-@dataclass(frozen=True, slots=True)
-class ShowInstruction:
+class ShowInstruction(Struct, frozen=True):
     """Read the block's instruction to the subject."""
 
     block: Block
 
 
-@dataclass(frozen=True, slots=True)
-class AskMount:
+class AskMount(Struct, frozen=True):
     """Have the experimenter put the trial's stimulus on."""
 
     trial: Trial
 
 
-@dataclass(frozen=True, slots=True)
-class StartTake:
-    """From here on readings belong to this take."""
+class _TakeCommand(Struct, frozen=True):
+    """Something is to be done about a take."""
 
     trial: int
     take: int
 
 
-@dataclass(frozen=True, slots=True)
-class MeasureZero:
+class StartTake(_TakeCommand, frozen=True):
+    """From here on readings belong to this take."""
+
+
+class MeasureZero(Struct, frozen=True):
     """Measure an unloaded stretch; nobody may touch."""
 
 
-@dataclass(frozen=True, slots=True)
-class AskStroke:
+class AskStroke(Struct, frozen=True):
     """Have the subject stroke."""
 
     trial: Trial
     allowed: int = 1  # strokes; every further one is flagged
 
 
-@dataclass(frozen=True, slots=True)
-class AskScore:
+class AskScore(Struct, frozen=True):
     """Have the subject judge on the line from 0 to 100; answered by Scored."""
 
     trial: Trial
@@ -226,16 +205,14 @@ class AskScore:
     question: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class AskNumber:
+class AskNumber(Struct, frozen=True):
     """Have the subject give a number on a scale of its own; answered by MagnitudeEstimate."""
 
     trial: Trial
     question: str
 
 
-@dataclass(frozen=True, slots=True)
-class AskChoice:
+class AskChoice(Struct, frozen=True):
     """Have the subject say which of two; answered by PairedChoice."""
 
     first: Trial
@@ -243,67 +220,50 @@ class AskChoice:
     question: str
 
 
-@dataclass(frozen=True, slots=True)
-class AskRest:
+class AskRest(Struct, frozen=True):
     """Let the subject rest; Resume goes on at any time."""
 
     duration: float | None  # [s], after which it goes on by itself; None: until the experimenter goes on
 
 
-@dataclass(frozen=True, slots=True)
-class KeepTake:
+class KeepTake(_TakeCommand, frozen=True):
     """The take is over and counts."""
 
-    trial: int
-    take: int
 
-
-@dataclass(frozen=True, slots=True)
-class DiscardTake:
+class DiscardTake(_TakeCommand, frozen=True):
     """The take does not count; its readings stay."""
 
-    trial: int
-    take: int
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class RestoreTake:
+class RestoreTake(_TakeCommand, frozen=True):
     """A take that a redo discarded is in hand again; its readings end where they ended."""
 
-    trial: int
-    take: int
 
-
-@dataclass(frozen=True, slots=True)
-class LeaveOut:
+class LeaveOut(Struct, frozen=True):
     """A trial is left out together with the one before it, or again after a redo was undone."""
 
     trial: int
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class AskFinish:
+class AskFinish(Struct, frozen=True):
     """Wait for the experimenter to end the session, or to have the last trial repeated."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tell:
+class Tell(Struct, frozen=True):
     """Say something that needs no answer."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class Refuse:
+class Refuse(Struct, frozen=True):
     """The event is not meant now; nothing has changed."""
 
     sentence: str
 
 
-@dataclass(frozen=True, slots=True)
-class EndSession:
+class EndSession(Struct, frozen=True):
     """Stop recording."""
 
     reason: str

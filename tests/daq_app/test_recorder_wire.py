@@ -3,6 +3,7 @@ import math
 import os
 from dataclasses import fields, is_dataclass
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -55,8 +56,9 @@ TOLD = [
 def same(a, b):
     if isinstance(a, np.ndarray):
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
-    if is_dataclass(a):
-        return type(a) is type(b) and all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if is_dataclass(a) or isinstance(a, msgspec.Struct):
+        names = [field.name for field in (fields(a) if is_dataclass(a) else msgspec.structs.fields(a))]
+        return type(a) is type(b) and all(same(getattr(a, name), getattr(b, name)) for name in names)
     if isinstance(a, tuple):
         return len(a) == len(b) and all(itertools.starmap(same, zip(a, b, strict=True)))
     return a == b or (isinstance(a, float) and math.isnan(a) and math.isnan(b))

@@ -4,6 +4,7 @@ import random
 from datetime import UTC, datetime
 from functools import partial
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from killed_process import forked, kill, lines_of, reported, whole_session
@@ -35,7 +36,7 @@ def logged(walk):
             lines.append(("refused", None, {"event": kind_of(event), "sentence": ""}))
             continue
         trial = None if not hasattr(before, "place") else before.place.trial.number
-        lines.append((kind_of(event), trial, dataclasses.asdict(event)))
+        lines.append((kind_of(event), trial, msgspec.structs.asdict(event)))
         lines += [line for line in map(line_of, commands) if line is not None]
     return plan, [LoggedEvent(i, i, kind, trial, 0, data) for i, (kind, trial, data) in enumerate(lines, 1)]
 

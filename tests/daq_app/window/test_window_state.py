@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from msgspec import structs
 from session_messages import (
     BAD,
     BEGUN,
@@ -323,7 +324,7 @@ def test_the_subject_gets_the_line_with_its_ends_when_it_is_time_to_score():
 def test_the_subject_sees_how_hard_it_presses_only_where_the_protocol_says_so():
     assert not derive_view(after(*READY)).subject.force
     plan = replace(PLAN, shown=Shown(subject=("instruction", "forces")))
-    told = [replace(said, plan=plan) if isinstance(said, m.SessionBegun) else said for said in READY]
+    told = [structs.replace(said, plan=plan) if isinstance(said, m.SessionBegun) else said for said in READY]
     assert derive_view(after(*told)).subject.force
 
 
