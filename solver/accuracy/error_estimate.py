@@ -130,14 +130,15 @@ def edge_changes(
     equilibrium.
     """
     moved = [_with_moved_edges(newton, state, given) for state, given in states]
-    known = [one for ones in moved for one in ones if one is not None]
+    known = [one for edges in moved for sides in edges for one in sides if one is not None]
     values = numbers([*(state for state, _ in states), *known])
     here, there = values[: len(states)], iter(values[len(states) :])
     out = np.zeros_like(here)
-    for number, ones in enumerate(moved):
-        changes = [np.full_like(here[0], np.inf) if one is None else np.abs(next(there) - here[number]) for one in ones]
-        worst = np.max(np.reshape(changes, (len(ones) // 2, 2, -1)), axis=1) if ones else np.zeros((1, 1))
-        out[number] = np.sqrt(np.sum(worst**2, axis=0))
+    for number, edges in enumerate(moved):
+        for sides in edges:
+            changes = [np.inf if one is None else np.abs(next(there) - here[number]) for one in sides]
+            out[number] += np.max(np.broadcast_arrays(*changes), axis=0) ** 2
+    np.sqrt(out, out=out)
     return here, out
 
 
@@ -153,15 +154,26 @@ def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> Nested
     return NestedNumbers(numbers, changes[:COUNT], values[COUNT:], changes[COUNT:])
 
 
-def _with_moved_edges(newton: Newton, state: EquilibriumState, given: Given | None) -> list[EquilibriumState | None]:
-    """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge after edge."""
+def _with_moved_edges(
+    newton: Newton, state: EquilibriumState, given: Given | None
+) -> list[list[EquilibriumState | None]]:
+    """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge by edge.
+
+    The only node that touches stays: without it there is no contact, and no edge.
+    """
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
-    pairs = [pair for edge in edges for pair in ((edge, edge + 1), (edge + 1, edge))]
     kept = newton.condensed.found is state.u  # the tangent of the last iteration is there still
     linearise = newton.relinearise if kept else newton.linearise
-    found = linearise(state, state.load, x, 0, given)
-    return [_moved(newton, state, given, x, *pair) if found else None for pair in pairs]
+    solvable, alone = linearise(state, state.load, x, 0, given), np.count_nonzero(state.touching) == 1
+    return [
+        [
+            _moved(newton, state, given, x, *pair) if solvable else None
+            for pair in ((edge, edge + 1), (edge + 1, edge))
+            if not (alone and state.touching[pair[0]])
+        ]
+        for edge in edges
+    ]
 
 
 def _moved(

@@ -9,6 +9,7 @@ from solver import Finger, Friction, Loading, Material, Materials, Receptor, Sce
 from solver.accuracy.error_estimate import errors
 from solver.prediction import COUNT, NestedNumbers
 from solver.scene.published import STICKINESS, scene
+from solver.verification.fine_meshes import fine_numbers
 from tests.solver.drawn_scenes import DRAWN, HELD_OUT
 
 
@@ -170,3 +171,13 @@ def test_estimates_lie_above_the_errors_of_scenes_that_nothing_was_chosen_on_and
         if kind == kinematics:
             close += closeness(drawn(*numbers, Solve(kind)), truth)
     assert np.mean(close) >= 0.75
+
+
+def test_skin_so_stiff_that_one_node_touches_is_estimated_by_contact_that_grows_not_by_contact_lost():
+    skin = Materials(Material(640.0, 0.48), Material(4.0, 0.48), Material(0.034, 0.48))
+    scene = Scene(materials=skin, friction=Friction(0.3), loading=Loading(0.6, "+x"))
+    found = solve(scene)
+    assert sum(state != "open" for state in found.skin.state) == 1
+    truth = fine_numbers([scene])[:, 0, 0]
+    off = abs(found.sed_ending / truth.mean() - 1.0)
+    assert off <= found.error_estimate < 10.0 * max(off, 2e-4)
