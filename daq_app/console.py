@@ -217,12 +217,15 @@ def table(rows: list[list[str]], *, head: list[str]) -> str:
 def number(value: float | None, digits: int = 3, *, factor: float = 1.0) -> str:
     """Return a number times a factor with so many significant digits, and a dash where there is none.
 
-    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3)
-    ('0.00526', '–', '12.0')
+    Of numbers below a million all digits before the point are there.
+
+    >>> number(0.0052573, 3), number(None), number(0.012, factor=1e3), number(1423.4, 2)
+    ('0.00526', '–', '12.0', '1,423')
     """
     if value is None:
         return "–"
-    return f"{factor * value:#.{digits}g}".rstrip(".")
+    value *= factor
+    return f"{value:,.0f}" if 10.0**digits <= abs(value) < 1e6 else f"{value:#.{digits}g}".rstrip(".")
 
 
 def span(low: float, high: float, digits: int = 3) -> str:

@@ -148,6 +148,15 @@ class Prediction:
         return plain
 
 
+def percent(part: float) -> str:
+    """Return a part in per cent for people, two digits or all before the point.
+
+    >>> percent(0.00432), percent(1.42)
+    ('0.43 %', '142 %')
+    """
+    return f"{100.0 * part:.2g} %" if abs(part) < 1.0 else f"{100.0 * part:.0f} %"
+
+
 def _response(found: Response) -> dict[str, float | None]:
     value, error = _plain(np.array(found))
     return {"value": value, "error": error}

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from daq_app.console import number
+from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate
 from solver.verification.hard_cases import HardCase
@@ -73,7 +74,7 @@ def targets(measured: Measured) -> Table:
     cells = [
         (
             row.work, row.at_error, _limit(row.reach, row.unit), _limit(row.aim, row.unit),
-            "–" if row.measured is None else f"{short(row.measured)} {row.unit}",
+            "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
             "–" if row.floors is None else number(row.floors, 2), row.verdict, row.how,
         )
         for row in rows
@@ -217,7 +218,7 @@ def orders(measured: Measured) -> Table:
     cells = [
         (
             row.problem, row.quantity, row.kinematics, " / ".join(f"{error:.1e}" for error in row.errors),
-            " / ".join(short(1e3 * took) for took in row.took_s), f"{row.order:.2f}", f"{row.least:g}",
+            " / ".join(number(1e3 * took) for took in row.took_s), f"{row.order:.2f}", f"{row.least:g}",
         )
         for row in rows
     ]  # fmt: skip
@@ -258,22 +259,8 @@ def _hard(measured: Measured, kinematics: str) -> Table:
     return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), tuple(cells))
 
 
-def percent(part: float) -> str:
-    """Return a part in percent, two digits."""
-    return f"{100 * part:.2g} %"
-
-
 def _ms(seconds: float | None) -> str:
-    return "–" if seconds is None else short(1e3 * seconds)
-
-
-def short(value: float) -> str:
-    """Return a number with three digits, or all before the point where there are more.
-
-    >>> short(0.0123), short(5423.4)
-    ('0.0123', '5,423')
-    """
-    return number(value) if value < 1000.0 else f"{value:,.0f}"
+    return "–" if seconds is None else number(1e3 * seconds)
 
 
 def _limit(value: float | None, unit: str) -> str:

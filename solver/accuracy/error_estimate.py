@@ -27,7 +27,7 @@ from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
-from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response
+from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene.scene import Scene
 
@@ -291,7 +291,7 @@ def contrast_error(found: Sequence[Prediction]) -> ContrastError:
 
 
 def _in_a_sentence(name: str, share: float) -> str:
-    part = f"{100.0 * share:.2g} %" if share < 1.0 else "more than all"
+    part = percent(share) if share < 1.0 else "more than all"
     small = f"Differences in {name} from the surfaces solved with this one are small"
     return f"{small}, and may be off by {part} of their range."
 

@@ -18,7 +18,7 @@ from solver.constitutive.hyperelastic import HUMAN_SKIN
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, SolveFailure
-from solver.prediction import Prediction
+from solver.prediction import Prediction, percent
 from solver.scene.scene import Scene
 from solver.scene.tables import Material, Materials, Solve
 
@@ -108,7 +108,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
         if change is not None and change > WORTH_TELLING:
-            found.append(f"Leaving out {name} may have changed the ending's SED by {100 * change:.2g} %: {cure}.")
+            found.append(f"Leaving out {name} may have changed the ending's SED by {percent(change)}: {cure}.")
     return tuple(found)
 
 
@@ -119,7 +119,7 @@ def _of_strain(entry: Mapping[str, Any]) -> list[str]:
     if "with_MPa" in numbers:
         if change is None or change <= WORTH_TELLING:
             return []
-        return [f"At finite strain the ending's SED differs by {100 * change:.2g} %: small strain is not meant for it."]
+        return [f"At finite strain the ending's SED differs by {percent(change)}: small strain is not meant for it."]
     if numbers["largest_strain"] <= LARGE_STRAIN:
         return []
     return [

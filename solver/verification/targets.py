@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from statistics import median
 
+from solver.prediction import percent
 from solver.verification.asked import Asked, Found
 from solver.verification.estimates import Guaranteed
 from solver.verification.growth import Growth, between, exponent
@@ -72,8 +73,8 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
     yield from map(_guaranteed, found.of(Guaranteed))
     for row in found.of(Memory):
         yield Target(
-            f"memory of a solve, {row.kinematics} strain, above idle", _percent(row.tolerance), "MB", 100.0, None,
-            row.solve_mb, None, f"{row.dofs} unknowns, estimate {_percent(row.error_estimate)}",
+            f"memory of a solve, {row.kinematics} strain, above idle", percent(row.tolerance), "MB", 100.0, None,
+            row.solve_mb, None, f"{row.dofs} unknowns, estimate {percent(row.error_estimate)}",
         )  # fmt: skip
     for kinematics in ("small", "finite"):
         rows = [row for row in found.of(Growth) if row.kinematics == kinematics]
@@ -99,22 +100,22 @@ def _at_error(
     good = [(took, r) for off, took, r in known if off <= error]
     if not good:
         least = min((r.judged_error for r in rows if r.judged_error is not None), default=None)
-        how = "" if least is None else f"no mesh that was tried is below: the best is at {_percent(least)}"
+        how = "" if least is None else f"no mesh that was tried is below: the best is at {percent(least)}"
         tried = len(rows) >= len(meshes[kinematics])
-        return Target(work, _percent(error), "ms", reach, aim, None, None, how, tried)
+        return Target(work, percent(error), "ms", reach, aim, None, None, how, tried)
     took, best = min(good, key=lambda pair: pair[0])
-    how = f"{best.dofs} unknowns, error {_percent(best.judged_error or 0.0)}"
+    how = f"{best.dofs} unknowns, error {percent(best.judged_error or 0.0)}"
     part = f"{best.surfaces} of them" if kinematics == "small" and best.surfaces < len(cases("small")) else ""
-    return Target(work, _percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
+    return Target(work, percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
 
 
 def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:
     rows = [row for row in found.of(Warm) if row.kinematics == kinematics]
-    at = f"{_percent(PEAK)} of peak"
+    at = f"{percent(PEAK)} of peak"
     if not rows:
         return Target(work, at, "ms", reach, aim, None, None, "")
     worst = max(row.worst_error for row in rows)
-    how = f"error {_percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
+    how = f"error {percent(worst)} of peak, median {1e3 * median(r.median_s for r in rows):.3g} ms"
     slowest = 1e3 * max(row.p99_s for row in rows)
     part = _part(len(rows), len(SURFACES), "surfaces")
     return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
@@ -142,10 +143,10 @@ def _cold(found: Found) -> Target:
 
 
 def _guaranteed(row: Guaranteed) -> Target:
-    error = "" if row.worst_error is None else f", true error {_percent(row.worst_error)}"
-    how = f"{row.dofs} unknowns, estimate {_percent(row.worst_estimate)}{error}"
+    error = "" if row.worst_error is None else f", true error {percent(row.worst_error)}"
+    how = f"{row.dofs} unknowns, estimate {percent(row.worst_estimate)}{error}"
     work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"
-    return Target(work, _percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
+    return Target(work, percent(row.tolerance), "ms", None, None, 1e3 * row.took_s, None, how)
 
 
 def _between(rows: list[Growth]) -> str:
@@ -155,7 +156,3 @@ def _between(rows: list[Growth]) -> str:
 
 def _part(measured: int, asked: int, what: str) -> str:
     return f"{measured} of {asked} {what}" if measured < asked else ""
-
-
-def _percent(part: float) -> str:
-    return f"{100 * part:.2g} %"

@@ -15,9 +15,10 @@ from solver.equilibrium.load_stepping import march
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.mesh.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
+from solver.prediction import percent
 from solver.scene.published import STICKINESS, scene
 from solver.verification.hard_cases.meshes import slabs, two_parts
-from solver.verification.hard_cases.outcome import Outcome, agree, percent, power
+from solver.verification.hard_cases.outcome import Outcome, agree, power
 from solver.verification.methods import Kinematics
 from solver.verification.published.bodies import distorted
 

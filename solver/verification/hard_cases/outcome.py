@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.failures import SolveFailure
-from solver.prediction import Prediction
+from solver.prediction import Prediction, percent
 from solver.response.solution import UNKNOWN, solve_many
 from solver.scene.scene import Scene
 
@@ -67,11 +67,6 @@ def agree(summary: str, numbers: Sequence[float], within: float) -> Outcome:
     spread = float(np.ptp(numbers)) / abs(numbers[0])
     flaw = "" if spread <= within else f"{len(numbers)} ways differ by {spread:.1g}"
     return Outcome(True, tuple(numbers), flaw, f"{summary}: {len(numbers)} ways agree to {power(spread)}")
-
-
-def percent(part: float) -> str:
-    """Return a part in percent, to two digits."""
-    return f"{100 * part:.2g} %"
 
 
 def power(value: float) -> str:
