@@ -13,8 +13,7 @@ from solver.quantities import FIELDS, SED
 Array = NDArray[np.float64]
 Range = tuple[float, float]
 FIELD_ERRORS = tr_noop(
-    "Fields in colours, under the pointer and in this plot: no estimate of the mesh's or the model's error. "
-    "The SED over the finger has both."
+    "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
 )
 
 NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")

@@ -3,7 +3,7 @@
 from daq_app.analyst import messages as m
 from daq_app.analyst.field_list import FieldChoice, Range, automatic_range
 from daq_app.analyst.frame import Finger, Frame
-from daq_app.analyst.shown import condition, sed_with_errors
+from daq_app.analyst.shown import greatest_errors, sed_words
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
@@ -52,7 +52,7 @@ def finger_words(state: AnalystState | None) -> str:
     finger = state.fingers.get(row.key)
     parts = [
         tr("Finger of {name}, settled", name=name),
-        f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
+        sed_words(state.report, said),
     ]
     if finger is not None:
         parts.append(_contact_words(finger.frame))
@@ -73,8 +73,7 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
     finger = None if found is None else other.fingers.get((found.trial, found.stroke))
     if found is None or found.sed is None or finger is None:
         return None, tr("{session} has no answer to this stimulus.", session=other.report.session)
-    sed = f"SED {condition(other.report, found)} {sed_with_errors(other.report, found)}"
-    return finger, " · ".join((other.report.session, sed, _contact_words(finger.frame)))
+    return finger, " · ".join((other.report.session, sed_words(other.report, found), _contact_words(finger.frame)))
 
 
 def _of_stimulus(report: Report, of: PredictionFinding) -> list[PredictionFinding]:
@@ -104,7 +103,7 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
     count = len(film.film.instants)
     return tr(
         "Step {at} of {count}, {time:.3f} s · {phase} · {depth:.2f} mm deep, {slid:.2f} mm slid · "
-        "SED {sed:.3f} kPa{errors} · {contact}",
+        "SED {sed:.3f} kPa at small strain{errors} · {contact}",
         at=at + 1,
         count=count,
         time=now.time,
@@ -115,6 +114,11 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
         errors=errors_words(None),  # a course is not solved again for each of its steps
         contact=_contact_words(frame),
     )
+
+
+def named_errors(report: Report) -> str:
+    """Return the name of a session, and the errors that hold for all of its SEDs."""
+    return " · ".join(filter(None, (report.session, greatest_errors(report))))
 
 
 def _contact_words(frame: Frame) -> str:

@@ -112,6 +112,11 @@ def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
     return f"{1000.0 * said.sed:.3f} kPa{errors_words(said.error_estimate, _effect(report))}"
 
 
+def sed_words(report: Report | None, said: PredictionFinding) -> str:
+    """Return a SED with its condition and errors."""
+    return f"SED {condition(report, said)} {sed_with_errors(report, said)}"
+
+
 def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     """Return the condition and the errors that hold for every trial of a session; "" where none was predicted.
 

@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import NAMES, compared
 from daq_app.analyst.edges import brought_back, decision_meant, decision_of, history, taken_back
+from daq_app.analyst.field_list import FIELD_ERRORS
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
+from daq_app.analyst.seen import film_words, named_errors
+from daq_app.analyst.shown import greatest_errors, sed_words
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
@@ -166,15 +169,15 @@ class Work:
         panel, png = self._panel(name)
         self._say(m.Drawn(name, "" if panel is None else panel.title, png))
 
-    def _panel(self, name: str) -> "tuple[Panel | None, bytes]":
-        """Return a picture and its PNG; `shown.session_pictures` tells those of the session."""
+    def _panel(self, name: str, note: str = "") -> "tuple[Panel | None, bytes]":
+        """Return a picture, its `note` under it, and its PNG; `shown.session_pictures` tells those of the session."""
         from sessions.report.figures import picture  # slow to load, and many never look at one
         from sessions.report.figures.finger import common_levels, finger_panels
         from sessions.report.figures.style import in_pixels, look
 
         what, _, of = name.partition(" ")
         report = self._report
-        with in_pixels() as pixels:
+        with in_pixels(note) as pixels:
             if what in ("finger", "contact"):
                 every = self._fields()
                 field = self._field(of, every)
@@ -190,6 +193,19 @@ class Work:
             else:
                 panel = picture(report, what, of or None)
         return panel, b"" if panel is None else pixels[panel.name]
+
+    def _note(self, name: str) -> str:
+        """Return what a picture that is written says under it: the condition and the errors of its SEDs."""
+        what, _, of = name.partition(" ")
+        if what in ("finger", "contact"):
+            stroke, _, step = of.partition(" ")
+            answers = (finding_of(row) for (_, number), (row, _) in self._ways.items() if number == int(stroke))
+            settled = (sed_words(self._report, said) for said in answers if said.sed is not None)
+            words = film_words(self._filmed, int(step)) if step else next(settled, "")
+            return f"{words}. {tr(FIELD_ERRORS)}"
+        if what == "compared":
+            return "\n".join(named_errors(one) for one in (self._report, self._other) if one is not None)
+        return greatest_errors(self._report) if what in ("relation", "response") else ""
 
     def _field(self, of: str, every: Mapping[int, Field]) -> Field | None:
         """Return the finger of a stroke, settled, or at a step of the history that was drawn last."""
@@ -305,14 +321,15 @@ class Work:
         from sessions.report.html import panel_csv, swap_in
 
         self._say(m.Step(0.0, tr("writing {name}", name=path.name)))
-        panel, png = self._panel(name)
+        note = self._note(name)
+        panel, png = self._panel(name, note)
         if panel is None:
             raise NothingToShow(tr("There are no numbers for this picture."))
         match path.suffix.lower():
             case ".svg":
                 swap_in(path, panel.svg)
             case ".csv":
-                swap_in(path, panel_csv(panel, self._report.head))
+                swap_in(path, panel_csv(panel, " · ".join(filter(None, (self._report.head, note)))))
             case _:
                 write_whole(path, png)
         return str(path)

@@ -1,10 +1,11 @@
 """A state of the model's finger that is looked at: moved, zoomed, probed, and cut by a line."""
 
+from math import ceil
 from typing import Any
 
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
-from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSizeF, Qt, Signal
+from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
@@ -146,11 +147,17 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return self._look.field
 
     def draw(self, painter: QPainter, head: str) -> None:
-        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it, "" for none."""
-        self.render(painter, QRectF(self.rect()), self.rect())
+        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it."""
+        above = self.size_with(head).height() - self.height()
+        painter.fillRect(QRectF(0, 0, self.width(), above), QColor(self._tokens.surface))
         painter.setFont(self._font)
         painter.setPen(QColor(self._tokens.look))
-        painter.drawText(self._here(), int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop), f"{head} ")
+        painter.drawText(QRectF(4, 0, self.width() - 8, above), int(Qt.TextFlag.TextWordWrap), head)
+        self.render(painter, QRectF(0, above, self.width(), self.height()), self.rect())
+
+    def size_with(self, head: str) -> QSize:
+        """Return the size of what is drawn with a `head` over it."""
+        return self.size() + QSize(0, ceil(self._height_of(head)))
 
     def paint_finger(self, painter: QPainter) -> None:
         """Paint the finger where the view box has it."""
@@ -264,11 +271,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def _above(self) -> float:
         """Return the height of the words [pixel], the same over every finger."""
-        metrics, box = QFontMetricsF(self._font), QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
-        needed = (
-            metrics.boundingRect(box, int(Qt.TextFlag.TextWordWrap), words).height() for words in self.sight.words
-        )
-        return max(LEAST_LINES * metrics.height(), *needed)
+        return max(LEAST_LINES * QFontMetricsF(self._font).height(), *map(self._height_of, self.sight.words))
+
+    def _height_of(self, words: str) -> float:
+        """Return the height of words that are as wide as the canvas [pixel]."""
+        box = QRectF(0.0, 0.0, self.width() - 8.0, 1.0)
+        return QFontMetricsF(self._font).boundingRect(box, int(Qt.TextFlag.TextWordWrap), words).height()
 
     def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
         pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
-from PySide6.QtCore import QBuffer, QObject, QRect, QSize, Qt, QTimer, Signal
+from PySide6.QtCore import QBuffer, QObject, QPoint, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import QImage, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QProgressDialog, QPushButton
@@ -33,14 +33,14 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
             rows = io.StringIO()
             if frame is not None:
                 table = np.column_stack([frame.nodes, field.of(frame)])
-                rows.write(f"# {head}\n" if head else "")
+                rows.writelines(f"# {line}\n" for line in (*head.split("\n"), canvas.accessibleName()) if line)
                 np.savetxt(rows, table, "%.9g", ",", header=f"x [mm],y [mm],{field.axis}", comments="")
             write_whole(path, rows.getvalue().encode())
         case ".svg":
             buffer, drawing = QBuffer(), QSvgGenerator()
             drawing.setOutputDevice(buffer)
-            drawing.setSize(QSize(canvas.width(), canvas.height()))
-            drawing.setViewBox(QRect(0, 0, canvas.width(), canvas.height()))
+            drawing.setSize(canvas.size_with(head))
+            drawing.setViewBox(QRect(QPoint(), canvas.size_with(head)))
             drawing.setTitle(canvas.accessibleName())
             _draw(canvas, QPainter(drawing), head)
             write_whole(path, bytes(buffer.data().data()))
@@ -51,7 +51,7 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
 
 
 def _image(canvas: FingerCanvas, density: float, head: str) -> QImage:
-    image = QImage(round(canvas.width() * density), round(canvas.height() * density), QImage.Format.Format_RGB888)
+    image = QImage(canvas.size_with(head) * density, QImage.Format.Format_RGB888)
     image.setDevicePixelRatio(density)
     _draw(canvas, QPainter(image), head)
     return image

@@ -10,7 +10,15 @@ from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.field_list import FIELD_ERRORS, automatic_range
 from daq_app.analyst.frame import Finger
-from daq_app.analyst.seen import common_range, film_words, finger_words, other_finger, shown_film, was_tried
+from daq_app.analyst.seen import (
+    common_range,
+    film_words,
+    finger_words,
+    named_errors,
+    other_finger,
+    shown_film,
+    was_tried,
+)
 from daq_app.analyst.shown import greatest_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
@@ -135,10 +143,9 @@ class ModelColumn(QWidget):
 
     def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
         assert state.report is not None  # nothing is compared before this session is open
-        first, second = (
-            " · ".join(filter(None, (one.session, greatest_errors(one)))) for one in (state.report, other.report)
-        )
-        self.compared.show_rows(compared(state.report, other.report), (first, second))
+        reports = (state.report, other.report)
+        first, second = map(named_errors, reports)
+        self.compared.show_rows(compared(*reports), (first, second))
         self.both.setChecked(True)
         self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
@@ -249,9 +256,10 @@ class ModelColumn(QWidget):
         self.asked.emit(m.Write(f"picture {name}", path))
 
     def _head(self) -> str:
-        """Return what every picture of the session is marked with."""
+        """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
         report = None if self._state is None else self._state.report
-        return "" if report is None else " · ".join(filter(None, (report.head, report.session)))
+        marks = () if report is None else (report.head, report.session)
+        return "\n".join((" · ".join(filter(None, marks)), tr(FIELD_ERRORS)))
 
     def _save_finger(self, name: str, path: str) -> None:
         """Write the picture of the SED as the report draws it, and any other field as it is shown."""

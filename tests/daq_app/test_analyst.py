@@ -1,6 +1,7 @@
 """The analyst's window knows a session folder without Qt."""
 
 import itertools
+import re
 import shutil
 import time
 from dataclasses import replace
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from daq_app.analyst import messages as m
 from daq_app.analyst.compared import compared
 from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, history, taken_back, within
+from daq_app.analyst.field_list import FIELD_ERRORS
 from daq_app.analyst.frame import Contact, Finger, Frame, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.messages import EDGES
@@ -331,3 +333,21 @@ def test_a_folder_that_is_no_session_is_told_in_a_sentence(tmp_path):
         assert str(tmp_path) in wait(analyst, m.Problem)[-1].sentence
     finally:
         analyst.close()
+
+
+def test_a_written_picture_says_the_condition_and_the_errors_of_its_sed(at_work, tmp_path):
+    work, _ = at_work
+    work.go_on()
+    said = next(said for said in work._report.predictions if said.sed is not None)
+    words = f"SED at {said.indentation:.3g} mm, small strain {1000.0 * said.sed:.3f} kPa ± "
+    for name in (f"finger {said.stroke}", f"contact {said.stroke}"):
+        work.do(m.Write(f"picture {name}", str(tmp_path / "written.csv")))
+        (head, *_) = (tmp_path / "written.csv").read_text().splitlines()
+        assert words in head
+        assert head.endswith(FIELD_ERRORS)
+        work.do(m.Write(f"picture {name}", str(tmp_path / "written.svg")))
+        lines = re.findall(r">([^<>]+)</text>", (tmp_path / "written.svg").read_text())
+        assert words.strip() in " ".join(lines)
+    work.do(m.ShowHistory((said.trial, said.stroke)))
+    work.do(m.Write(f"picture finger {said.stroke} 0", str(tmp_path / "written.csv")))
+    assert "Step 1 of " in (tmp_path / "written.csv").read_text().splitlines()[0]

@@ -31,6 +31,7 @@ TEXT = 8.5  # [pt]
 POINTS = 72.0  # in an inch: SVG is laid out in them
 DOTS = 220  # of a picture in pixels, in an inch
 _PIXELS: ContextVar[dict[str, bytes] | None] = ContextVar("pixels", default=None)  # see `in_pixels`
+_NOTE: ContextVar[str] = ContextVar("note", default="")  # likewise
 _LOOK: dict[Any, Any] = {
     "font.family": "sans-serif",
     # Text stays text, so that it can be searched, copied and read aloud. The layout is made for the first font, which
@@ -139,20 +140,23 @@ def _mixed(colour: str, towards: float) -> str:
 
 
 @contextmanager
-def in_pixels() -> Generator[dict[str, bytes]]:
-    """Also draw every picture made meanwhile in pixels: yields PNGs by the pictures' names."""
+def in_pixels(note: str = "") -> Generator[dict[str, bytes]]:
+    """Also draw every picture made meanwhile in pixels, with a `note` under it: yields PNGs by the pictures' names."""
     images: dict[str, bytes] = {}
-    before = _PIXELS.set(images)
+    before, noted = _PIXELS.set(images), _NOTE.set(note)
     try:
         yield images
     finally:
         _PIXELS.reset(before)
+        _NOTE.reset(noted)
 
 
 def svg(drawn: Sheet, name: str, title: str, *, simulated: bool) -> str:
     """Return the picture as an SVG document, inside `look`; the same drawing gives the same bytes."""
     if simulated:
         drawn.figure.suptitle("SIMULATED", x=0.995, ha="right", fontsize=6.5, color=GREY, fontweight="bold")
+    if note := _NOTE.get():
+        drawn.figure.supxlabel(note, x=0.01, ha="left", fontsize=6.5, color=GREY, wrap=True)
     engine = drawn.figure.get_layout_engine()
     if engine is not None:
         engine.execute(drawn.figure)

@@ -14,7 +14,7 @@ from PySide6.QtTest import QTest
 from qt_events import wheel
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.field_list import FIELD_CHOICES
+from daq_app.analyst.field_list import FIELD_CHOICES, FIELD_ERRORS
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.state import chosen, rows
 from daq_app.qt.field_bar import ALL_TRIALS, FIXED
@@ -29,7 +29,7 @@ def test_history_is_stepped_by_keys_and_says_what_the_finger_does(window):
     window.take(m.Filmed(key, film()))
     player, canvas = window.model.player, window.model.finger
     assert "Step 4 of 4" in canvas.accessibleName()
-    assert "kPa; mesh, model: no estimate" in canvas.accessibleName()
+    assert "kPa at small strain; mesh, model: no estimate" in canvas.accessibleName()
     for _ in range(3):
         QTest.keyClick(player, Qt.Key.Key_Left)
     assert "pressing down" in canvas.accessibleName()
@@ -192,10 +192,13 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
         assert window._words.accessibleName().startswith("Saved: ")
     assert not any(isinstance(asked, m.Write) for asked in window._work.asked)
     with Image.open(tmp_path / "u.png") as written:
-        assert written.size == (2 * canvas.width(), 2 * canvas.height())
+        assert written.size == (2 * canvas.width(), 2 * canvas.size_with(window.model._head()).height())
+        assert written.height > 2 * canvas.height() + 2 * canvas.fontMetrics().height()
     assert "SIMULATED" in (tmp_path / "u.svg").read_text()
-    head, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
+    head, errors, words, names, *numbers = (tmp_path / "u.csv").read_text().splitlines()
     assert (head[:11], names) == ("# SIMULATED", f"x [mm],y [mm],{field.axis}")
+    assert errors == f"# {FIELD_ERRORS}"
+    assert "at small strain; mesh, model: no estimate" in words
     shown = canvas.frame
     table = np.array([line.split(",") for line in numbers], float)
     np.testing.assert_allclose(table, np.column_stack([shown.nodes, field.of(shown)]), rtol=1e-8)
@@ -218,7 +221,7 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     window.model._moved = show
     with Image.open(tmp_path / "film.gif") as written:
         assert (written.n_frames, written.info["duration"]) == (4, 100)
-        assert written.size == (window.model.finger.width(), window.model.finger.height())
+        assert written.size == window.model.finger.size_with(window.model._head()).toTuple()
     assert len(ranges) == 1
     assert "Step 4 of 4" in window.model.finger.accessibleName()
 
@@ -227,8 +230,7 @@ def test_a_film_as_mp4_has_every_state_for_a_tenth_of_a_second(application, wind
     window.take(m.Filmed(chosen(window.state).key, film()))
     window.model.write_film(tmp_path / "film.mp4")
     until(application, lambda: "Saved" in window._words.accessibleName())
-    finger = window.model.finger
-    width, height = finger.width() // 2 * 2, finger.height() // 2 * 2
+    width, height = (length // 2 * 2 for length in window.model.finger.size_with(window.model._head()).toTuple())
     read = [
         imageio_ffmpeg.get_ffmpeg_exe(),
         "-i",
