@@ -1,13 +1,14 @@
 """Who decides about a stroke's windows and why, and the way back."""
 
 from PySide6.QtCore import QSettings, Signal
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.qt.decision_stack import DecisionStack
 from daq_app.qt.parts import Wrapped, button, label
 from daq_app.qt.remembered import type_scale
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, TEXT, font
 from daq_app.wording import tr
 
 BY = "analyst/by"  # where the code is remembered
@@ -30,6 +31,7 @@ class DecisionsBar(QWidget):
         self.by.editingFinished.connect(lambda: QSettings().setValue(BY, self.by.text()))
         self.why = QLineEdit()
         self.why.setPlaceholderText(DRAGGED)
+        self.why.setMinimumWidth(QFontMetrics(font(TEXT, type_scale())).horizontalAdvance(DRAGGED) + 3 * GRID)
         self.why.setAccessibleName(tr("why an edge is moved"))
         self.stack = DecisionStack(self)
         self.stack.wanted.connect(self._ask)

@@ -16,7 +16,7 @@ from daq_app.wording import tr, tr_noop
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
-LEAST_FOR_ACTS = 150  # a lower panel has room for the numbers alone, before the font's scale [px]
+LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers alone, before the font's scale [px]
 NAMES = {
     "N": tr_noop("Normal force"),
     "T": tr_noop("Tangential force"),
@@ -70,7 +70,8 @@ class LiveBar(QWidget):
             made.setCheckable(True)
         for made in (self.hold, self.finite, self.length):
             made.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.setMinimumWidth(1)  # numbers give way where there is no room for all of them
+        # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
+        self.setMinimumSize(1, QFontMetrics(font(TITLE, scale)).height())
 
     def show_forces(self, shown: bool) -> None:
         """Show the numbers, or keep them from the experimenter where the protocol does."""

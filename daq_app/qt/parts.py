@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
@@ -107,6 +107,10 @@ class _Choice(QComboBox):
         self._label.setBuddy(self)
         self._label.hide()
 
+    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
+        """Return at least the height of a target."""
+        return super().sizeHint().expandedTo(QSize(0, TARGET))
+
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
         """Move the label to the parent that the list is given."""
         super().changeEvent(event)
@@ -121,7 +125,6 @@ class _Choice(QComboBox):
 def choice(name: str) -> QComboBox:
     """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
     made = _Choice(name)
-    made.setMinimumHeight(TARGET)
     made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return made
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFont, QFontInfo, QGuiApplication, QPalette
+from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetrics, QGuiApplication, QPalette
 
 GRID = 8  # everything keeps to multiples of it [device-independent pixels]
 TARGET = 40  # least height of what is clicked or touched
@@ -128,9 +128,9 @@ def _px(size: float, scale: float) -> str:
     return f"{round(size * scale)}px"
 
 
-def _tall(size: float, scale: float, least: int) -> str:
-    """Return the least height of a button: that of a line of its type, 1.2 times its size in most fonts."""
-    return f"{max(least, round(1.2 * size * scale))}px"
+def _tall(size: int, scale: float, least: int) -> str:
+    """Return the least height of a button: that of a line of its type."""
+    return f"{max(least, QFontMetrics(font(size, scale)).height())}px"
 
 
 def _panels(t: Tokens, scale: float) -> str:

@@ -44,7 +44,9 @@ class TrialStrip(QScrollArea):
         if tiles == self._shown:
             return
         while len(self.tiles) > len(tiles):
-            self.tiles.pop().deleteLater()
+            gone = self.tiles.pop()
+            gone.hide()  # until it is deleted nobody can press it
+            gone.deleteLater()
         while len(self.tiles) < len(tiles):
             self._add()
         for made, tile in zip(self.tiles, tiles, strict=True):

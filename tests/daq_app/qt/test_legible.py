@@ -5,19 +5,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import (
-    QCheckBox,
-    QComboBox,
-    QHeaderView,
-    QLabel,
+    QLineEdit,
     QListWidget,
     QProgressBar,
-    QPushButton,
-    QRadioButton,
     QScrollArea,
-    QStyle,
     QStyleFactory,
-    QStyleOptionButton,
-    QStyleOptionComboBox,
+    QTabBar,
     QTableWidget,
     QTableWidgetItem,
     QTreeWidget,
@@ -46,9 +39,10 @@ from daq_app.window.preview import preview
 from daq_app.window.view import derive_view
 from daq_app.window.view_model import ModelWords
 from sessions.plan.protocols import protocol, protocol_names
-from tests.daq_app.qt.painted_text import cut_or_colliding, painted_texts, paints_by_hand
+from tests.daq_app.qt.painted_text import cut_or_colliding, painted_texts
 from tests.daq_app.qt.review.examples import SESSION, Nobody, film
 from tests.daq_app.qt.test_window_for_everybody import contrast
+from tests.daq_app.qt.written_text import ROUNDING, cut_off
 from tests.daq_app.session_messages import BAD, CLOSING, MOUNT, PAUSED, SCORE, after
 from tests.sessions.report_example import example
 
@@ -57,7 +51,6 @@ PACE = 1.0  # no test here waits for a session
 SCREENS = [(1366, 768), (1920, 1080), (3840, 2160)]
 SCALES = [1.0, 1.5, 2.0]
 DOCUMENT_MARGIN = 4  # around the name of an axis [px]
-ROUNDING = 2  # by which Qt's own size of a button may fall short of its text; its padding is wider [px]
 LONGEST_FIELD = max(range(len(FIELD_CHOICES)), key=lambda at: len(FIELD_CHOICES[at].axis))
 MODEL_SAYS = (
     "PROVISIONAL  SED 12.34 kPa; mesh, model: no estimate · at the measured force, 2.1 mm deep · small strain",
@@ -128,58 +121,62 @@ def test_the_progress_bar_can_be_read_empty_and_full(themed, part):
     assert painted_contrast(bar, bar.rect().adjusted(4, 4, -4, -4)) >= 4.5
 
 
-def cut_off(window):
-    """Return every text that has less room than it needs, or lies on another: of widgets, and painted by hand."""
-    found = []
-    for shown in window.findChildren(QWidget):
-        if shown.isVisible():
-            found += [(text, room, needed) for text, room, needed in texts_of(shown) if text and is_less(room, needed)]
-            found += cut_or_colliding(shown) if paints_by_hand(shown) else []
-    return found
+LONG = "a text that is longer than its room"
 
 
-def is_less(room, needed):
-    return any(has + ROUNDING < needs for has, needs in zip(room, needed, strict=True))
+def _tabs():
+    made = QTabBar()
+    made.setUsesScrollButtons(False)
+    made.setElideMode(Qt.TextElideMode.ElideRight)
+    made.addTab(LONG)
+    made.addTab(LONG)
+    return made
 
 
-def texts_of(shown):
-    """Return what is written in a widget: each text with the room that it has and that it needs [px]."""
-    if isinstance(shown, QLabel):
-        needed = shown.sizeHint().width() if not shown.wordWrap() else 0
-        high = shown.heightForWidth(shown.width()) if shown.wordWrap() else shown.sizeHint().height()
-        return [(shown.text(), shown.size().toTuple(), (needed, high))]
-    if isinstance(shown, QPushButton | QCheckBox | QRadioButton):
-        option = QStyleOptionButton()
-        shown.initStyleOption(option)
-        element = {
-            QPushButton: QStyle.SubElement.SE_PushButtonContents,
-            QCheckBox: QStyle.SubElement.SE_CheckBoxContents,
-        }
-        kind = next(
-            (one for of, one in element.items() if isinstance(shown, of)), QStyle.SubElement.SE_RadioButtonContents
-        )
-        return [(shown.text(), shown.style().subElementRect(kind, option, shown).size().toTuple(), size_of(shown))]
-    if isinstance(shown, QComboBox) and not shown.isEditable():  # in one that is typed in a text moves along
-        option = QStyleOptionComboBox()
-        shown.initStyleOption(option)
-        field = QStyle.SubControl.SC_ComboBoxEditField
-        room = shown.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, shown).size().toTuple()
-        return [(shown.currentText(), room, size_of(shown, shown.currentText()))]
-    if isinstance(shown, QHeaderView) and shown.orientation() == Qt.Orientation.Horizontal:
-        model, sections = shown.model(), [at for at in range(shown.count()) if not shown.isSectionHidden(at)]
-        heads = [str(model.headerData(at, Qt.Orientation.Horizontal) or "") for at in sections]
-        return [
-            (text, (shown.sectionSize(at), shown.height()), size_of(shown, text))
-            for at, text in zip(sections, heads, strict=True)
-        ]
-    return []
+def _cells(head, cell):
+    made = QTableWidget(1, 1)
+    made.setHorizontalHeaderLabels([head])
+    made.setItem(0, 0, QTableWidgetItem(cell))
+    made.setColumnWidth(0, 60)
+    return made
 
 
-def size_of(shown, text=None):
-    """Return the width and height of a text as a widget writes it, without the ampersands of its keys."""
-    lines = (shown.text() if text is None else text).replace("&", "").split("\n")
-    metrics = shown.fontMetrics()
-    return max(metrics.horizontalAdvance(line) for line in lines), metrics.height() * len(lines)
+def _list():
+    made = QListWidget()
+    made.addItem(LONG)
+    return made
+
+
+def _field():
+    made = QLineEdit()
+    made.setPlaceholderText(LONG)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("make", "room"),
+    [
+        (_list, 300),
+        (_field, 300),
+        (_tabs, 600),
+        (lambda: _cells(LONG, ""), 0),
+        (lambda: _cells("", LONG), 0),
+    ],
+    ids=["row", "example", "tab", "head", "cell"],
+)
+@pytest.mark.usefixtures("application")
+def test_a_row_an_example_a_tab_a_head_and_a_cell_are_noticed_where_they_are_cut(make, room):
+    window = QWidget()
+    made = make()
+    made.setParent(window)
+    window.resize(800, 200)
+    made.resize(100, 100)
+    window.show()
+    assert [text for text, *_ in cut_off(window)].count(LONG) >= 1
+    made.resize(room or 700, 100)
+    if isinstance(made, QTableWidget):
+        made.setColumnWidth(0, 600)
+    assert [text for text, *_ in cut_off(window) if text == LONG] == []
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from daq_app.window.messages import NewSession
 from daq_app.window.stroke_quality import StrokePicture
 from daq_app.window.view_trials import Inspection, Tile
 from sessions.run import steps
-from tests.daq_app.qt.test_legible import cut_off
 from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
+from tests.daq_app.qt.written_text import cut_off
 
 pytestmark = pytest.mark.qt
 
@@ -153,6 +153,17 @@ def test_of_sixty_trials_the_one_in_hand_is_in_sight_and_no_tile_cuts_its_words(
     assert all(made.width() >= made.sizeHint().width() for made in strip.tiles)
     assert all(made.height() >= made.sizeHint().height() for made in strip.tiles)
     strip.hide()
+
+
+@pytest.mark.usefixtures("application")
+def test_a_tile_of_a_session_that_is_over_cannot_be_pressed():
+    strip = TrialStrip(1.0, lambda _: None)
+    strip.show_tiles(tuple(Tile(number, "K50", "coming") for number in range(1, 4)))
+    strip.show()
+    gone = strip.tiles[2]
+    strip.show_tiles((Tile(1, "D86", "current"),))
+    assert len(strip.tiles) == 1
+    assert not gone.isVisible()
 
 
 def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):

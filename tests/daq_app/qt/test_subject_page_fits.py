@@ -11,7 +11,7 @@ from daq_app.qt import tokens
 from daq_app.qt.press_bar import FULL, PressBar
 from daq_app.qt.subject_window import LARGER, SubjectWindow
 from daq_app.window.view_subject import SubjectView
-from tests.daq_app.qt.test_legible import cut_off
+from tests.daq_app.qt.written_text import cut_off
 
 pytestmark = pytest.mark.qt
 
