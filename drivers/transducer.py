@@ -1,7 +1,7 @@
 """What every six-axis transducer can do, whatever its wire, and how it fails."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Protocol
 
 from drivers.calibration import Calibration
@@ -56,6 +56,9 @@ class Health:
     off_rate: int = 0  # times the rate was found to be another than the one set, or than before
     rate_words: str = ""  # what was found of it last
     lag_ms: float = 0.0  # age of the newest reading when it was handed over [ms of the session's clock]
+
+
+COUNTS = tuple(one.name for one in fields(Health) if one.type is int and one.name != "received")  # of what went wrong
 
 
 class Transducer(Protocol):

@@ -2,8 +2,7 @@
 
 import errno
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import usb.core  # pyright: ignore[reportMissingTypeStubs]
 import usb.util  # pyright: ignore[reportMissingTypeStubs]
@@ -19,8 +18,7 @@ _LARGEST = 64  # bytes in a packet of a full-speed bulk endpoint
 _WRITE_MS = 300
 
 
-@dataclass(frozen=True, slots=True)
-class Endpoints:
+class Endpoints(NamedTuple):
     """Addresses of a device's bulk endpoints."""
 
     requests: int

@@ -20,6 +20,24 @@ from simulators.simulator import Simulated, Simulator, unplug
 _core: Any = usb.core
 _Backend: Any = usb.backend.IBackend
 _ENDPOINTS = (0x01, 0x82, 0x83)
+# Fields of the descriptors, as the USB specification names and orders them.
+_DEVICE = (
+    "bLength bDescriptorType bcdUSB bDeviceClass bDeviceSubClass bDeviceProtocol bMaxPacketSize0 idVendor idProduct "
+    "bcdDevice iManufacturer iProduct iSerialNumber bNumConfigurations"
+)
+_CONFIGURATION = (
+    "bLength bDescriptorType wTotalLength bNumInterfaces bConfigurationValue iConfiguration bmAttributes bMaxPower"
+)
+_INTERFACE = (
+    "bLength bDescriptorType bInterfaceNumber bAlternateSetting bNumEndpoints bInterfaceClass bInterfaceSubClass "
+    "bInterfaceProtocol iInterface"
+)
+_ENDPOINT = "bLength bDescriptorType bEndpointAddress bmAttributes wMaxPacketSize bInterval bRefresh bSynchAddress"
+
+
+def _descriptor(names: str, values: Sequence[int], **further: object) -> SimpleNamespace:
+    """Return a descriptor with its fields by name, and what pyusb wants `further`."""
+    return SimpleNamespace(**dict(zip(names.split(), values, strict=True)), extra_descriptors=[], **further)
 
 
 class SimulatedBus(_Backend):
@@ -40,74 +58,26 @@ class SimulatedBus(_Backend):
 
     def get_device_descriptor(self, dev: int) -> SimpleNamespace:
         """Return what a U6 tells of itself."""
-        return SimpleNamespace(
-            bLength=18,
-            bDescriptorType=1,
-            bcdUSB=0x0200,
-            bDeviceClass=0xFF,
-            bDeviceSubClass=0,
-            bDeviceProtocol=0,
-            bMaxPacketSize0=64,
-            idVendor=0x0CD5,
-            idProduct=0x0006,
-            bcdDevice=0x0100,
-            iManufacturer=0,
-            iProduct=0,
-            iSerialNumber=0,
-            bNumConfigurations=1,
-            address=dev + 1,
-            bus=1,
-            port_number=dev + 1,
-            port_numbers=(dev + 1,),
-            speed=2,
+        values = 18, 1, 0x0200, 0xFF, 0, 0, 64, 0x0CD5, 0x0006, 0x0100, 0, 0, 0, 1
+        return _descriptor(
+            _DEVICE, values, address=dev + 1, bus=1, port_number=dev + 1, port_numbers=(dev + 1,), speed=2
         )
 
     def get_configuration_descriptor(self, dev: int, config: int) -> SimpleNamespace:
         """Return the only configuration."""
         if config:
             raise IndexError(config)
-        return SimpleNamespace(
-            bLength=9,
-            bDescriptorType=2,
-            wTotalLength=39,
-            bNumInterfaces=1,
-            bConfigurationValue=1,
-            iConfiguration=0,
-            bmAttributes=0x80,
-            bMaxPower=250,
-            extra_descriptors=[],
-        )
+        return _descriptor(_CONFIGURATION, (9, 2, 39, 1, 1, 0, 0x80, 250))
 
     def get_interface_descriptor(self, dev: int, intf: int, alt: int, config: int) -> SimpleNamespace:
         """Return the only interface."""
         if intf or alt or config:
             raise IndexError(alt)
-        return SimpleNamespace(
-            bLength=9,
-            bDescriptorType=4,
-            bInterfaceNumber=0,
-            bAlternateSetting=0,
-            bNumEndpoints=len(_ENDPOINTS),
-            bInterfaceClass=0xFF,
-            bInterfaceSubClass=0,
-            bInterfaceProtocol=0,
-            iInterface=0,
-            extra_descriptors=[],
-        )
+        return _descriptor(_INTERFACE, (9, 4, 0, 0, len(_ENDPOINTS), 0xFF, 0, 0, 0))
 
     def get_endpoint_descriptor(self, dev: int, ep: int, intf: int, alt: int, config: int) -> SimpleNamespace:
         """Return one of the three bulk endpoints."""
-        return SimpleNamespace(
-            bLength=7,
-            bDescriptorType=5,
-            bEndpointAddress=_ENDPOINTS[ep],
-            bmAttributes=2,
-            wMaxPacketSize=64,
-            bInterval=0,
-            bRefresh=0,
-            bSynchAddress=0,
-            extra_descriptors=[],
-        )
+        return _descriptor(_ENDPOINT, (7, 5, _ENDPOINTS[ep], 2, 64, 0, 0, 0))
 
     def open_device(self, dev: int) -> SimpleNamespace:
         """Return a handle."""

@@ -204,23 +204,9 @@ class Gone(Struct, frozen=True):
 
 
 Report = (
-    Device
-    | NoDevice
-    | HealthReport
-    | Live
-    | Tared
-    | SessionBegun
-    | SessionEnded
-    | Sealing
-    | Sealed
-    | Failed
-    | LinkDown
-    | LinkBack
-    | Gone
-    | LoggedEvent
-    | Status
-    | steps.Command
-)
+    Device | NoDevice | HealthReport | Live | Tared | SessionBegun | SessionEnded | Sealing | Sealed | Failed
+    | LinkDown | LinkBack | Gone | LoggedEvent | Status | steps.Command
+)  # fmt: skip
 
 REQUESTS: tuple[type, ...] = get_args(Request)
 REPORTS: tuple[type, ...] = get_args(Report)

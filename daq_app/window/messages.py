@@ -67,15 +67,7 @@ class LanguageChosen(Struct, frozen=True):
 
 
 Own = (
-    Tick
-    | Searching
-    | DevicesFound
-    | Loaded
-    | LifeKnown
-    | Judged
-    | Dismissed
-    | NewSession
-    | DrawingFailed
+    Tick | Searching | DevicesFound | Loaded | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed
     | LanguageChosen
-)
+)  # fmt: skip
 Message = m.Request | m.Report | Own  # what `fold` takes

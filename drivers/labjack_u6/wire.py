@@ -6,6 +6,7 @@ head. All numbers are little-endian. Six differential pairs, 0-1 to 10-11, read 
 
 import struct
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,8 +56,7 @@ STATUS_BITS = StatusTable(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
+class Identity(NamedTuple):
     """Who a converter says it is."""
 
     serial: int
@@ -64,8 +64,7 @@ class Identity:
     pro: bool
 
 
-@dataclass(frozen=True, slots=True)
-class ScanClock:
+class ScanClock(NamedTuple):
     """The converter's clock for a scan rate."""
 
     flags: int  # scan configuration byte

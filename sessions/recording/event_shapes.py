@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
+from drivers.transducer import COUNTS
 from sessions.json_document import converted, json_object
 
 Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # what SQLite, HDF5 and NumPy hold alike
@@ -40,16 +41,7 @@ class _Zeroed(msgspec.Struct):
     mean: SixNumbers
 
 
-class _Losses(msgspec.Struct):
-    lost: Count = 0
-    repeated: Count = 0
-    late: Count = 0
-    malformed: Count = 0
-    stalled: Count = 0
-    restarted: Count = 0
-    saturated: Count = 0
-    off_rate: Count = 0
-    rate_words: str = ""
+_Losses = msgspec.defstruct("_Losses", [*((name, Count, 0) for name in COUNTS), ("rate_words", str, "")])
 
 
 class _Sentence(msgspec.Struct):

@@ -2,18 +2,15 @@
 
 from collections import Counter
 from collections.abc import Generator, Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
+from drivers.transducer import COUNTS, Health, LinkLost, SetupError, TransducerInfo
 from sessions.recording.log import LoggedEvent
 from sessions.recording.reader import Recording
-
-# What a "losses" event may count.
-COUNTED = frozenset(field.name for field in fields(Health)) - {"received", "lag_ms", "rate_words", "flagged"}
 
 
 class RecordedReadings:
@@ -143,7 +140,7 @@ class ReplayTransducer:
 def health_of(log: Iterable[LoggedEvent]) -> Health:
     """Return the totals of what "losses" events tell."""
     events = list(log)
-    counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTED}
+    counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
     words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
     flagged: Counter[str] = Counter()
     for event in events:

@@ -10,8 +10,8 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path, PurePath
+from typing import NamedTuple
 
 # File systems whose blocks lie on another computer, as Linux (/proc/mounts) and macOS (mount) name them.
 NETWORK = re.compile(
@@ -52,8 +52,7 @@ SYNC_VARIABLES = ("OneDrive", "OneDriveCommercial", "OneDriveConsumer")  # set b
 MOVE = "record into a folder on a disk of this computer, and copy it when it is sealed"
 
 
-@dataclass(frozen=True, slots=True)
-class Mount:
+class Mount(NamedTuple):
     """A file system and where it is mounted."""
 
     kind: str

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
 from drivers.status import flagged_words
-from drivers.transducer import DeviceFault, Health, LinkLost, Transducer
+from drivers.transducer import COUNTS, DeviceFault, Health, LinkLost, Transducer
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.run.event_log import data_of, kind_of, line_of
@@ -22,10 +22,6 @@ from sessions.strokes.onset import DetectorSettings
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"
 Ending = tuple[Cause, str]  # why a session ends, for programs and for people
-LOSSES = (  # counts of Health
-    *("lost", "repeated", "late", "malformed", "stalled", "restarted"),
-    *("saturated", "doubtful", "noted", "off_rate", "off_units"),
-)
 
 
 class Operator(Protocol):
@@ -278,7 +274,7 @@ class _Run:
         if self.transducer is None:
             return
         health = self.transducer.health
-        counts = {name: getattr(health, name) - getattr(self._reported, name) for name in LOSSES}
+        counts = {name: getattr(health, name) - getattr(self._reported, name) for name in COUNTS}
         if any(counts.values()) and (now or self._due("losses", self.settings.losses_every)):
             summary = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
             flagged = {words: count - self._reported.flagged.get(words, 0) for words, count in health.flagged.items()}

@@ -134,26 +134,9 @@ class Finish(Struct, frozen=True):
 
 
 Event = (
-    Begin
-    | StimulusMounted
-    | Zeroed
-    | ContactOnset
-    | FingerLifted
-    | Settled
-    | StrokeDone
-    | Scored
-    | MagnitudeEstimate
-    | PairedChoice
-    | Note
-    | Redo
-    | UndoRedo
-    | Skip
-    | Pause
-    | Resume
-    | RestOver
-    | Abort
-    | Finish
-)
+    Begin | StimulusMounted | Zeroed | ContactOnset | FingerLifted | Settled | StrokeDone | Scored
+    | MagnitudeEstimate | PairedChoice | Note | Redo | UndoRedo | Skip | Pause | Resume | RestOver | Abort | Finish
+)  # fmt: skip
 
 # ---- what is to be done
 
@@ -271,22 +254,6 @@ class EndSession(Struct, frozen=True):
 
 
 Command = (
-    AskBegin
-    | ShowInstruction
-    | AskMount
-    | StartTake
-    | MeasureZero
-    | AskStroke
-    | AskScore
-    | AskNumber
-    | AskChoice
-    | AskRest
-    | KeepTake
-    | DiscardTake
-    | RestoreTake
-    | LeaveOut
-    | AskFinish
-    | Tell
-    | Refuse
-    | EndSession
-)
+    AskBegin | ShowInstruction | AskMount | StartTake | MeasureZero | AskStroke | AskScore | AskNumber | AskChoice
+    | AskRest | KeepTake | DiscardTake | RestoreTake | LeaveOut | AskFinish | Tell | Refuse | EndSession
+)  # fmt: skip

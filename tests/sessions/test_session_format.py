@@ -9,6 +9,7 @@ import pytest
 from recordings import rows
 from told_session import Session
 
+from drivers.transducer import COUNTS
 from sessions.plan.plan import Shown
 from sessions.plan.protocols.protocol import (
     BlockOutline,
@@ -21,7 +22,6 @@ from sessions.plan.protocols.protocol import (
 )
 from sessions.recording.archive import seal
 from sessions.run import event_log
-from sessions.run.runner import LOSSES
 from sessions.run.steps import Event
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -64,7 +64,7 @@ def test_every_data_set_of_the_copy_is_told(recorded):
 def test_every_kind_of_event_is_told(recorded):
     met = {kind for (kind,) in rows(recorded, "SELECT kind FROM events")}
     possible = {event_log._kind(kind) for kind in get_args(Event)}
-    assert met | possible | set(LOSSES) <= NAMED
+    assert met | possible | set(COUNTS) <= NAMED
 
 
 def test_every_key_of_a_protocol_is_told():
