@@ -49,21 +49,18 @@ class NetFtBox(ServedBox):
         *,
         rate: int = 200,
         ports: tuple[int, int, int] = (0, 0, 0),
-        rate_error: float = 0.0,
         faults: Faults | None = None,
         first: tuple[int, int] = (0, 1),
         product: Product = NET_FT,
     ) -> None:
-        """Set up a box that streams at `rate` [Hz] by an oscillator wrong by `rate_error` [-].
+        """Set up a box that streams at `rate` [Hz].
 
         `ports` are those of UDP, TCP and HTTP, 0 for a free one. `first` holds its counter when it starts, as if it
         had run for long, and the first number of the first stream. `product` says which box it is.
         """
         super().__init__(clock, faults)
         first_tick, self._first_record = first
-        self._inside = Electronics(
-            bench, self.faults, rate=rate, rate_error=rate_error, first_tick=first_tick, product=product
-        )
+        self._inside = Electronics(bench, self.faults, rate=rate, first_tick=first_tick, product=product)
         kinds = socket.SOCK_DGRAM, socket.SOCK_STREAM, socket.SOCK_STREAM
         self._wanted = tuple(zip(kinds, ("rdt", "tcp", "http"), ports, strict=True))
         self._on = True

@@ -26,8 +26,8 @@ class Electronics:
         faults: Faults,
         *,
         rate: int,
-        rate_error: float,
         first_tick: int,
+        rate_error: float = 0.0,
         product: Product = NET_FT,
     ) -> None:
         """Switch on at time 0 with the counter at `first_tick`, running wrong by `rate_error` [-]."""

@@ -8,7 +8,7 @@ from daq_app.console import Console
 from drivers.clock import Clock
 from drivers.transducer import Transducer
 from sessions.plan.plan import SessionPlan
-from sessions.recording import SessionWriter, Setting, provenance
+from sessions.recording import FleetingWriter, SessionWriter, Setting, provenance
 from sessions.recording.archive import seal
 from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
@@ -34,14 +34,15 @@ def conduct(
 ) -> SessionEnd:
     """Run the session into `folder` and seal it, however it ended, unless it can be resumed.
 
-    `durable` as for the writer.
+    With `durable` False nothing waits for the disk.
 
     Raises RecordingError when the folder cannot be used or the disk takes no more.
     """
     operator, transducer, clock = taking_part
     info = None if transducer is None else transducer.info
     came_from = provenance(clock, settings)
-    writer = SessionWriter.create(folder, plan, info, came_from, subject_simulated=True, clock=clock, durable=durable)
+    kind = SessionWriter if durable else FleetingWriter
+    writer = kind.create(folder, plan, info, came_from, subject_simulated=True, clock=clock)
 
     def show(status: Status) -> None:
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials

@@ -4,10 +4,11 @@ from sessions.recording.errors import RecordingError
 from sessions.recording.log import LoggedEvent, Take, TrialRecord
 from sessions.recording.provenance import Setting, provenance
 from sessions.recording.reader import Recording
-from sessions.recording.writer import Acknowledged, SessionWriter
+from sessions.recording.writer import Acknowledged, FleetingWriter, SessionWriter
 
 __all__ = [
     "Acknowledged",
+    "FleetingWriter",
     "LoggedEvent",
     "Recording",
     "RecordingError",

@@ -50,6 +50,8 @@ class Acknowledged:
 class SessionWriter:
     """Writes one session into a folder of its own. Everything else is in memory until `acknowledged` counts it."""
 
+    durable = True  # a commit waits until it is on the disk
+
     def __init__(self, connection: sqlite3.Connection, path: Path, clock: Clock) -> None:
         """Use `SessionWriter.create`."""
         self._connection = connection
@@ -78,13 +80,11 @@ class SessionWriter:
         subject_simulated: bool = False,
         clock: Clock | None = None,
         reserve: int = 0,
-        durable: bool = True,
     ) -> Self:
         """Begin a recording in `folder`, which is made, or is empty: nothing is ever written over.
 
         `info` is None for a scores-only visit. `clock` times events and commits (the machine's when None). `reserve`
-        bytes are taken in advance, so that the end can be written on a full disk. With `durable` False, for invented
-        sessions only, nothing is waited for until it is on the disk: a power cut may lose all of it.
+        bytes are taken in advance, so that the end can be written on a full disk.
         Raises RecordingError when the folder holds something or cannot be written.
         """
         simulated = simulated_sentence(info, subject_simulated)
@@ -109,7 +109,7 @@ class SessionWriter:
             ) from error
         connection = sqlite3.connect(path, isolation_level=None)
         try:
-            _prepare(connection, head, durable=durable)
+            _prepare(connection, head, durable=cls.durable)
         except sqlite3.Error as error:
             connection.close()
             release_reserve(folder)
@@ -330,6 +330,12 @@ class SessionWriter:
         """Raise RecordingError when nothing can be written any more."""
         if self._failure is not None:
             raise RecordingError(f"{self._path}: {self._failure}")
+
+
+class FleetingWriter(SessionWriter):
+    """Writes an invented session: nothing waits for the disk, so a power cut may lose all of it."""
+
+    durable = False
 
 
 def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable: bool) -> None:

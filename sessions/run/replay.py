@@ -13,7 +13,7 @@ import msgspec
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
-from sessions.recording import Acknowledged, LoggedEvent, Recording, RecordingError, SessionWriter
+from sessions.recording import Acknowledged, FleetingWriter, LoggedEvent, Recording, RecordingError
 from sessions.recording.digests import digest_of
 from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
@@ -48,7 +48,6 @@ def replay(recording: Recording, folder: Path, speed: float | None, progress: Pr
         recording.provenance,
         subject_simulated="subject" in (recording.simulated_sentence or ""),
         clock=clock,
-        durable=False,
     )
     writer.follow(recording)
     if recording.plan.trials:
@@ -83,7 +82,7 @@ def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str
     )
 
 
-class _Rewriter(SessionWriter):
+class _Rewriter(FleetingWriter):
     """Writes a replay: each event has the instant at which it was recorded, for a replay makes no time of its own.
 
     A recording that was cut short is cut short here too, and the disk is not waited for: nothing can be lost.

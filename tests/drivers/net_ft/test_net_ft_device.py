@@ -151,7 +151,7 @@ FAULTS = st.lists(
 @given(timetable=FAULTS, seed=st.integers(0, 1000))
 def test_every_reading_is_received_or_named_as_lost_whatever_befalls_it(timetable, seed):
     faults = Faults(timetable, seed=seed, remember=True)
-    box = Electronics(Bench(seed), faults, rate=200, rate_error=0.0, first_tick=0)
+    box = Electronics(Bench(seed), faults, rate=200, first_tick=0)
     for k in range(200):
         faults.route(k / 200, [(k / 200, struct.pack(">I", k + 1) + box.readings([35 * k])[0])])
     faults.route(2.0, [])
