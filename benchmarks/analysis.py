@@ -35,25 +35,25 @@ def main() -> None:
         alone = _taken(lambda: analyse(Recording.open(folder)))
         drawn = _taken(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
         solved = _taken(lambda: predict(analysis, recording.plan, prediction.options))
-        told = _taken(lambda: with_intervals(analysis, prediction))
-        beside = _taken(lambda: with_alternatives(carried))
+        spans = _taken(lambda: with_intervals(analysis, prediction))
+        alternatives = _taken(lambda: with_alternatives(carried))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
     print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
     ways = [one.method for row in carried.trials for one in (row.interval, row.opposite_interval) if one]
     print(f"predicted both ways   {1000 * solved:6.0f} ms   at small strain")
-    print(f"intervals of the SEDs {1000 * told:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
-    print(f"side by side          {1000 * beside:6.0f} ms   at small strain")
+    print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
+    print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
 
 
 def _taken(work: Callable[[], object]) -> float:
     """Return the median processor time of some work [s]."""
-    found: list[float] = []
+    times: list[float] = []
     for _ in range(RUNS):
         began = time.process_time()
         work()
-        found.append(time.process_time() - began)
-    return median(found)
+        times.append(time.process_time() - began)
+    return median(times)
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ def _work(folder: Path) -> None:
     print(f"all {answers} trials are answered after {time.process_time() - begun:4.2f} s")
     report = next(one.report for one in said if isinstance(one, m.Found))
     stroke = next(s for s in report.strokes if s.steady is not None)
-    for words, asked in (
+    for words, request in (
         (
             "a moved edge, until numbers follow",
             m.Move(stroke.number, "steady begin", stroke.steady[0] + 0.05, "B", "b"),
@@ -65,7 +65,7 @@ def _work(folder: Path) -> None:
         ("second picture", m.Draw("friction")),
     ):
         begun = time.process_time()
-        work.do(asked)
+        work.do(request)
         print(f"{words:36s} {time.process_time() - begun:4.2f} s")
     film = next(one.film for one in said if isinstance(one, m.Filmed))
     _painting(film)

@@ -102,14 +102,14 @@ class Visit:
             surface = next(iter(surfaces.values()))
             time = np.arange(np.ceil(2.5 * number * RATE), 2.5 * (number + 1) * RATE) / RATE
             trial = Trial(len(surfaces) + 1 + number, "b", Stimulus("slipperiness", surface.index, "P"), 1, 1)
-            parts.append((trial, _block(time, self._felt(time, self._press(time - time[0])))))
+            parts.append((trial, _block(time, self._measured(time, self._press(time - time[0])))))
         begin = 2.5 * self._trouble.presses + 0.5
         for number, surface in enumerate(surfaces.values(), 1):
             self._bench.mount(surface)
             planted = self._bench.begin_stroke(self._subject.stroke(surface), begin)
             time = np.arange(np.ceil((begin - 0.2) * RATE), (planted.end + 0.6) * RATE) / RATE
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
-            parts.append((trial, _block(time, self._felt(time, self._exerted(time, planted)))))
+            parts.append((trial, _block(time, self._measured(time, self._exerted(time, planted)))))
             truths.append(self._truth(planted))
             begin = planted.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
@@ -155,15 +155,15 @@ class Visit:
         x, y = PUSH * self._hand.standard_normal((2, 1)) * normal
         return np.column_stack([x, y, -normal, -HEIGHT * y, HEIGHT * x, np.zeros_like(time)])
 
-    def _felt(self, time: Array, true: Array) -> Array:
+    def _measured(self, time: Array, true: Array) -> Array:
         """Return the wrench (n, 6) [N, N mm] that the transducer tells of a true one in the face's frame."""
         turned = np.hstack([true[:, :3] @ self._turn.T, true[:, 3:] @ self._turn.T])
-        felt = turned @ self._errors.T + self._bench.wrench(time) - self._bench.exerted(time)
+        measured = turned @ self._errors.T + self._bench.wrench(time) - self._bench.exerted(time)
         if self._trouble.hum:
-            felt[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
+            measured[:, :3] += self._trouble.hum * np.sin(2 * np.pi * 50.0 * time[:, None] + self._phases[3:6])
         if self._trouble.flicker:
-            felt[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
-        return felt
+            measured[:, :3] += self._trouble.flicker * _flicker(len(time), 3, (self._seed, int(time[0] * RATE)))
+        return measured
 
 
 def _block(time: Array, wrench: Array) -> ReadingBlock:
@@ -193,7 +193,7 @@ def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
 class Coverage:
     """How often intervals of a set hold what was planted."""
 
-    held: dict[str, float]  # of those given, by number [-]
+    hits: dict[str, float]  # of those given, by number [-]
     withheld: dict[str, float]  # share of strokes without one, by number [-]
     errors: dict[str, float]  # median of told over planted, less 1 [-]
     false_peaks: float  # share of strokes with a static peak [-]
@@ -201,7 +201,7 @@ class Coverage:
 
 def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], object] = lambda: None) -> Coverage:
     """Return how often intervals hold what was planted, over ten strokes of each seed."""
-    held: dict[str, list[bool | None]] = defaultdict(list)
+    hits: dict[str, list[bool | None]] = defaultdict(list)
     errors: dict[str, list[float]] = defaultdict(list)
     peaks: list[bool] = []
     for seed in seeds:
@@ -209,17 +209,17 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
         at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
         for number, truth in enumerate(truths, 1):
             at, stroke = at_trial.get(number, (0, None))
-            found = None if stroke is None else analysis.intervals[at]
+            intervals = None if stroke is None else analysis.intervals[at]
             peaks.append(stroke is not None and stroke.mu_static is not None)
             for name in NUMBERS:
-                ends = None if found is None else getattr(found, name)
-                held[name].append(None if ends is None else ends[0] <= truth[name] <= ends[1])
+                ends = None if intervals is None else getattr(intervals, name)
+                hits[name].append(None if ends is None else ends[0] <= truth[name] <= ends[1])
                 if ends is not None:
                     errors[name].append(getattr(stroke, name) / truth[name] - 1.0)
         progress()
     return Coverage(
-        {name: float(np.mean([hit for hit in hits if hit is not None] or [np.nan])) for name, hits in held.items()},
-        {name: hits.count(None) / len(hits) for name, hits in held.items()},
+        {name: float(np.mean([hit for hit in ones if hit is not None] or [np.nan])) for name, ones in hits.items()},
+        {name: ones.count(None) / len(ones) for name, ones in hits.items()},
         {name: float(np.median(errors[name] or [np.nan])) for name in NUMBERS},
         float(np.mean(peaks)),
     )
@@ -231,9 +231,9 @@ def main() -> None:
     head = ("set", *(f"`{name}` (withheld)" for name in NUMBERS), "static peaks")
     print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
     for name in sys.argv[3:] or SETS:
-        found = coverage(SETS[name], range(first, first + count))
-        cells = [f"{100 * found.held[n]:.1f} % ({100 * found.withheld[n]:.1f} %)" for n in NUMBERS]
-        print("| " + " | ".join((name, *cells, f"{100 * found.false_peaks:.1f} %")) + " |", flush=True)
+        measured = coverage(SETS[name], range(first, first + count))
+        cells = [f"{100 * measured.hits[n]:.1f} % ({100 * measured.withheld[n]:.1f} %)" for n in NUMBERS]
+        print("| " + " | ".join((name, *cells, f"{100 * measured.false_peaks:.1f} %")) + " |", flush=True)
 
 
 if __name__ == "__main__":

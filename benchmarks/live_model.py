@@ -27,7 +27,7 @@ def main() -> None:
     for kinematics in ("small", "finite"):
         _alone(kinematics, options.repeats)
     for _ in range(options.repeats):
-        _beside(options.seconds)
+        _with_readings(options.seconds)
     print(f"load of this computer: {os.getloadavg()[0]:.1f}")
 
 
@@ -54,11 +54,11 @@ def _alone(kinematics: str, repeats: int) -> None:
                 part = slice(i, i + size)
                 follower.take(Forces(at[part], -wrench[part, 2], -wrench[part, 0], 0, 1))
             took.append(time.process_time() - began)
-        told = f"{len(at) / statistics.median(took):.0f} steps a second of the processor"
-        print(f"alone, {kinematics} strain, {name}: {told}, median of {repeats}")
+        words = f"{len(at) / statistics.median(took):.0f} steps a second of the processor"
+        print(f"alone, {kinematics} strain, {name}: {words}, median of {repeats}")
 
 
-def _beside(seconds: float) -> None:
+def _with_readings(seconds: float) -> None:
     from daq_app.recorder.messages import Live
     from daq_app.window.live_model_process import LiveModel
     from sessions.plan.plan import Frame
@@ -84,8 +84,8 @@ def _beside(seconds: float) -> None:
                 ages.append(time.monotonic() - said.received_ns * 1e-9)
         time.sleep(1.0 / FRAMES)
     model.close()
-    told = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"
-    print(f"beside {RATE} Hz: {(model.predictions - before) / seconds:.0f} predictions a second, their age {told}")
+    words = f"{np.median(ages) * 1e3:.0f} ms at the median, {np.percentile(ages, 99) * 1e3:.0f} ms at 99 %"
+    print(f"beside {RATE} Hz: {(model.predictions - before) / seconds:.0f} predictions a second, their age {words}")
 
 
 def _block(first: int, last: int) -> tuple[np.ndarray, ...]:

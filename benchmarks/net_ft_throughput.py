@@ -40,22 +40,22 @@ SHOWN_EVERY = 1 / 60  # [s]
 
 def main() -> None:
     """Print a row for each rate."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--seconds", type=float, default=10.0)
-    options.add_argument("--every", type=float, default=2.0, help="the reader's pause between two hand-overs [ms]")
-    options.add_argument("--rates", type=int, nargs="+", default=[200, 1000, 7000])
-    options.add_argument("--beyond", type=int, nargs="+", default=[], help="rates to be sent ready packed, instead")
-    options.add_argument("--draw", action="store_true", help="let another process draw what is read")
-    given = options.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--every", type=float, default=2.0, help="the reader's pause between two hand-overs [ms]")
+    parser.add_argument("--rates", type=int, nargs="+", default=[200, 1000, 7000])
+    parser.add_argument("--beyond", type=int, nargs="+", default=[], help="rates to be sent ready packed, instead")
+    parser.add_argument("--draw", action="store_true", help="let another process draw what is read")
+    options = parser.parse_args()
     print(f"load of this computer: {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     print(f"{'':>8} {'received':>10} {'of them':>8} {'':>9} {'lag [ms]':>13} {'age [ms]':>13} {'CPU':>7} {'drawn':>8}")
     print(
         f"{'rate Hz':>8} {'a second':>10} {'lost':>8} {'malformed':>9} {'p50':>6} {'p99':>6} {'p50':>6} {'p99':>6} "
         f"{'% core':>7} {'a second':>8}"
     )
-    for rate in given.beyond or given.rates:
-        ready = rate in given.beyond
-        print(row(rate, given.seconds, given.every * 1e-3, drawing=given.draw, ready=ready), flush=True)
+    for rate in options.beyond or options.rates:
+        ready = rate in options.beyond
+        print(row(rate, options.seconds, options.every * 1e-3, drawing=options.draw, ready=ready), flush=True)
     print(f"load of this computer: {os.getloadavg()[0]:.1f}")
 
 
@@ -171,10 +171,10 @@ def draw(rate: int, pipe: Connection) -> None:
         while pipe.poll():
             arrived.append(pipe.recv())
         ended = arrived[-1] is None
-        for told in filter(None, arrived):
-            values = np.full((len(CHANNELS), len(told[0])), np.nan)
-            values[:6] = told[1].T
-            trace.add(told[0], values)
+        for readings in filter(None, arrived):
+            values = np.full((len(CHANNELS), len(readings[0])), np.nan)
+            values[:6] = readings[1].T
+            trace.add(readings[0], values)
         if (newest := trace.newest) is not None:
             columns = trace.columns(newest - 10.0, newest, 1200)
             for plot in plots:

@@ -73,8 +73,8 @@ class PlayedRecorder:
 
 def health(**counts: int) -> m.HealthReport:
     """Return a report of a bench that is well, save for these counts."""
-    told = Health(received=123_456, lag_ms=2.0, **counts)
-    return m.HealthReport(told, 6999.7, (0.0,) * 6, (0.0,) * 6, 0)
+    totals = Health(received=123_456, lag_ms=2.0, **counts)
+    return m.HealthReport(totals, 6999.7, (0.0,) * 6, (0.0,) * 6, 0)
 
 
 def logged(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:

@@ -47,10 +47,10 @@ def measure(uri: str, rate: int, seconds: float, room: Path) -> None:
             until(recorder, m.SessionBegun)
             if number == 0:
                 listen(recorder, seconds)
-            asked = time.perf_counter()
+            stop_time = time.perf_counter()
             recorder.send(m.Stop())
             until(recorder, m.SessionEnded)
-            stops.append(time.perf_counter() - asked)
+            stops.append(time.perf_counter() - stop_time)
         print(f"{rate} Hz: from a stop to the written end, median of {STOPS}: {statistics.median(stops) * 1e3:.0f} ms")
 
 

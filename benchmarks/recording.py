@@ -109,14 +109,14 @@ def measure(folder: Path, seconds: int) -> None:
     before = memory()
     with timed("reading it whole"):
         block = recording.readings()
-    held = sum(getattr(block, name).nbytes for name in COLUMNS) / 1e6
-    print(f"{len(block)} readings, {held:.0f} MB; memory grew by {memory() - before:.0f} MB")
+    size = sum(getattr(block, name).nbytes for name in COLUMNS) / 1e6
+    print(f"{len(block)} readings, {size:.0f} MB; memory grew by {memory() - before:.0f} MB")
     del block
     with timed("sealing"):
         seal(folder)
     with timed("checking"):
-        found = problems(folder)
-    print(f"{len(found)} problems; largest memory: {memory():.0f} MB")
+        damage = problems(folder)
+    print(f"{len(damage)} problems; largest memory: {memory():.0f} MB")
 
 
 if __name__ == "__main__":

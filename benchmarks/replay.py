@@ -27,13 +27,13 @@ def main() -> None:
             began = time.perf_counter()
             again = replay(recording, Path(room) / f"replay-{number}", None, lambda *_: None)
             replayed.append(time.perf_counter() - began)
-            found = [*different_readings(recording, again), *different_events(recording, again)]
+            differences = [*different_readings(recording, again), *different_events(recording, again)]
             analyse(again)
             compared.append(time.perf_counter() - began)
     print(f"session of {lasted:.1f} s, {recording.events[-1].readings} readings")
     print(f"replayed in {median(replayed):.3f} s: {lasted / median(replayed):.0f} times real time (median of {RUNS})")
     print(f"compared and analysed too: {median(compared):.3f} s, {lasted / median(compared):.0f} times real time")
-    print(f"differences: {len(found)}")
+    print(f"differences: {len(differences)}")
 
 
 if __name__ == "__main__":

@@ -63,8 +63,8 @@ def row(study: Study, planted: str, alike: set[str], weights: Sequence[Mapping[s
         sure.count(planted),
         sum(name not in alike for name in sure),
     ]
-    told = " | ".join(f"{100 * count / len(weights):.1f} %" for count in counts)
-    return f"| {study.name} | `{planted}` | {len(alike) - 1} | {told} | {most} |"
+    shares = " | ".join(f"{100 * count / len(weights):.1f} %" for count in counts)
+    return f"| {study.name} | `{planted}` | {len(alike) - 1} | {shares} | {most} |"
 
 
 def main() -> None:

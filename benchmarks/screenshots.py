@@ -42,10 +42,10 @@ def main() -> None:
 
 
 def _settings() -> list[str]:
-    made: list[str] = []
+    settings: list[str] = []
     for number, ((width, height), scale, theme) in enumerate(itertools.product(SIZES, SCALES, THEMES)):
-        made.append(f"{width}x{height}-{scale:g}-{theme}-{LOCALES[number % 2]}")
-    return made
+        settings.append(f"{width}x{height}-{scale:g}-{theme}-{LOCALES[number % 2]}")
+    return settings
 
 
 def _take(setting: str, out: Path, session: Path | None) -> None:

@@ -175,15 +175,15 @@ class _Watched:
 
 def _processor() -> dict[str, float]:
     """Return the processor time of the window's process and of those it started [s]; Linux alone knows the latter."""
-    found = {"window": sum(os.times()[:2])}
+    seconds = {"window": sum(os.times()[:2])}
     for status in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             parts = status.read_text().rsplit(")", 1)[1].split()
             if int(parts[1]) == os.getpid():
                 command = (status.parent / "cmdline").read_text()
                 name = "recorder" if "daq_app.recorder" in command else f"helper {status.parent.name}"
-                found[name] = (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
-    return found
+                seconds[name] = (int(parts[11]) + int(parts[12])) / os.sysconf("SC_CLK_TCK")
+    return seconds
 
 
 def _parts(seconds: object) -> str:

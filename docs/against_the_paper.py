@@ -39,8 +39,8 @@ POINTS = """## What the paper shows
 
 def page() -> str:
     """Return the page in Markdown."""
-    found = {name: _solved(series) for name, series in SERIES.items()}
-    return HEAD + POINTS + _tables(found) + _claims(found)
+    rows_of = {name: _solved(series) for name, series in SERIES.items()}
+    return HEAD + POINTS + _tables(rows_of) + _claims(rows_of)
 
 
 def _solved(series: tuple[Surface, ...]) -> list[dict[str, float]]:
@@ -69,9 +69,9 @@ def _solved(series: tuple[Surface, ...]) -> list[dict[str, float]]:
     return rows
 
 
-def _tables(found: Mapping[str, list[dict[str, float]]]) -> str:
+def _tables(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
     lines = ["## The ten surfaces", ""]
-    for name, rows in found.items():
+    for name, rows in rows_of.items():
         way = "proximal to distal, 2 mm deep" if name == "stickiness" else "distal to proximal, 1.5 mm deep"
         lines += [
             f"{name.capitalize()}, {way}. SED in kPa; at finite strain on a coarse mesh, good to a few percent.",
@@ -95,9 +95,9 @@ def _or_none(value: float) -> str:
     return f"{value:.2f}" if np.isfinite(value) else "no slide"
 
 
-def _claims(found: Mapping[str, list[dict[str, float]]]) -> str:
-    sticky, slippery = found["stickiness"], found["slipperiness"]
-    r = {name: pearson([row["index"] for row in rows], [row["sed"] for row in rows]) for name, rows in found.items()}
+def _claims(rows_of: Mapping[str, list[dict[str, float]]]) -> str:
+    sticky, slippery = rows_of["stickiness"], rows_of["slipperiness"]
+    r = {name: pearson([row["index"] for row in rows], [row["sed"] for row in rows]) for name, rows in rows_of.items()}
     bounds = {
         name: pearson([float(one.index) for one in series], [one.printed_bound for one in series])
         for name, series in SERIES.items()

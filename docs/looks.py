@@ -60,7 +60,7 @@ def contrast(first: str, second: str) -> float:
 
 def write_pictures(folder: Path) -> None:
     """Write a picture of the window's parts in each theme, made by the program's own style."""
-    held = QApplication.instance() or QApplication([])
+    application = QApplication.instance() or QApplication([])
     for name, theme in THEMES.items():
         shown = _parts()
         shown.setStyle(QStyleFactory.create("Fusion"))
@@ -68,7 +68,7 @@ def write_pictures(folder: Path) -> None:
         shown.setStyleSheet(tokens.style_sheet(theme, 1.0))
         shown.resize(640, 260)
         shown.grab().save(str(folder / f"looks-{name}.png"))
-    del held
+    del application
 
 
 def _parts() -> QWidget:
@@ -85,9 +85,9 @@ def _parts() -> QWidget:
     rows.setCurrentRow(1)
     grid.addWidget(rows, 3, 1)
     for at, grade in enumerate(("wrong", "look")):
-        made = label(f"This is {grade}.", "value")
-        made.setProperty("grade", grade)
-        grid.addWidget(made, at + 1, 2)
+        graded = label(f"This is {grade}.", "value")
+        graded.setProperty("grade", grade)
+        grid.addWidget(graded, at + 1, 2)
     return shown
 
 

@@ -9,6 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("daq_app", "drivers", "sessions", "simulators", "solver")
+SCRIPTS = ("benchmarks", "docs")  # no packages of the program, but with the same words
 PRIVATE_IN = ("sessions", "daq_app", "drivers", "simulators")  # packages whose underscore names stay in their files
 GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
 ROWS = [line.split("|") for line in GLOSSARY.splitlines() if line.startswith("|")]
@@ -30,7 +31,11 @@ TABLET = Path("daq_app", "tablet", "server.py")  # asked for by `--subject-scree
 @pytest.fixture(scope="module")
 def trees() -> dict[Path, ast.Module]:
     """Return every module of ours, parsed once."""
-    files = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    return parsed(PACKAGES)
+
+
+def parsed(folders: tuple[str, ...]) -> dict[Path, ast.Module]:
+    files = [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
     return {path.relative_to(ROOT): ast.parse(path.read_text(encoding="utf-8")) for path in files}
 
 
@@ -55,7 +60,8 @@ def test_the_glossary_names_what_a_thing_is_not_called():
 
 
 def test_no_name_says_only_what_happened_to_a_value(trees):
-    ordered = {file: tree for file, tree in trees.items() if not file.as_posix().startswith(UNORDERED)}
+    every = trees | parsed(SCRIPTS)
+    ordered = {file: tree for file, tree in every.items() if not file.as_posix().startswith(UNORDERED)}
     names = {
         file: {name.strip("_").lower() for name in identifiers(file, tree)} & PARTICIPLES
         for file, tree in ordered.items()
@@ -66,7 +72,7 @@ def test_no_name_says_only_what_happened_to_a_value(trees):
 
 def test_no_name_of_the_column_not_this_is_used(trees):
     found = []
-    for file, tree in trees.items():
+    for file, tree in (trees | parsed(SCRIPTS)).items():
         names = {name.strip("_") for name in identifiers(file, tree)} & set(NOT_THIS)
         found += [
             f"{file}: {name}" for name in sorted(names - (ONLY_IN_SOLVER if file.parts[0] == "solver" else set()))
