@@ -5,6 +5,8 @@ import threading
 import time
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tempfile import mkdtemp
 from types import SimpleNamespace
 
 import pytest
@@ -68,10 +70,11 @@ def test_every_driver_with_bytes_of_its_own_has_a_hostile_device():
 @pytest.fixture(scope="module")
 def attempts(tmp_path_factory):
     """Of each hostile device what connecting said and how long it took [s]; all at once, for they mostly wait."""
+    room = tmp_path_factory.mktemp("devices")  # its factory is not made for threads
     threads = set(threading.enumerate())
 
     def attempt(name):
-        device, opened = HOSTILE[name](tmp_path_factory.mktemp("device")), []
+        device, opened = HOSTILE[name](Path(mkdtemp(dir=room))), []
         try:
             began = time.monotonic()
             sentence = connect(device.uri, opened)
@@ -103,9 +106,10 @@ PATIENT = [name for name in HOSTILE if "drips" not in name and "any baud" not in
 @pytest.fixture(scope="module")
 def stops(tmp_path_factory):
     """Of each hostile device how long a stop took [s], and whether connecting ended with it; all at once."""
+    room = tmp_path_factory.mktemp("devices")
 
     def stop(name):
-        device, opened = HOSTILE[name](tmp_path_factory.mktemp("device")), []
+        device, opened = HOSTILE[name](Path(mkdtemp(dir=room))), []
         connecting = threading.Thread(target=lambda: connect(device.uri, opened))
         try:
             connecting.start()
