@@ -135,7 +135,7 @@ class _Places:
         self.window.show()
         self.subject = self.window.subject
         self.subject.resize(*size)
-        self.window.show_subject = self.subject.show
+        self.window.side.show = self.subject.show
         self.now = 0.0
 
     def all(self) -> None:

@@ -21,7 +21,6 @@ from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
-from daq_app.qt.keyboard import Keyboard
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.menus import Menus
 from daq_app.qt.middle import Middle
@@ -29,14 +28,15 @@ from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
-from daq_app.qt.screens import line_settings, millimetres
+from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_preview import open_preview
+from daq_app.qt.subject_side import SubjectSide
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tablet_screen import TabletScreen
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
-from daq_app.window.messages import Message, NewSession
+from daq_app.window.messages import NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
@@ -81,14 +81,10 @@ class MainWindow(QMainWindow):
         self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
         self.strip = BenchStrip(tokens, scale, self._fold_bench)
         self.subject = SubjectWindow(tokens, scale, bridge.session_now)
-        self.subject.answered.connect(self._answered)
-        self.subject.screen_changed.connect(self._line_changed)
         self.tablet = tablet
-        if tablet is not None:
-            tablet.answered.connect(bridge.send)
-            tablet.changed.connect(self._tablet_changed)
-        self.keyboard = Keyboard(self, self.course.plan, self.subject, self.act)
-        self.keyboard.free.connect(self._bring_subject)
+        self.side = SubjectSide(self, bridge, self.subject, tablet, self.course, self.act)
+        self.side.line_changed.connect(self._line_changed)
+        self.keyboard = self.side.keyboard
         self.rooms = Rooms(bridge, tokens, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
         self._acts = self._table()
         self._left = QStackedWidget()
@@ -128,7 +124,7 @@ class MainWindow(QMainWindow):
             self.to_do.show_what(course.headline, course.primary, course.direction)
         self.to_do.second.setVisible(self.rooms.over)
         self.rooms.show_state()
-        self._show_subject_view(view)
+        self.side.show_view(view)
 
     def set_tokens(self, tokens: Tokens) -> None:
         """Follow another theme."""
@@ -146,28 +142,6 @@ class MainWindow(QMainWindow):
         ):
             part.set_tokens(tokens)
 
-    def show_subject(self) -> None:
-        """Show the subject's window, and let the keyboard go to it from whatever is being typed."""
-        if self.keyboard.typed_in() is not None:
-            self.setFocus()
-        self._place_subject(activating=True)
-        self._show_subject_view(self.bridge.view)  # which a window that is hidden need not have
-        self.subject.raise_()
-        self.subject.activateWindow()
-
-    def _place_subject(self, *, activating: bool) -> None:
-        """Show the subject's window: on a second screen where there is one."""
-        here = self.screen()
-        others = [screen for screen in QGuiApplication.screens() if screen is not here]
-        self.subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
-        if others and not self.subject.isVisible():
-            self.subject.setGeometry(others[0].availableGeometry())
-            self.subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
-        elif not others and activating and self.subject.scoring:
-            self.subject.setGeometry(self.geometry())
-        if others or activating:
-            self.subject.show()
-
     def act(self, act: str) -> None:
         """Do what a key, a button or an entry of the menu stands for."""
         if act in COURSE and self.rooms.room == "review":
@@ -179,7 +153,7 @@ class MainWindow(QMainWindow):
         elif act in ("redo", "skip", "note", "no answer", "end") and self.course.isVisible():
             self.course.ask(act)
             if self.course.asking:
-                self._come_back()
+                self.side.come_back()
 
     def _table(self) -> dict[str, Callable[[], object]]:
         """Return what is done for each act that is not the course panel's own."""
@@ -202,8 +176,8 @@ class MainWindow(QMainWindow):
             "pilot": self._pilot,
             "preview": self._preview,
             "tablet": lambda: self.tablet and self.tablet.server.renew(),
-            "subject": self.show_subject,
-            "ruler": lambda: (self.show_subject(), self.subject.check_ruler()),
+            "subject": self.side.show,
+            "ruler": lambda: (self.side.show(), self.subject.check_ruler()),
             "open": self.rooms.choose,
             "report": lambda: (at := self.rooms.analyst) and at.write_report(),
             "export": lambda: (at := self.rooms.analyst) and at.write_export(),
@@ -300,8 +274,7 @@ class MainWindow(QMainWindow):
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        line = line_settings(self.subject.screen()) if self.tablet is None else self.tablet.line_settings()
-        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), line)
+        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
         if isinstance(made, Refused):
             self.notice.warn(" ".join(made.sentences.values()))
             return
@@ -332,67 +305,22 @@ class MainWindow(QMainWindow):
                 self.page.subject.clear()  # the next session is not begun by whoever was there last
                 self.page.look_for_unfinished()
 
-    def _show_subject_view(self, view: View) -> None:
-        session = self.bridge.state.session
-        self.course.mirror.show_view(view.mirror, self.subject.size())
-        if self.tablet is not None:
-            self.tablet.session_offset = self.bridge.session_offset
-            self.tablet.show_view(view.subject, session)
-            if not self.subject.isVisible():
-                return  # no key here is an answer
-        hand = None if session is None else session.plan.answering_hand
-        was_scoring = self.subject.scoring
-        self.subject.show_view(view.subject, hand)
-        if not was_scoring:
-            self._bring_subject()
-
-    def _tablet_changed(self) -> None:
-        """Say what is known of the tablet, and that it has gone where an answer is due."""
-        self._line_changed()
-        assert self.tablet is not None
-        if self.bridge.recording and not self.tablet.server.connected:
-            self.notice.warn(tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here."))
-
-    def _bring_subject(self) -> None:
-        """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""
-        session = self.bridge.state.session
-        if not self.subject.scoring or session is None or session.people == "simulated people":
-            return
-        active = QGuiApplication.applicationState() == Qt.ApplicationState.ApplicationActive
-        if active and self.keyboard.typed_in() is None:
-            self.show_subject()
-        else:
-            self._place_subject(activating=False)
-
-    def _come_back(self) -> None:
-        """Let the keyboard come back to this window, which comes to the front where it shares a screen."""
-        if len(QGuiApplication.screens()) == 1:
-            self.subject.hide()
-            self.raise_()
-        self.activateWindow()
-
     def _line_changed(self) -> None:
         if self.tablet is None:
             self.page.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
             self.page.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
+            if self.bridge.recording and not self.tablet.server.connected:
+                words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+                self.notice.warn(words)
         if self.bridge.view.course is None:
             self._form_changed()
-
-    def _answered(self, event: Message) -> None:
-        self.bridge.send(event)
-        field = self.keyboard.typed_in()
-        if field is None or field.window() is self:
-            self._come_back()
 
     def _draw(self) -> None:
         session = self.bridge.state.session
         try:
             self.live.model_says()
-            if self.tablet is not None and self.bridge.view.subject.force:
-                self.tablet.show_force(self.bridge.feed.trace)
-            if self.subject.press.isVisible():
-                self.subject.press.show_force(self.bridge.feed.trace)
+            self.side.show_force()
             self.live.draw(() if session is None else session.marks, self.bridge.state.now)
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)

@@ -92,17 +92,8 @@ class NewSessionPage(QFrame):
         self.stroking, self.answering = _hands(tr("stroking hand")), _hands(tr("answering hand"))
         self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
         self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
-        self.with_forces = QRadioButton(tr("Forces, with the transducer"))
-        self.scores_only = QRadioButton(tr("Scores only"))
-        self.people_score = QRadioButton(tr("People"))
-        self.simulated = QRadioButton(tr("Rehearse, simulated"))
-        for pair, chosen in (((self.with_forces, self.scores_only), 0), ((self.people_score, self.simulated), 0)):
-            group = QButtonGroup(self)
-            for made in pair:
-                group.addButton(made)
-                made.setAccessibleName(made.text())
-                made.setMinimumHeight(TARGET - GRID)
-            pair[chosen].setChecked(True)
+        self.with_forces, self.scores_only = self._either(tr("Forces, with the transducer"), tr("Scores only"))
+        self.people_score, self.simulated = self._either(tr("People"), tr("Rehearse, simulated"))
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
         self.screen_fields = ScreenFields(tokens, scale, act)
@@ -120,6 +111,16 @@ class NewSessionPage(QFrame):
         self._follow()
         self._place_changed()
         self._show_study()
+
+    def _either(self, *words: str) -> list[QRadioButton]:
+        """Return buttons of which one is pressed, the first to begin with."""
+        group, made = QButtonGroup(self), [QRadioButton(one) for one in words]
+        for one in made:
+            group.addButton(one)
+            one.setAccessibleName(one.text())
+            one.setMinimumHeight(TARGET - GRID)
+        made[0].setChecked(True)
+        return made
 
     def _follow(self) -> None:
         """Let every field say that it has changed, and show what depends on it."""

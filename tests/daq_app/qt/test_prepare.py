@@ -46,8 +46,10 @@ def test_the_card_of_the_transducer_says_its_zero_noise_and_life_and_enter_conne
     window.act("tare")
     driver.until(lambda: driver.state.bench.zero is not None and not driver.state.bench.taring, "a zero")
     zero = driver.state.bench.zero
+    driver.until(
+        lambda: row.words.text().startswith("SIMULATED Net F/T SI-36-0.5: nothing lost.\n"), "readings in time"
+    )
     said = row.words.text().split("\n")
-    assert said[0] == "SIMULATED Net F/T SI-36-0.5: nothing lost."
     assert said[1] == f"Zero: over {zero.duration:.1f} s, n = {zero.readings}."
     assert said[2].startswith(f"Noise: {1000 * max(zero.noise[:3]):.2g} mN")
     assert said[3].startswith("Life: ")
