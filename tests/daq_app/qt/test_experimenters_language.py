@@ -23,14 +23,15 @@ from daq_app import wording
 from daq_app.cli.verbs.translate import window_texts
 from daq_app.qt import remembered
 from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
+from sessions.exchange import FORMATS
+from sessions.plan.protocols import protocol_names
 
 pytestmark = pytest.mark.qt
 
 # What no translator is given: what was recorded, named or typed, units, formats of files, names of keys.
 DATA = re.compile(
-    r"SIMULATED Net F/T[^:]*|SIM00000|sensotact-friction|constant-stimuli|magnitude-estimation|paired-comparison|three"
-    r"|adaptive-comparison"
-    r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|bids|csv|hdf5|nwb|analyst|dragged by hand"
+    "|".join((*protocol_names(), *FORMATS)) + r"|SIMULATED Net F/T[^:]*|SIM00000|three"
+    r"|stickiness|slipperiness|/\S*|English \(en\)|kPa|SED|SVG|PNG|CSV|analyst|dragged by hand"
     r"|counts per unit read from|Ctrl|P01_\S*|<[^>]*>|&\w+;"
 )
 SESSIONS_OWN = ("SIMULATED: the transducer and",)  # sentences of a recording, which the report has too
