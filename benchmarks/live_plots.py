@@ -85,7 +85,7 @@ def _by_pyqtgraph():  # noqa: ANN202
     _shown(plots)
 
     def draw(now: float) -> None:
-        for plot, own, (onset, lift, steady), (wide, _) in zip(plots, curves, marks, SIZES, strict=True):
+        for _plot, own, (onset, lift, steady), (wide, _) in zip(plots, curves, marks, SIZES, strict=True):
             at, values = _values(now, len(own), wide // 2)
             for curve, row in zip(own, values, strict=True):
                 curve.setData(at - now, row, skipFiniteCheck=True)

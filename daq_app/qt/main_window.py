@@ -25,6 +25,7 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.menus import Menus
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
+from daq_app.qt.parts import scrolled
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
@@ -48,7 +49,7 @@ COURSE = frozenset({"primary", "redo", "skip", "pause", "note", "no answer", "en
 WIDE = 1366  # below it the bench folds to a strip of lamps
 ROOMY = 1100  # below it the six axes and the sample fold away
 TALL = 620  # below it the type of the headline is smaller
-LOW = 500  # below it an empty notice gives up its line
+LOW = 540  # below it an empty notice gives up its line
 CARDS, PLAN = 600, 316  # widths of the checklist and of the plan
 LEAST_CARDS = 260  # width in which no field of the checklist is cut
 LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
@@ -357,7 +358,9 @@ class MainWindow(QMainWindow):
     def _placed(self) -> QWidget:
         window = QWidget()
         window.setObjectName("window")
-        body = QHBoxLayout()
+        panels = QWidget()
+        body = _Panels(panels)
+        body.setContentsMargins(0, 0, 0, 0)
         body.setSpacing(GRID)
         body.addWidget(self._left, 4)
         body.addWidget(self.middle, 3)
@@ -370,7 +373,7 @@ class MainWindow(QMainWindow):
         layout.setSpacing(GRID)
         layout.addWidget(self.notice)
         layout.addWidget(self.to_do)
-        layout.addLayout(body, 1)
+        layout.addWidget(scrolled(panels), 1)
         self.rooms.addWidget(here)
         frame = QGridLayout(window)
         frame.setContentsMargins(GRID, GRID // 2, GRID, GRID)
@@ -381,3 +384,11 @@ class MainWindow(QMainWindow):
         frame.setRowStretch(1, 1)
         frame.setColumnStretch(1, 1)
         return window
+
+
+class _Panels(QHBoxLayout):
+    """The panels beside each other: only where the window is lower than their least heights are they scrolled."""
+
+    def hasHeightForWidth(self) -> bool:  # noqa: N802  Qt's name
+        """Say no: a scroll area would give panels with words that wrap the height that they like best."""
+        return False

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import button, label, panel, regrade, say, scrolled
+from daq_app.qt.parts import Wrapped, button, panel, regrade, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
@@ -30,7 +30,7 @@ class Middle(QWidget):
         self.strip = TrialStrip(scale, self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
         self.trial = InspectedTrial(tokens, scale, self.leave)
-        self.stroke = label("", wrap=True)
+        self.stroke = Wrapped("value")
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
         self.undo.hide()
@@ -122,6 +122,7 @@ class Middle(QWidget):
         self.strip.show_inspected(None if shown is None else shown.number)
 
     def _show_stroke(self, words: str, details: str, grade: str) -> None:
-        say(self.stroke, words, tr("The last stroke:"))
+        self.stroke.show_text(words)
+        self.stroke.setAccessibleName(f"{tr('The last stroke:')} {words}")
         self.stroke.setToolTip(details)
         regrade(self.stroke, grade)

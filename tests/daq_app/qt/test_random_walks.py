@@ -4,6 +4,7 @@ import os
 import random
 import signal
 import time
+from contextlib import suppress
 
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
@@ -134,7 +135,8 @@ class Walk:
         bridge = self.window.bridge
         what = self.random.choice(("killed", "unplugged", "plugged", "wrong address"))
         if what == "killed" and self.driver.state.gone is None:
-            os.kill(bridge._client.pid, signal.SIGKILL)
+            with suppress(ProcessLookupError):  # killed a moment ago, and the window has not heard of it
+                os.kill(bridge._client.pid, signal.SIGKILL)
         elif what == "unplugged":
             bridge.send(Disconnect())
         elif what == "plugged":

@@ -7,7 +7,16 @@ import pytest
 from PySide6.QtCore import QEvent, QLocale, QPointF, Qt
 from PySide6.QtGui import QAccessible, QColor, QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLabel, QLineEdit, QListWidget, QWidget
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QListWidget,
+    QScrollArea,
+    QWidget,
+)
 
 from daq_app.qt import score_line, screens, tokens
 from daq_app.qt.keys import KEYS, act_of
@@ -104,6 +113,22 @@ def test_the_window_fits_the_screen_and_nothing_is_laid_over_anything_else(drive
     for i, box in enumerate(boxes):
         assert window.rect().contains(box)
         assert not any(box.intersects(other) for other in boxes[i + 1 :])
+    window.resize(1440, 900)
+
+
+def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
+    window = driver.window
+    window.resize(683, 384)  # a screen of 1366 x 768 that shows everything twice as large
+    driver.application.processEvents()
+    assert (window.width(), window.height()) == (683, 384)
+    area = next(area for area in window.rooms.findChildren(QScrollArea) if area.isAncestorOf(window.middle))
+    assert area.horizontalScrollBar().maximum() == 0
+    for shown in (window.middle.redo, window.live.plots[1], window.to_do.primary):
+        if area.isAncestorOf(shown):
+            area.ensureWidgetVisible(shown)
+        place = shown.rect().translated(shown.mapTo(window, shown.rect().topLeft()))
+        assert window.rect().contains(place)
+        assert shown.height() >= shown.minimumHeight()
     window.resize(1440, 900)
 
 
