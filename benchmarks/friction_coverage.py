@@ -2,6 +2,7 @@
 
 Every bench errs as its stated accuracy allows: gains and cross-talk of the forces are drawn with a standard deviation
 of 1 %, the tilt of the face with 1° about each axis. A set adds its own trouble. None of its strokes has a static peak.
+Beside a share stands that of the errors alone which all strokes of a bench have in common: chance is in both alike.
 
 Run from the repository's root: python -m benchmarks.friction_coverage [SEEDS [FIRST [SET ...]]]; by default 100 seeds
 from 5000.
@@ -9,7 +10,7 @@ from 5000.
 
 import sys
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +21,9 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import Analysis, analyse_blocks
+from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.systematic import SystematicDraws, drag_direction
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
 from simulators.subject import SimulatedSubject
 from simulators.surface import CONTACT_AREA, paper_surfaces
@@ -93,10 +96,11 @@ class Visit:
         self._slips_each = draw.uniform(5.0, 15.0)  # [Hz]
         self._drop = draw.uniform(0.1, 0.3)  # of mu in each slip [-]
 
-    def strokes(self) -> tuple[Analysis, list[Truth]]:
-        """Return the analysis of the ten strokes, and what was planted in each."""
+    def strokes(self) -> tuple[Analysis, list[Truth], list[Array]]:
+        """Return the analysis of the ten strokes, what was planted in each, and its true force (3,) half-way [N]."""
         parts: list[tuple[Trial, ReadingBlock]] = []
         truths: list[Truth] = []
+        forces: list[Array] = []
         surfaces = paper_surfaces()
         for number in range(self._trouble.presses):
             surface = next(iter(surfaces.values()))
@@ -111,10 +115,34 @@ class Visit:
             trial = Trial(number, "b", Stimulus("slipperiness", surface.index, f"K{number}"), surface.direction, 1)
             parts.append((trial, _block(time, self._measured(time, self._exerted(time, planted)))))
             truths.append(self._truth(planted))
+            forces.append(self._exerted(np.array([np.mean(planted.steady)]), planted)[0, :3])
             begin = planted.end + 1.0
         blocks = (Block("b", "", 1, 2.0, ("", ""), tuple(trial for trial, _ in parts)),)
         plan = SessionPlan("sensotact", "S1", 0, "given", blocks, forces=True, frame=Frame("-z", "set", HEIGHT, "set"))
-        return analyse_blocks(parts, plan, INFO, AnalysisSettings()), truths
+        return analyse_blocks(parts, plan, INFO, AnalysisSettings()), truths, forces
+
+    def errors_alone(self, force: Array, settings: BootstrapSettings) -> dict[str, bool]:
+        """Say whether intervals of nothing but gains, cross-talk and lean hold mu and T of a true force (3,) [N]."""
+        measured = self._errors[:3, :3] @ self._turn @ force
+        accuracy = (settings.gain_error, settings.cross_talk)
+        lean = settings.tilt, settings.tilt_error
+        shared = SystematicDraws(settings.repeats, settings.seed, accuracy, *lean, presses=settings.tilt_presses)
+        along = drag_direction(measured[None, :2])
+        drag, normal = float(np.hypot(*measured[:2])), -float(measured[2])
+        true = float(np.hypot(*force[:2]))
+        draws = {
+            "mu_dynamic": (shared.ratio(drag / normal, along), drag / normal, true / -float(force[2])),
+            "tau_max": (drag * shared.gain_t + shared.shares(along)[0] * normal, drag, true),
+        }
+        ends = {
+            name: (*np.quantile(draw, (0.025, 0.975)), reported, truth)
+            for name, (draw, reported, truth) in draws.items()
+        }
+        levelled = settings.tilt == (0.0, 0.0)
+        return {
+            name: low <= truth <= high or (not levelled and min(low, reported) <= truth <= max(high, reported))
+            for name, (low, high, reported, truth) in ends.items()
+        }
 
     def _truth(self, planted: PlantedStroke) -> Truth:
         steady = np.linspace(*planted.steady, FINE)
@@ -194,18 +222,22 @@ class Coverage:
     """How often intervals of a set hold what was planted."""
 
     hits: dict[str, float]  # of those given, by number [-]
+    alone: dict[str, float]  # share that the errors in common alone would hold, by number [-]
     withheld: dict[str, float]  # share of strokes without one, by number [-]
-    errors: dict[str, float]  # median of told over planted, less 1 [-]
     false_peaks: float  # share of strokes with a static peak [-]
 
 
-def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], object] = lambda: None) -> Coverage:
+def coverage(trouble: Trouble, seeds: Sequence[int]) -> Coverage:
     """Return how often intervals hold what was planted, over ten strokes of each seed."""
     hits: dict[str, list[bool | None]] = defaultdict(list)
-    errors: dict[str, list[float]] = defaultdict(list)
+    alone: dict[str, list[bool]] = defaultdict(list)
     peaks: list[bool] = []
     for seed in seeds:
-        analysis, truths = Visit(seed, trouble).strokes()
+        visit = Visit(seed, trouble)
+        analysis, truths, forces = visit.strokes()
+        for force in forces:
+            for name, holds in visit.errors_alone(force, analysis.bootstrap).items():
+                alone[name].append(holds)
         at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
         for number, truth in enumerate(truths, 1):
             at, stroke = at_trial.get(number, (0, None))
@@ -214,13 +246,10 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
             for name in NUMBERS:
                 ends = None if intervals is None else getattr(intervals, name)
                 hits[name].append(None if ends is None else ends[0] <= truth[name] <= ends[1])
-                if ends is not None:
-                    errors[name].append(getattr(stroke, name) / truth[name] - 1.0)
-        progress()
     return Coverage(
         {name: float(np.mean([hit for hit in ones if hit is not None] or [np.nan])) for name, ones in hits.items()},
+        {name: float(np.mean(ones)) for name, ones in alone.items()},
         {name: ones.count(None) / len(ones) for name, ones in hits.items()},
-        {name: float(np.median(errors[name] or [np.nan])) for name in NUMBERS},
         float(np.mean(peaks)),
     )
 
@@ -228,12 +257,14 @@ def coverage(trouble: Trouble, seeds: Sequence[int], progress: Callable[[], obje
 def main() -> None:
     """Print a row for each set, as the documentation holds them."""
     count, first = (int(sys.argv[1]) if len(sys.argv) > 1 else 100), (int(sys.argv[2]) if len(sys.argv) > 2 else 5000)
-    head = ("set", *(f"`{name}` (withheld)" for name in NUMBERS), "static peaks")
+    head = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
     print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
     for name in sys.argv[3:] or SETS:
         measured = coverage(SETS[name], range(first, first + count))
-        cells = [f"{100 * measured.hits[n]:.1f} % ({100 * measured.withheld[n]:.1f} %)" for n in NUMBERS]
-        print("| " + " | ".join((name, *cells, f"{100 * measured.false_peaks:.1f} %")) + " |", flush=True)
+        alone = {n: f" ({100 * share:.1f} %)" for n, share in measured.alone.items()}
+        cells = [f"{100 * measured.hits[n]:.1f} %{alone.get(n, '')}" for n in NUMBERS]
+        cells += [f"{100 * share:.1f} %" for share in (max(measured.withheld.values()), measured.false_peaks)]
+        print("| " + " | ".join((name, *cells)) + " |", flush=True)
 
 
 if __name__ == "__main__":
