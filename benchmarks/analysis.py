@@ -28,7 +28,7 @@ def main() -> None:
         analysis = analyse(recording)  # what is loaded once is loaded now
         strokes = analysis.strokes
         prediction = predict(
-            analysis, recording.plan, PredictionOptions(course="steady", intervals=True, beside="small")
+            analysis, recording.plan, PredictionOptions(course="steady", intervals=True, variants="small")
         )
         carried = with_intervals(analysis, prediction)
         with_alternatives(carried)

@@ -18,7 +18,7 @@ NOT_THIS = sorted({name for row in ROWS for name in re.findall(r"`(\w+)`", row[3
 ONLY_IN_SOLVER = {"evidence"}
 # A value that has a kind is not called by what happened to it. Other folders join as their names are mended.
 PARTICIPLES = {"asked", "beside", "both", "felt", "found", "given", "held", "made", "others", "told"}
-UNORDERED = ("solver", "sessions/prediction", "sessions/report", "sessions/statistics",
+UNORDERED = ("solver",
              "daq_app/analyst", "daq_app/qt", "daq_app/tablet", "daq_app/window")  # fmt: skip
 # Modules that read what can run, and calls that run what was read.
 RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})

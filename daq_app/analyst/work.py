@@ -349,7 +349,7 @@ def _opened(folder: Path) -> Recording:
 def _options(recording: Recording) -> PredictionOptions:
     """Return the options of the kept prediction, or the usual ones; what nobody looks at here is not solved for."""
     kept = stored_options(recording) or PredictionOptions()
-    return replace(kept, intervals=False, beside="none", beside_intervals=False)
+    return replace(kept, intervals=False, variants="none", variant_intervals=False)
 
 
 def sentence_of(error: Exception) -> str:

@@ -12,7 +12,7 @@ from sessions.plan.study_file import is_study
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.side_by_side import with_alternatives
-from sessions.prediction.stored import check_prediction
+from sessions.prediction.stored import check_prediction, with_present_names
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
@@ -109,6 +109,7 @@ def stored_document(folder: Path, name: str) -> dict[str, Any] | None:
     try:
         document = load_derived(folder, name)
         if document is not None:
+            document = document if name == ANALYSIS else with_present_names(document)
             (check_analysis if name == ANALYSIS else check_prediction)(document)
             settings_of(document)
             _afferent_of(document)
@@ -161,8 +162,8 @@ def _no_longer(before: Mapping[str, Any], now: PredictionOptions) -> list[str]:
     stood = from_table(before.get("options", {}), PredictionOptions, PREDICTION)
     rank = ("none", "small", "both").index
     lost = ["intervals of the SED (--intervals)"] if stood.intervals and not now.intervals else []
-    if before and rank(stood.beside) > rank(now.beside):
-        lost.append(f"the variants side by side (--variants {stood.beside})")
+    if before and rank(stood.variants) > rank(now.variants):
+        lost.append(f"the variants side by side (--variants {stood.variants})")
     return lost
 
 
@@ -196,7 +197,7 @@ def _predict(
 ) -> SessionPrediction:
     """Return the prediction with all that its options ask for beside it."""
     intervals = options is not None and options.intervals
-    parts = 1 + intervals + (options is not None and options.beside != "none")
+    parts = 1 + intervals + (options is not None and options.variants != "none")
 
     def part(number: int) -> Progress:
         return lambda done: progress((number + done) / parts)

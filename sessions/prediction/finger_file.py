@@ -21,9 +21,9 @@ def finger_in(path: Path) -> tuple[Scene, str]:
     """
     text = text_of(path)
     scene = from_toml(text, Scene, str(path), instead=_OF_TRIALS)
-    given = tomllib.loads(text)
-    ignored = [f"[{name}]" for name in _OF_TRIALS if name in given]
-    ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in given.get("solve", {})]
+    document = tomllib.loads(text)
+    ignored = [f"[{name}]" for name in _OF_TRIALS if name in document]
+    ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
     if not ignored:
         return scene, ""
     are = "is" if len(ignored) == 1 else "are"

@@ -21,8 +21,8 @@ class PredictionOptions:
     intervals: bool = (
         False  # also what the uncertainty of friction makes of each SED, see `sessions.prediction.uncertainty`
     )
-    beside_intervals: bool = False  # those of the variants at finite strain too, which takes longer
-    beside: Literal["none", "small", "both"] = (
+    variant_intervals: bool = False  # those of the variants at finite strain too, which takes longer
+    variants: Literal["none", "small", "both"] = (
         "none"  # also otherwise, see `sessions.prediction.side_by_side`; at which strain
     )
 

@@ -42,8 +42,8 @@ def predict(
     first. `watch` takes each row as soon as it is known, at finite strain once all are. Raises SceneError where the
     options make no scene, Cancelled where `progress` says so.
     """
-    asked = with_own_finger(options or PredictionOptions(), plan)
-    prepared = prepared_cases(analysis, plan, asked)
+    chosen = with_own_finger(options or PredictionOptions(), plan)
+    prepared = prepared_cases(analysis, plan, chosen)
     rows = [one.row for one in prepared]
     report = watch or _unseen
     for number, one in enumerate(prepared):
@@ -52,7 +52,7 @@ def predict(
     solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
     scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
     # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
-    small = asked.kinematics == "small"
+    small = chosen.kinematics == "small"
     depths = _depths(scenes, [_force_per_mm(prepared[n]) if small else None for n in solved])
     ways: dict[int, Way] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
@@ -79,9 +79,9 @@ def predict(
     return SessionPrediction(
         simulated=analysis.simulated,
         trials=tuple(rows),
-        width=template(asked).finger.width,
-        width_origin="assumed" if template(asked).finger.width == Finger().width else "set",
-        options=asked,
+        width=template(chosen).finger.width,
+        width_origin="assumed" if template(chosen).finger.width == Finger().width else "set",
+        options=chosen,
         decisions=analysis.decisions,
         area=analysis.settings.area,
         gain_error=analysis.settings.gain_error,

@@ -90,11 +90,9 @@ class PressModel:
 
     def finger(self, stiffness: Array) -> Scene:
         """Return the scene with layers of a `stiffness` (3,) [MPa], that at the speed of the presses: none relaxes."""
-        made = self.scene.materials
-        layers = {
-            name: replace(made.of(name), E=float(one), prony=()) for name, one in zip(LAYERS, stiffness, strict=True)
-        }
-        return replace(self.scene, materials=replace(made, **layers))
+        materials, moduli = self.scene.materials, zip(LAYERS, stiffness.tolist(), strict=True)
+        layers = {name: replace(materials.of(name), E=modulus, prony=()) for name, modulus in moduli}
+        return replace(self.scene, materials=replace(materials, **layers))
 
 
 def press_model(

@@ -80,8 +80,8 @@ class RelaxationFit:
         """Return a scene whose layers are as stiff at once as found here and relax."""
         term = (Relaxation(self.part.value, self.time.value),)
         layers = {name: scene.materials.of(name) for name in LAYERS}
-        made = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
-        return replace(scene, materials=replace(scene.materials, **made))
+        relaxing = {name: replace(one, E=one.E * self.at_once, prony=term) for name, one in layers.items()}
+        return replace(scene, materials=replace(scene.materials, **relaxing))
 
 
 def relaxing_fit(

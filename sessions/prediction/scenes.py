@@ -48,9 +48,9 @@ def prepared_cases(analysis: Analysis, plan: SessionPlan, options: PredictionOpt
 
 def _cases(analysis: Analysis, plan: SessionPlan) -> Iterator[_Case]:
     if not plan.blocks:
-        given = {friction.stroke: friction for friction in analysis.friction}
+        by_stroke = {friction.stroke: friction for friction in analysis.friction}
         for number, stroke in enumerate(analysis.strokes):
-            yield _Case(None, None, given.get(number), number, stroke)
+            yield _Case(None, None, by_stroke.get(number), number, stroke)
         return
     if not plan.forces:
         return

@@ -65,10 +65,10 @@ def sealed_sentence(recording: Recording, predicted: Sequence[Mapping[str, Any]]
         return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
     if seal is None:
         return "The predictions were made after the scores had been given, and had not been sealed before."
-    held: Any = seal.get("numbers")
-    if not isinstance(held, list) or not all(isinstance(row, dict) for row in cast("list[object]", held)):
+    rows: Any = seal.get("numbers")
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in cast("list[object]", rows)):
         return f"A seal of predictions is there, but {SEAL} is damaged and proves nothing; restore a copy of it."
-    numbers = cast("list[dict[str, Any]]", held)
+    numbers = cast("list[dict[str, Any]]", rows)
     sha256 = str(seal.get("sha256"))
     if digest(numbers) != sha256:
         return f"A seal of predictions is there, but its numbers are not those of its SHA-256: {SEAL} was changed."

@@ -32,18 +32,18 @@ def with_alternatives(
     """Return a prediction with every trial predicted in the variants that its options ask for (`beside`) as well.
 
     Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
-    for `beside_intervals`; `analysis` is what the friction came from.
+    for `variant_intervals`; `analysis` is what the friction came from.
     Raises Cancelled where `progress`, told the part done, returns False.
     """
-    asked, options = tuple(variants(prediction.options.beside)), prediction.options
-    drawn = draws_of(analysis, prediction) if asked and analysis is not None and options.intervals else None
+    kinds, options = tuple(variants(prediction.options.variants)), prediction.options
+    drawn = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
 
-    def told(variant: Variant) -> Sequence[Drawn] | None:
-        return drawn if variant.kinematics == "small" or options.beside_intervals else None
+    def drawn_of(variant: Variant) -> Sequence[Drawn] | None:
+        return drawn if variant.kinematics == "small" or options.variant_intervals else None
 
     along = [
-        _along(prediction, variant, told(variant), _part(progress, number / len(asked), (number + 1) / len(asked)))
-        for number, variant in enumerate(asked)
+        _along(prediction, variant, drawn_of(variant), _part(progress, number / len(kinds), (number + 1) / len(kinds)))
+        for number, variant in enumerate(kinds)
     ]
     trials = tuple(
         _with_depth(replace(row, alternatives=tuple(one[number] for one in along)), options)

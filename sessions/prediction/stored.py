@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 
@@ -22,6 +22,8 @@ _NOT_STORED = ("prediction", "opposite")  # of a row as plain data: all that the
 _STORED_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
 
 
+# Options of documents from before 2026-11-26, and what they are called now. Once no such document is read, this goes.
+_RENAMED = {"beside": "variants", "beside_intervals": "variant_intervals"}
 ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
 
@@ -114,8 +116,8 @@ class SessionPrediction:
     @property
     def finger(self) -> Scene:
         """The finger that was asked, at the strain that was asked for; its friction and loading mean nothing."""
-        held = template(self.options)
-        return replace(held, solve=replace(held.solve, kinematics=self.options.kinematics))
+        finger = template(self.options)
+        return replace(finger, solve=replace(finger.solve, kinematics=self.options.kinematics))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
@@ -162,9 +164,20 @@ class _Document(msgspec.Struct):
     decisions: tuple[Decision, ...]
 
 
+def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a prediction with its options called as they are now."""
+    parts = {name: document.get(name) for name in ("options", "options_origin")}
+    renamed = {
+        name: {_RENAMED.get(key, key): value for key, value in cast("dict[str, Any]", part).items()}
+        for name, part in parts.items()
+        if isinstance(part, dict)
+    }
+    return {**document, **renamed}
+
+
 def check_prediction(document: Mapping[str, Any]) -> None:
     """Raise ValueError where a document is no prediction that this program writes: where, and what is expected."""
-    held = complete(document, _Document)
+    parts = complete(document, _Document)
     converted(document, _SolvedTrials)
-    from_table(held.options, PredictionOptions, "options")
-    from_table(held.scene, Scene, "scene")
+    from_table(parts.options, PredictionOptions, "options")
+    from_table(parts.scene, Scene, "scene")

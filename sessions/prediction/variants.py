@@ -67,9 +67,9 @@ class Alternative:
     doubt: str = ""  # why the numbers are not to be believed, where the model was driven beyond its range
 
 
-def variants(beside: Literal["none", "small", "both"]) -> Iterator[Variant]:
+def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
     """Yield the variants asked for: those at small strain, or those at finite strain too."""
-    for kinematics in _KINDS[beside]:
+    for kinematics in _KINDS[choice]:
         yield Variant(kinematics, "computed", "depth")
         yield Variant(kinematics, "as-printed", "depth")
         yield Variant(kinematics, "computed", "force")

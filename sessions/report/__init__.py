@@ -85,7 +85,7 @@ def findings(
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
     predicted = predictions(prediction, more.firing, undone)
     head = _head(recording, tables)
-    others = [Path(table.session).name for table in tables[1:]]
+    other_sessions = [Path(table.session).name for table in tables[1:]]
     numbers = quantities(predicted, stroke_findings)
     judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area, more.response)
     return Report(
@@ -113,7 +113,7 @@ def findings(
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
         again=facts.again(recording, analysis),
         commands=session_commands(
-            recording, analysis, prediction, more.firing_settings, more.paths, others, more.response
+            recording, analysis, prediction, more.firing_settings, more.paths, other_sessions, more.response
         ),
         scene=scene_file(recording, prediction),
         width=None if prediction is None else prediction.width,

@@ -34,8 +34,8 @@ def session_commands(
     if prediction is not None:
         file = scene_file(recording, prediction)
         scene = [] if file is None else ["--scene", shlex.quote(file.name)]
-        beside = prediction.options.beside
-        sided = ["--variants", "both"] if beside == "both" else []
+        variants = prediction.options.variants
+        sided = ["--variants", "both"] if variants == "both" else []
         words = [*model_words(prediction.options), *scene, *sided, *_afferent_words(afferent), *settings]
         lines.append(["predict", name, *words])
     if paths is not None:
@@ -69,7 +69,7 @@ def model_words(options: PredictionOptions) -> list[str]:
         *(["--kinematics", options.kinematics] if options.kinematics != "small" else []),
         *(["--tau", options.tau_reading] if options.tau_reading != "computed" else []),
         *([] if options.indentation is None else ["--indentation", repr(float(options.indentation))]),
-        *(["--intervals"] if options.beside_intervals else []),
+        *(["--intervals"] if options.variant_intervals else []),
     ]
 
 

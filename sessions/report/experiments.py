@@ -11,7 +11,7 @@ from sessions.prediction import BY_NAME, SED
 from sessions.recording.reader import Recording
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
-from sessions.statistics.rivals import FIELDS, GIVEN, MODEL, NAMES, RESPONSES, rivals_of_means
+from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
 from sessions.statistics.scales.constant_stimuli import comparison, function_of
 from sessions.statistics.scales.psychometric import Psychometric
 from sessions.statistics.scores import Relation, ScoreTable, mean_scores, relation, score_matrix
@@ -24,18 +24,18 @@ Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` ->
 
 def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
     """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
-    given: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in NAMES}
+    numbers_of: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in NAMES}
     by_number = {stroke.number: stroke for stroke in strokes}
     for one in predictions:
         if one.index is not None:
             stroke = by_number.get(one.stroke or 0)
-            numbers = {name: getattr(one if name == GIVEN else stroke, FIELDS[name], None) for name in FIELDS}
+            numbers = {name: getattr(one if name == MODEL_MU else stroke, FIELDS[name], None) for name in FIELDS}
             numbers |= {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
             numbers[MODEL] = one.sed
             for name, value in numbers.items():
                 if value is not None:
-                    given[name][one.experiment, one.index].append(value)
-    return {name: {key: float(np.mean(all_of)) for key, all_of in values.items()} for name, values in given.items()}
+                    numbers_of[name][one.experiment, one.index].append(value)
+    return {name: {key: float(np.mean(all_of)) for key, all_of in own.items()} for name, own in numbers_of.items()}
 
 
 def with_psychometric(
@@ -117,9 +117,7 @@ def _experiment(
         scale_ends=block.scale_ends,
         indices=indices,
         scores=means,
-        answers=tuple(
-            Answers(subject, tuple(given.get(index) for index in indices)) for subject, given in answers.items()
-        ),
+        answers=tuple(Answers(subject, tuple(row.get(index) for index in indices)) for subject, row in answers.items()),
         score_relation=_related(score_of, predicted),
         index_relation=_related({index: float(index) for index in indices}, predicted),
         own_relation=_related(own, predicted),
@@ -141,7 +139,7 @@ def _experiment(
 
 def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
     """Return how responses go with x, over the indices that have both; None where there is none."""
-    both = [index for index in x if index in responses]
-    if not both:
+    shared = [index for index in sorted(x) if index in responses]
+    if not shared:
         return None
-    return relation([x[index] for index in both], [responses[index] for index in both], both)
+    return relation([x[index] for index in shared], [responses[index] for index in shared], shared)

@@ -56,9 +56,9 @@ def _block(block: Block) -> str:
     indices = ", ".join(str(i) for i in sorted({trial.stimulus.known_index for trial in block.trials}))
     low, high = block.scale_ends
     ticks = f", {block.ticks} marks" if block.ticks else ""
-    asked = f"scale: 0 “{low}”, 100 “{high}”{ticks}" if low else f"asked: “{block.question}”"
+    task = f"scale: 0 “{low}”, 100 “{high}”{ticks}" if low else f"asked: “{block.question}”"
     depth = f"; depth {block.indentation:g} mm, measured" if block.indentation_origin == "measured" else ""
-    return f"{block.instruction} Stimuli {indices}, stroked {way}; {asked}{depth}."
+    return f"{block.instruction} Stimuli {indices}, stroked {way}; {task}{depth}."
 
 
 def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:

@@ -152,17 +152,17 @@ def _is_page(path: Path) -> bool:
 
 def swap_in(path: Path, text: str) -> None:
     """Write a file beside its place, then put it there in one step."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.new")
+    new = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            with open_new(beside) as file:
+            with open_new(new) as file:
                 file.write(text.encode())
                 file.flush()
                 os.fsync(file.fileno())
-            beside.replace(path)
+            new.replace(path)
         finally:
-            beside.unlink(missing_ok=True)
+            new.unlink(missing_ok=True)
     except OSError as error:
         raise ReportError(
             f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"

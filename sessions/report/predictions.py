@@ -61,8 +61,8 @@ def fields(prediction: SessionPrediction | None) -> tuple[Field, ...]:
             before = chosen.get(row.block)
             if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
                 chosen[row.block] = row
-    made = [field_of(name, row) for name, row in chosen.items()]
-    return tuple(field for field in made if field is not None)
+    drawn = [field_of(name, row) for name, row in chosen.items()]
+    return tuple(field for field in drawn if field is not None)
 
 
 def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:

@@ -12,13 +12,13 @@ def grading(records: Iterable[TrialRecord]) -> dict[str, str]:
 
     The grading holds where the answers rise with the maker's number throughout. Raises Blinded while it is sealed.
     """
-    given: defaultdict[str, dict[int, float]] = defaultdict(dict)
+    judgements: defaultdict[str, dict[int, float]] = defaultdict(dict)
     for record in records:
         answer = record.number if record.score is None else record.score
         if record.trial.phase == "pre-evaluation" and answer is not None:
             stimulus = record.trial.stimulus
-            given[stimulus.descriptor][stimulus.known_index] = answer
-    return {descriptor: _sentence(answers) for descriptor, answers in given.items()}
+            judgements[stimulus.descriptor][stimulus.known_index] = answer
+    return {descriptor: _sentence(answers) for descriptor, answers in judgements.items()}
 
 
 def _sentence(answers: dict[int, float]) -> str:

@@ -80,8 +80,8 @@ def mixed_model(
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
     fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
     spread = np.sqrt(np.diag(fit.among)) / scale[:own]
-    others = max(len(score) - len(names) - (count - 1) * own, 1)
-    free = [count - 1, varies - 1, *([others] * len(names))] if slopes_differ else [None] * len(names)
+    rest = max(len(score) - len(names) - (count - 1) * own, 1)
+    free = [count - 1, varies - 1, *([rest] * len(names))] if slopes_differ else [None] * len(names)
     estimates = zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free, strict=False)
     terms = tuple(_term(name, estimate, error, dof) for name, estimate, error, dof in estimates)
     first, *common = covariates.values()

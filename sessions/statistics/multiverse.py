@@ -115,14 +115,14 @@ def trial_paths(
     choice. Raises as `predict` does.
     """
     paths = [path for path in PATHS if finite or path.kinematics == "small"]
-    asked = replace(prediction.options, course="steady")
+    steady = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
     usual = {one.trial: one for one in next(iter(analyses.values())).friction}
     scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
     for path in paths:
         if path.receptor == RECEPTORS[0]:
             varied = _varied(analyses, path, usual)
-            kind = replace(asked, kinematics=path.kinematics)
+            kind = replace(steady, kinematics=path.kinematics)
             scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
     known = [row.prediction for row in prediction.trials if row.prediction is not None]
@@ -139,9 +139,9 @@ def _without_receptor(path: Path) -> tuple[str, ...]:
 
 def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
     """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
-    first, *others = dict.fromkeys(law for law, _ in AREAS.values())
-    asked = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], others)]
-    return {(f, w, law): analyse(recording, _settings(FILTERS[f], WINDOWS[w], law)) for f, w, law in asked}
+    first, *laws = dict.fromkeys(law for law, _ in AREAS.values())
+    cases = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], laws)]
+    return {(f, w, law): analyse(recording, _settings(FILTERS[f], WINDOWS[w], law)) for f, w, law in cases}
 
 
 def _settings(cut_off: float, rule: WindowRule, law: AreaLaw) -> AnalysisSettings:
@@ -184,12 +184,12 @@ def _solved(
     for scene in sorted(scenes, key=_friction):
         alike[_kind(scene)].append(scene)
     first = {kind: group[0] for kind, group in alike.items()}
-    held = {kind: one for one in known if (kind := _kind(one.scene)) in first}
-    new = [kind for kind in first if kind not in held]
+    solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
+    new = [kind for kind in first if kind not in solved]
     answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
-    held |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
+    solved |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
     pairs: dict[Scene, Pair | None] = {}
-    for kind, slide in zip(held, slides(list(held.values()), _part(progress, 0.5, 0.7)), strict=True):
+    for kind, slide in zip(solved, slides(list(solved.values()), _part(progress, 0.5, 0.7)), strict=True):
         pairs |= _near(slide, alike[kind], quantity)
     rest = [scene for scene in scenes if scene not in pairs]
     answers = [answer for answer in settled(rest, _part(progress, 0.7, 0.9)) if answer is not None]
@@ -255,19 +255,19 @@ def path_findings(
 
     Correlations within subjects are taken where `within` says so. Empty where no trial went along the paths.
     """
-    held = [trial for trial in trials if trial.values]
-    if not held:
+    along = [trial for trial in trials if trial.values]
+    if not along:
         return ()
-    rule, gone = held[0].rule, min(len(trial.values) for trial in held)
+    rule, gone = along[0].rule, min(len(trial.values) for trial in along)
     return tuple(
-        _finding(n, path, held, usual=path.usual(rule, kinematics, law), within=within)
+        _finding(n, path, along, usual=path.usual(rule, kinematics, law), within=within)
         for n, path in enumerate(PATHS[:gone])
     )
 
 
 def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: bool, within: bool) -> PathFinding:
-    held = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
-    points = [(trial, value, trial.score) for trial, value in held if trial.score is not None]
+    predicted = [(trial, value) for trial in trials if (value := trial.values[number]) is not None]
+    points = [(trial, value, trial.score) for trial, value in predicted if trial.score is not None]
     pairs = [(trial.subject, value, score) for trial, value, score in points]
     values = surface_means([(trial.subject, trial.index, value) for trial, value, _ in points]) or {}
     scores = surface_means([(trial.subject, trial.index, score) for trial, _, score in points]) or {}
@@ -276,8 +276,8 @@ def _finding(number: int, path: Path, trials: Sequence[PathTrial], *, usual: boo
     return PathFinding(
         path=path,
         usual=usual,
-        surfaces=len({trial.index for trial, _ in held}),
-        trials=len(held),
+        surfaces=len({trial.index for trial, _ in predicted}),
+        trials=len(predicted),
         r=pearson(list(values.values()), list(scores.values())),
         within=None if inner is None else inner.r,
         low=low,
@@ -313,11 +313,11 @@ def spread(values: Sequence[float | None]) -> Spread | None:
     >>> of.median, of.correlated, of.distinct
     (0.7, 3, 2)
     """
-    held = sorted(value for value in values if value is not None)
-    if not held:
+    numbers = sorted(value for value in values if value is not None)
+    if not numbers:
         return None
-    least, lower, median, upper, greatest = np.quantile(held, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
-    return Spread(len(values), len(held), _distinct(held), least, lower, median, upper, greatest)
+    least, lower, median, upper, greatest = np.quantile(numbers, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
+    return Spread(len(values), len(numbers), _distinct(numbers), least, lower, median, upper, greatest)
 
 
 def _distinct(ordered: Sequence[float]) -> int:
@@ -340,6 +340,6 @@ def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread |
         names = dict.fromkeys(getattr(one.path, choice) for one in findings)
         usual = {getattr(one.path, choice) for one in findings if one.usual}
         for name in names:
-            held = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
-            rows.append((choice, name, spread(held), name in usual))
+            chosen = [r for one, r in zip(findings, values, strict=True) if getattr(one.path, choice) == name]
+            rows.append((choice, name, spread(chosen), name in usual))
     return tuple(rows)

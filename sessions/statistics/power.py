@@ -32,14 +32,14 @@ class Power:
 
     subjects: int
     surfaces: int
-    found: int  # studies of which the test finds the planted effect with its sign
+    detections: int  # studies of which the test finds the planted effect with its sign
     wrong: int  # studies of which it finds the other sign
     studies: int
 
     @property
     def share(self) -> float:
         """The power [-]."""
-        return self.found / self.studies
+        return self.detections / self.studies
 
     @property
     def half(self) -> float:

@@ -21,12 +21,12 @@ from sessions.statistics.scores import CONFIDENCE, fisher_interval, pearson, rel
 from sessions.statistics.within_subjects import repeated_correlation
 
 MODEL = SED.label  # the published quantity, to which the others are compared where no other is named
-GIVEN = "µ of the model"
+MODEL_MU = "µ of the model"
 # Name for people, and that of the model's quantities at the receptor.
 RESPONSES: Mapping[str, str] = {one.label: one.name for one in BY_NAME.values()}
 # Name for people, and the field of a stroke or trial that holds it.
 FIELDS: Mapping[str, str] = {
-    GIVEN: "mu",
+    MODEL_MU: "mu",
     "µ dynamic": "mu_dynamic",
     "µ static": "mu_static",
     "τ max": "tau_max",
@@ -107,9 +107,9 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
     weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
     rivals: list[Rival] = []
     for name in names:
-        told = deviances[name]
+        deviance = deviances[name]
         rival = replace(_within(name, model, counted), weight=weights.get(name))
-        rivals.append(_because(rival, "weight", told if isinstance(told, str) else None))
+        rivals.append(_because(rival, "weight", deviance if isinstance(deviance, str) else None))
     return tuple(rivals)
 
 
@@ -118,7 +118,7 @@ def _ordered(model: str) -> tuple[str, ...]:
 
 
 def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mapping[str, Mapping[int, float]]) -> Rival:
-    used = [name, model, *([GIVEN] if GIVEN in series else [])]
+    used = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
     own = [index for index in scores if index in series[name]]
     x, y = [series[name][i] for i in own], [scores[i] for i in own]
     related = relation(x, y, own)
@@ -130,9 +130,9 @@ def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mappin
     values = {one: [series[one][i] for i in shared] for one in used}
     if name != model:
         rival = _compared(rival, values[model], values[name], score)
-    if GIVEN not in used or name == GIVEN:
+    if MODEL_MU not in used or name == MODEL_MU:
         return _because(rival, "partial", "µ itself is given")
-    xy, xz, yz = pearson(values[name], score), pearson(values[name], values[GIVEN]), pearson(score, values[GIVEN])
+    xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])
     partial = None if xy is None or xz is None or yz is None else partial_correlation(xy, xz, yz)
     if partial is None:
         return _because(rival, "partial", "µ determines it, or there are too few surfaces")
@@ -159,7 +159,7 @@ def _compared(rival: Rival, model: Sequence[float], other: Sequence[float], scor
 
 
 def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
-    used = [*dict.fromkeys((name, model, GIVEN))]
+    used = [*dict.fromkeys((name, model, MODEL_MU))]
     mine = [trial for trial in trials if name in trial.values]
     x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
     subjects = [trial.subject for trial in mine]
@@ -177,13 +177,13 @@ def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     here, again = drawn
     if name != model:
         rival = _bootstrapped(rival, here, again, len(shared))
-    if name == GIVEN:
+    if name == MODEL_MU:
         return _because(rival, "partial", "µ itself is given")
-    given, column = used.index(GIVEN) + 1, 1
-    partial = _partials(here[None], column, given)
+    control, column = used.index(MODEL_MU) + 1, 1
+    partial = _partials(here[None], column, control)
     if not np.isfinite(partial).all():
         return _because(rival, "partial", "µ determines it")
-    ends = _percentiles(_partials(again, column, given))
+    ends = _percentiles(_partials(again, column, control))
     return replace(rival, partial=float(partial[0]), partial_low=ends[0], partial_high=ends[1])
 
 
@@ -226,9 +226,9 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
     return np.where(size > 0.0, covariances[:, first, second], np.nan) / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
-def _partials(covariances: Array, column: int, given: int) -> Array:
+def _partials(covariances: Array, column: int, control: int) -> Array:
     """Return the correlation of score and a column given another in each of many covariances; nan where none is."""
-    xy, xz, yz = (_correlations(covariances, *pair) for pair in ((0, column), (0, given), (column, given)))
+    xy, xz, yz = (_correlations(covariances, *pair) for pair in ((0, column), (0, control), (column, control)))
     left = (1 - xz * xz) * (1 - yz * yz)
     return np.where(left > 1e-12, xy - xz * yz, np.nan) / np.sqrt(np.where(left > 1e-12, left, 1.0))
 

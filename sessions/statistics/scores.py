@@ -123,11 +123,11 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
     >>> subject_scores([first, again])
     (Score(subject='P01', descriptor='stickiness', index=20, score=20.0),)
     """
-    given: defaultdict[tuple[str, str, int], list[float]] = defaultdict(list)
+    answers: defaultdict[tuple[str, str, int], list[float]] = defaultdict(list)
     for table in tables:
         for score in table.scores:
-            given[table.subject, score.descriptor, score.index].append(score.score)
-    return tuple(Score(*key, score=float(np.mean(values))) for key, values in given.items())
+            answers[table.subject, score.descriptor, score.index].append(score.score)
+    return tuple(Score(*key, score=float(np.mean(values))) for key, values in answers.items())
 
 
 def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:

@@ -18,6 +18,7 @@ from examples import SCENE
 from page_numbers import estimates
 from report_session import record
 
+from daq_app.batch.derived import stored_document
 from daq_app.batch.pool import Shelf
 from daq_app.batch.session_numbers import content_of
 from daq_app.cli.main import run
@@ -207,6 +208,17 @@ def test_an_analysis_of_an_older_program_keeps_the_settings_of_its_intervals(sma
     settings["tilt_from_presses"] = False
     check_analysis(document)
     assert bootstrap_settings(settings) == now
+
+
+def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_present_names(reported, tmp_path):
+    folder = shutil.copytree(reported, tmp_path / "P01")
+    now = json.loads((folder / "prediction.json").read_bytes())
+    older = {name: dict(now[name]) for name in ("options", "options_origin")}
+    for part in older.values():
+        part["beside"], part["beside_intervals"] = part.pop("variants"), part.pop("variant_intervals")
+    (folder / "prediction.json").write_text(json.dumps({**now, **older}))
+    stored = stored_document(folder, "prediction.json")
+    assert {name: stored[name] for name in older} == {name: now[name] for name in older}
 
 
 def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, capsys, tmp_path):

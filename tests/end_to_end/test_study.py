@@ -51,7 +51,7 @@ def test_the_damaged_session_is_named_and_stops_nothing(pool):
 
 
 def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):
-    assert [(flaw["session"], flaw["found"]) for flaw in pool["flaws"]] == [("S02", True), ("S11", True)]
+    assert [(flaw["session"], flaw["detected"]) for flaw in pool["flaws"]] == [("S02", True), ("S11", True)]
 
 
 def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):
@@ -335,7 +335,7 @@ def test_the_whole_synthetic_study_names_everything_that_was_spoilt(tmp_path):
     assert "S07" in Path(folder / "pooled" / "study.html").read_text()
     assert pool["friction"]["strokes"] >= 90
     assert len(pool["flaws"]) == 7
-    assert all(flaw["found"] for flaw in pool["flaws"]), pool["flaws"]
+    assert all(flaw["detected"] for flaw in pool["flaws"]), pool["flaws"]
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from study_example import study, visit
+from study_example import INDICES, study, visit
 
 from sessions.prediction import BY_NAME, PredictionOptions
 from sessions.report.study_csv import trials_csv
 from sessions.report.study_page import study_page
 from sessions.report.study_prose import command, excluded, remarks, summary
+from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_scores
 from sessions.statistics.multiverse import PATHS
 from sessions.statistics.pooling.exclusions import Exclusion, exclusions_in
@@ -46,7 +47,7 @@ def test_planted_gain_drift_and_carry_over_stand_beside_what_is_found():
     planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": []}
     found = {one.effect: one for one in pooled(VISITS, planted=planted).effects}
     assert set(found) == {INDEX, FRICTION, DRIFT, CARRY_OVER}
-    assert found[INDEX].found == pytest.approx(0.8, abs=0.05)
+    assert found[INDEX].estimate == pytest.approx(0.8, abs=0.05)
     assert found[INDEX].covered
 
 
@@ -203,12 +204,12 @@ def test_a_planted_flaw_that_nobody_names_is_told_as_not_found():
     }
     planted = {"score": {"gain": 0.8, "drift": 0.4, "carry_over": 0.0}, "strokes": [], "spoilt": spoilt}
     made = [*VISITS[:2], visit(3, gain=-0.8)]
-    assert [flaw.found for flaw in pooled(made, planted=planted).flaws] == [False, False, True, False]
+    assert [flaw.detected for flaw in pooled(made, planted=planted).flaws] == [False, False, True, False]
     lost = replace(
         made[0], rows=tuple(replace(r, flaws=("lost_readings",)) if r.trial == 2 else r for r in made[0].rows)
     )
     found = pooled([lost, *made[1:]], [("S99", "damaged")], planted=planted).flaws
-    assert [flaw.found for flaw in found] == [True, False, True, True]
+    assert [flaw.detected for flaw in found] == [True, False, True, True]
 
 
 def test_what_was_excluded_is_told_with_who_and_why_and_trials_alike_together():
@@ -288,3 +289,12 @@ def test_any_quantity_of_the_model_takes_the_place_of_the_sed_in_everything_that
     page = study_page(by_shear, "made")
     assert "predicted shear along the skin [1]" in page
     assert "--quantity shear_along_skin" in page
+
+
+def test_the_table_of_standardised_scores_has_the_scores_as_given_beside_them():
+    (shown,) = [one for one in study_tables(pooled(VISITS))["scores"] if one.name == "table-normalised"]
+    scores = np.array([[{row.index: row.score for row in one.rows}[index] for index in INDICES] for one in VISITS])
+    standardised = (scores - scores.mean(axis=1, keepdims=True)) / scores.std(axis=1, ddof=1, keepdims=True)
+    cells = [[float(row[n].text.replace("−", "-")) for n in (2, 5)] for row in shown.groups[0].rows]
+    expected = np.column_stack([scores.mean(axis=0), standardised.mean(axis=0)])
+    assert (np.abs(np.array(cells) - expected) <= (0.0501, 0.00501)).all()  # printed to one and two decimals

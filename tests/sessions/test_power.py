@@ -24,7 +24,7 @@ def test_with_alike_people_and_exact_friction_the_power_is_nearly_that_of_a_t_te
 
 def test_where_nothing_is_planted_the_test_finds_something_in_about_five_of_a_hundred():
     (found,) = power(Planted(effect=0.0), (10,), (5,), 600, 2)
-    assert 0.02 <= (found.found + found.wrong) / found.studies <= 0.08
+    assert 0.02 <= (found.detections + found.wrong) / found.studies <= 0.08
 
 
 def test_more_subjects_find_more_and_spread_people_less():

@@ -23,7 +23,7 @@ from sessions.statistics.dependent_correlations import (
     partial_correlation,
     steiger_z,
 )
-from sessions.statistics.rivals import GIVEN, MODEL, RivalTrial, rivals_of_means, rivals_within
+from sessions.statistics.rivals import MODEL, MODEL_MU, RivalTrial, rivals_of_means, rivals_within
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many
 from solver.scene.published import scenes as published_scenes
@@ -83,18 +83,18 @@ def test_the_left_out_error_is_that_of_lines_fitted_without_each_point():
 )
 def test_friction_follows_the_published_indices_as_closely_as_the_sed_does(descriptor, mu, tau_max):
     found = {rival.name: rival for rival in published(descriptor)}
-    assert found[GIVEN].r == pytest.approx(mu, abs=5e-4)
+    assert found[MODEL_MU].r == pytest.approx(mu, abs=5e-4)
     assert found["τ max"].r == pytest.approx(tau_max, abs=5e-4)
-    assert found[GIVEN].same_order
+    assert found[MODEL_MU].same_order
     assert found["τ max"].same_order is (descriptor == "stickiness")
-    assert found[GIVEN].contrast.low < 0.0 < found[GIVEN].contrast.high
-    assert found[GIVEN].needed > 5
+    assert found[MODEL_MU].contrast.low < 0.0 < found[MODEL_MU].contrast.high
+    assert found[MODEL_MU].needed > 5
 
 
 def published(descriptor):
     """Return how the numbers of the published tables go with the index of each surface."""
     rows = TABLES[descriptor]
-    names = (GIVEN, "τ max", "speed", MODEL)
+    names = (MODEL_MU, "τ max", "speed", MODEL)
     series = {name: {index: row[at] for index, row in rows.items()} for at, name in enumerate(names)}
     return rivals_of_means({index: float(index) for index in rows}, series)
 
@@ -109,13 +109,13 @@ def test_a_tip_of_seven_millimetres_turns_the_published_signs_round(radius, stic
 
 
 def test_what_has_no_number_has_a_reason_instead():
-    series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, GIVEN: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
+    series = {MODEL: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}, "µ static": {0: 1.0}, MODEL_MU: {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0}}
     found = {rival.name: rival for rival in rivals_of_means({0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0}, series)}
     assert found["µ static"].r is None
     assert set(found["µ static"].reasons) == {"r", "contrast", "partial", "left_out_error"}
     assert "µ determines it" in found[MODEL].reasons["partial"]
-    assert found[GIVEN].contrast is None  # the two are one variable
-    assert rivals_of_means({0: 1.0}, {GIVEN: {0: 1.0}}) == ()
+    assert found[MODEL_MU].contrast is None  # the two are one variable
+    assert rivals_of_means({0: 1.0}, {MODEL_MU: {0: 1.0}}) == ()
 
 
 def people(draw, judge, subjects=10):
@@ -127,7 +127,9 @@ def people(draw, judge, subjects=10):
             own = mu * math.exp(draw.normal(0.0, 0.12))
             sed = 0.0086 + 0.002 * (own - 0.5) ** 2 + 0.001 * draw.normal(0.0, 0.3)
             score = level + judge(own, sed) + draw.normal(0.0, 4.0)
-            trials.append(RivalTrial(f"S{subject}", index, score, {MODEL: sed, GIVEN: own, "N": draw.normal(1.0, 0.1)}))
+            trials.append(
+                RivalTrial(f"S{subject}", index, score, {MODEL: sed, MODEL_MU: own, "N": draw.normal(1.0, 0.1)})
+            )
     return trials
 
 
@@ -135,12 +137,12 @@ def test_the_quantity_that_people_judge_by_is_told_from_its_rivals():
     draw = np.random.default_rng(7)
     by_mu = {one.name: one for one in rivals_within(people(draw, lambda mu, _: 120.0 * (mu - 0.5)))}
     by_sed = {one.name: one for one in rivals_within(people(draw, lambda _, sed: 4e4 * (sed - 0.0086)))}
-    assert by_mu[GIVEN].contrast.high < 0.0 < by_sed[GIVEN].contrast.low
+    assert by_mu[MODEL_MU].contrast.high < 0.0 < by_sed[MODEL_MU].contrast.low
     assert by_mu[MODEL].partial_low < 0.0 < by_mu[MODEL].partial_high
     assert by_sed[MODEL].partial_low > 0.5
-    assert by_mu[GIVEN].weight > 0.95
+    assert by_mu[MODEL_MU].weight > 0.95
     assert by_sed[MODEL].weight > 0.95
-    assert by_mu[GIVEN].left_out_error < by_mu[MODEL].left_out_error
+    assert by_mu[MODEL_MU].left_out_error < by_mu[MODEL].left_out_error
     assert sum(one.weight for one in by_mu.values()) == pytest.approx(1.0)
 
 
@@ -148,17 +150,18 @@ def test_numbers_within_subjects_are_those_of_trials_without_each_subjects_mean(
     trials = people(np.random.default_rng(8), lambda mu, _: 90.0 * mu, subjects=4)
     found = {one.name: one for one in rivals_within(trials)}
     who = [trial.subject for trial in trials]
-    columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL, GIVEN)}
+    columns = {name: np.array([trial.values[name] for trial in trials]) for name in (MODEL, MODEL_MU)}
     columns["score"] = np.array([trial.score for trial in trials])
     left = {
         name: (v.reshape(4, 5) - v.reshape(4, 5).mean(axis=1, keepdims=True)).ravel() for name, v in columns.items()
     }
     expected = repeated_correlation(who, columns[MODEL], columns["score"])
     assert (found[MODEL].r, found[MODEL].low) == (expected.r, expected.people[0])
-    steps = [abs(np.corrcoef(left["score"], left[name])[0, 1]) for name in (MODEL, GIVEN)]
-    assert found[GIVEN].contrast.difference == pytest.approx(steps[0] - steps[1])
+    steps = [abs(np.corrcoef(left["score"], left[name])[0, 1]) for name in (MODEL, MODEL_MU)]
+    assert found[MODEL_MU].contrast.difference == pytest.approx(steps[0] - steps[1])
     rest = [
-        left[name] - left[GIVEN] * (left[name] @ left[GIVEN]) / (left[GIVEN] @ left[GIVEN]) for name in (MODEL, "score")
+        left[name] - left[MODEL_MU] * (left[name] @ left[MODEL_MU]) / (left[MODEL_MU] @ left[MODEL_MU])
+        for name in (MODEL, "score")
     ]
     assert found[MODEL].partial == pytest.approx(np.corrcoef(rest)[0, 1])
 
@@ -173,8 +176,8 @@ def test_a_quantity_that_trials_lack_gets_no_weight_and_the_others_keep_theirs()
     found = {one.name: one for one in rivals_within(some)}
     assert found["N"].weight is None
     assert "10 of 50 trials" in found["N"].reasons["weight"]
-    ratio = found[MODEL].weight / found[GIVEN].weight
-    assert ratio == pytest.approx(whole[MODEL].weight / whole[GIVEN].weight)
+    ratio = found[MODEL].weight / found[MODEL_MU].weight
+    assert ratio == pytest.approx(whole[MODEL].weight / whole[MODEL_MU].weight)
 
 
 def test_the_crossed_deviance_is_the_least_of_the_dense_normal_density():
@@ -221,7 +224,7 @@ def test_weights_are_those_of_the_published_rule():
 def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_summary():
     report = example()
     shown = next(one for one in tables(report)["rivals"] if one.name == "table-rivals")
-    assert [row[0].text for row in shown.groups[0].rows] == [MODEL, GIVEN, "µ static", "τ max", "speed"]
+    assert [row[0].text for row in shown.groups[0].rows] == [MODEL, MODEL_MU, "µ static", "τ max", "speed"]
     assert len(shown.caption.split()) <= 60
     drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
     assert "τ max +0.95" in drawn
@@ -256,6 +259,6 @@ def test_equal_rivals_are_said_to_be_told_apart_by_no_number_of_surfaces():
     score = {0: 1.0, 1: 3.0, 2: 4.0, 3: 2.0, 4: 6.0}
     same = {0: 1.0, 1: 2.0, 2: 4.0, 3: 3.0, 4: 5.0}
     twice = {index: 2.0 * value for index, value in same.items()}
-    said = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, GIVEN: twice}))
+    said = rivals_sentences("roughness", rivals_of_means(score, {MODEL: same, MODEL_MU: twice}))
     assert said[0].startswith("Roughness: µ of the model orders these 5 surfaces as the SED does")
     assert said[0].endswith("no number of surfaces would.")

@@ -26,7 +26,7 @@ def given(trials=TRIALS):
 
 @pytest.fixture(scope="module")
 def alone():
-    return predict(*given(), PredictionOptions(course="steady", beside="small"))
+    return predict(*given(), PredictionOptions(course="steady", variants="small"))
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_it_is_plain_data_for_files_and_reports(beside):
 def test_a_trial_without_friction_or_force_says_why_in_each_variant():
     found, plan = given((2,))
     without = replace(found, strokes=(stroke(2, normal_force=None),))
-    options = PredictionOptions(course="steady", beside="small")
+    options = PredictionOptions(course="steady", variants="small")
     (row,) = with_alternatives(predict(without, plan, options)).trials
     assert of(row, "computed", "force").reason == "The stroke gives no steady normal force."
     (row,) = with_alternatives(predict(replace(found, friction=(), strokes=()), plan, options)).trials
@@ -105,7 +105,7 @@ def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its
         return tuple("There is none." for _ in scenes)
 
     monkeypatch.setattr(side_by_side, "solved", none)
-    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", beside="both"))).trials
+    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
     assert asked == ["small"] * 2 + ["finite"] * 4
     assert of(row, "computed", "depth", "finite").sed is None
     assert of(row, "computed", "depth", "finite").reason == "There is none."
@@ -114,7 +114,7 @@ def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its
 
 @pytest.mark.slow
 def test_at_finite_strain_a_sticky_surface_has_no_settled_slide_at_its_depth_and_says_so():
-    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", beside="both"))).trials
+    (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
     found = of(row, "computed", "depth", "finite")
     assert found.sed is None
     assert "settled sliding up to mu" in found.reason
@@ -123,7 +123,7 @@ def test_at_finite_strain_a_sticky_surface_has_no_settled_slide_at_its_depth_and
 
 def test_a_finger_pressed_until_its_tissue_turns_inside_out_is_doubted_and_no_other(beside):
     assert all(one.doubt == "" for row in beside.trials for one in row.alternatives)
-    deep = with_alternatives(predict(*given(), PredictionOptions(course="steady", beside="small", indentation=3.0)))
+    deep = with_alternatives(predict(*given(), PredictionOptions(course="steady", variants="small", indentation=3.0)))
     doubts = [of(row, "computed", "depth").doubt for row in deep.trials]
     assert all("turned inside out" in told for told in doubts)
     assert all(row.prediction.audits["smallest_det_F"] < 0 for row in deep.trials)

@@ -26,19 +26,19 @@ def test_an_exact_law_is_found_by_both_routes_whatever_unit_a_subject_chose():
     mu = np.tile(MU, 4)
     answers = np.repeat([1.0, 7.0, 100.0, 0.2], len(MU)) * mu**0.8
     found = stevens_exponent(people, np.tile(range(5), 4).tolist(), answers, mu)
-    assert found.both[0] == pytest.approx(0.8, rel=1e-12)
+    assert found.deming[0] == pytest.approx(0.8, rel=1e-12)
 
 
 def test_where_what_was_measured_errs_the_plain_slope_is_too_flat_and_deming_s_is_not():
     found = [stevens_exponent(*study(np.random.default_rng([3, n]), 1.1, error=0.2)) for n in range(16)]
     assert np.mean([one.plain.estimate for one in found]) < 0.95
-    assert np.mean([one.both[0] for one in found]) == pytest.approx(1.1, abs=0.1)
+    assert np.mean([one.deming[0] for one in found]) == pytest.approx(1.1, abs=0.1)
 
 
 @pytest.mark.slow
 def test_intervals_hold_the_planted_exponent_in_88_to_98_of_a_hundred_studies():
     found = [stevens_exponent(*study(np.random.default_rng([4, n]), 1.1), seed=n) for n in range(150)]
-    held = [one.both[1] <= 1.1 <= one.both[2] for one in found]
+    held = [one.deming[1] <= 1.1 <= one.deming[2] for one in found]
     assert 0.88 <= np.mean(held) <= 0.98
 
 

@@ -42,7 +42,7 @@ def intervals(analysis, prediction):
 @pytest.fixture(scope="module")
 def beside(analysis, prediction):
     """Return the sticky trial with its variants, and the options."""
-    options = replace(prediction.options, beside="small", beside_intervals=True)
+    options = replace(prediction.options, variants="small", variant_intervals=True)
     alone = replace(prediction, trials=prediction.trials[:1], options=options)
     return with_alternatives(with_intervals(analysis, alone), analysis=analysis)
 

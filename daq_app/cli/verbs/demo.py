@@ -52,7 +52,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return FLAWED
     recording = Recording.open(study.stroked)
     analysis = analyse_session(recording, console)
-    prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, beside="small"))
+    prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, variants="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
     from sessions.report import findings, score_table
     from sessions.report.html import plates, write_figures, write_report

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--variants",
         "--beside",  # as it was called before
-        dest="beside",
+        dest="variants",
         choices=["none", "small", "both"],
         default="small",
         help="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "
@@ -102,9 +102,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
         scene=scene,
         indentation=options.indentation,
         kinematics=options.kinematics,
-        beside=options.beside,
+        variants=options.variants,
         intervals=options.intervals,
-        beside_intervals=options.intervals,
+        variant_intervals=options.intervals,
     )
     recording = open_visit(options.session, options.subject)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
@@ -137,7 +137,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     _print_beside(prediction, console)
     if choices.intervals:
         _print_intervals(prediction, console)
-        _print_beside_intervals(prediction, console)
+        _print_variant_intervals(prediction, console)
     if firing:
         _print_firing(firing["afferent"], console)
     if seal:
@@ -200,7 +200,7 @@ def _cell(one: Alternative) -> str:
     return f"{number(one.sed, 4, factor=1e3)} ({number(companion)}){'!' if one.doubt else ''}"
 
 
-def _print_beside_intervals(prediction: SessionPrediction, console: Console) -> None:
+def _print_variant_intervals(prediction: SessionPrediction, console: Console) -> None:
     """Print the interval of each SED in every variant, marked * where it is by solving draws."""
     rows = [row for row in prediction.trials if row.alternatives]
     if not rows:

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--variants",
         "--beside",  # as it was called before
-        dest="beside",
+        dest="variants",
         choices=["none", "small", "both"],
         help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
         "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
@@ -95,8 +95,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _prediction_options(recording: Recording, options: argparse.Namespace) -> PredictionOptions:
     """Return what to ask of the model: what was asked before, so that nothing kept is lost, and what a page shows."""
     before = stored_options(recording) or PredictionOptions()
-    variants = max(before.beside, options.beside or "small", key=("none", "small", "both").index)
-    return replace(before, intervals=True, beside=variants, course="history")
+    variants = max(before.variants, options.variants or "small", key=("none", "small", "both").index)
+    return replace(before, intervals=True, variants=variants, course="history")
 
 
 def _further(

@@ -159,7 +159,7 @@ def _print(study: StudyFindings, files: dict[str, str], console: Console) -> Non
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(
-            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, found {one.found:.3g} "
-            f"({one.low:.3g} to {one.high:.3g}): {inside}"
+            f"planted {one.descriptor}, {one.effect} [{UNITS[one.effect]}]: {one.planted:.3g}, "
+            f"found {one.estimate:.3g} ({one.low:.3g} to {one.high:.3g}): {inside}"
         )
     console.say(*(f"{what:8}  {path}" for what, path in files.items()))

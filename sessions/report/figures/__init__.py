@@ -20,8 +20,8 @@ __all__ = ["Panel", "Plate", "picture", "plates"]
 def plates(report: Report) -> tuple[Plate, ...]:
     """Return the figures that a report has numbers for, in their order."""
     with look():
-        made = tuple(draw(report) for draw in _PLATES.values())
-    return tuple(plate for plate in made if plate.panels)
+        drawn = tuple(draw(report) for draw in _PLATES.values())
+    return tuple(plate for plate in drawn if plate.panels)
 
 
 def picture(report: Report, plate: str, experiment: str | None = None) -> Panel | None:
@@ -144,8 +144,8 @@ def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:
     """Return the strokes by experiment, in the order of the experiments; those of none come last."""
     names = [experiment.name for experiment in report.experiments]
     groups = [(name, [s for s in report.strokes if s.experiment == name]) for name in names]
-    others = [s for s in report.strokes if s.experiment not in names]
-    return [group for group in [*groups, ("", others)] if group[1]]
+    rest = [s for s in report.strokes if s.experiment not in names]
+    return [group for group in [*groups, ("", rest)] if group[1]]
 
 
 _PLATES: Mapping[str, Callable[[Report], Plate]] = {

@@ -23,19 +23,19 @@ _BINS = 24
 def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: bool) -> Panel | None:
     """Return the distribution of the correlation over all paths; None where no path has one."""
     values = correlations(findings)
-    held = [value for value in values if value is not None]
-    if not held:
+    numbers = [value for value in values if value is not None]
+    if not numbers:
         return None
     choices = by_choice(findings)
     usual = next((r for one, r in zip(findings, values, strict=True) if one.usual and r is not None), None)
     with look():
         drawn = sheet(328, 190 + 13 * len(choices), (1.0, 0.115 * len(choices)))
         above, below = drawn.axes
-        low, high = _ends(held)
-        counts, edges = np.histogram(held, _BINS, (low, high))
+        low, high = _ends(numbers)
+        counts, edges = np.histogram(numbers, _BINS, (low, high))
         above.bar(edges[:-1], counts, np.diff(edges), align="edge", color=PALE, edgecolor=GREY, linewidth=0.6)
         above.set_ylabel("paths [number]")
-        above.set_title(f"{descriptor}: {len(held)} paths")
+        above.set_title(f"{descriptor}: {len(numbers)} paths")
         for y, (choice, name, of, is_usual) in enumerate(choices):
             if of is None:
                 below.text(low, y, "none", fontsize=7, va="center", color=GREY)

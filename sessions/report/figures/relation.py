@@ -26,7 +26,7 @@ def relation_panel(
     if len(points) < 2:
         return None
     figure_sheet = _two_columns()
-    axes, beside = figure_sheet.axes
+    axes, from_zero = figure_sheet.axes
     related = experiment.score_relation
     rising = related is not None and (related.slope or 0.0) > 0.0
     for mean, numbers in points:
@@ -51,12 +51,12 @@ def relation_panel(
         f"{relation_words(experiment)}\nrange of {shown.label}: {shown.text(high - low)} ({spread_share(low, high)})"
     )
     axes.set_title(f"{title}\n{rival_words(experiment.rivals)}".strip())
-    beside.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
-    beside.set_ylim(min(0.0, 1.15 * low), max(0.0, 1.15 * high))
-    beside.set_xlim(-1, 1)
-    beside.set_xticks([])
-    beside.spines["bottom"].set_visible(False)
-    beside.set_xlabel("from 0")
+    from_zero.plot([0.0] * len(values), values, "_", color=GREEN, markersize=12, markeredgewidth=1.2)
+    from_zero.set_ylim(min(0.0, 1.15 * low), max(0.0, 1.15 * high))
+    from_zero.set_xlim(-1, 1)
+    from_zero.set_xticks([])
+    from_zero.spines["bottom"].set_visible(False)
+    from_zero.set_xlabel("from 0")
     name, title = f"relation-{experiment.name}", f"Predicted {shown.label} against score of {experiment.descriptor}"
     header = (
         "index",

@@ -31,10 +31,10 @@ def _free_place(experiment: Experiment) -> tuple[float, bool] | None:
     across = np.array([y - x for x, y in dots])
 
     def room(start: float, *, above: bool) -> float:
-        beside = np.maximum(np.maximum(start - along, along - start - _LONG), 0.0)
+        along_bar = np.maximum(np.maximum(start - along, along - start - _LONG), 0.0)
         low, high = (1.0, 2.0 * _HIGH) if above else (-2.0 * _HIGH, -1.0)  # y - x grows twice as fast as the way across
         over = np.maximum(np.maximum(low - across, across - high), 0.0) / 2.0
-        return float(np.hypot(beside, over).min(initial=np.inf))
+        return float(np.hypot(along_bar, over).min(initial=np.inf))
 
     places = [(start, above) for start in range(2, 70) for above in (True, False)]
     best = max(places, key=lambda place: room(float(place[0]), above=place[1]))
@@ -47,8 +47,8 @@ def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
     (axes,) = drawn.axes
     _draw_identity(axes, _free_place(experiment))
     for answers in experiment.answers:
-        given = [(i, score) for i, score in zip(experiment.indices, answers.scores, strict=True) if score is not None]
-        places, scores = [index - 3.0 for index, _ in given], [score for _, score in given]
+        own = [(i, score) for i, score in zip(experiment.indices, answers.scores, strict=True) if score is not None]
+        places, scores = [index - 3.0 for index, _ in own], [score for _, score in own]
         axes.plot(places, scores, "o", markersize=2, color=GREY, alpha=0.55, markeredgewidth=0)
     for mean in experiment.scores:
         _draw_mean(drawn, axes, mean)

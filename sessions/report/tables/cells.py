@@ -113,11 +113,11 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Group], notes:
     kept = tuple(group for group in groups if group.rows)
     if not kept:
         return None
-    told, further = _in_short(caption)
+    short, further = _in_short(caption)
     heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
     return Table(
         name,
-        told,
+        short,
         tuple(Column(head, unit) for head, _, unit in heads),
         kept,
         (*further, *(notes.listed() if notes else ())),
@@ -142,9 +142,9 @@ def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
     return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in kept)),)
 
 
-def sections_of(made: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
+def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
     """Return the tables of each section that have rows."""
-    return {name: tuple(each for each in tables if each is not None) for name, tables in made.items()}
+    return {name: tuple(each for each in tables if each is not None) for name, tables in sections.items()}
 
 
 def parted(

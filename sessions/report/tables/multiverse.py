@@ -44,9 +44,9 @@ def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
     rows = [(Cell("all"), Cell(""), Cell(""), *_spread(spread(correlations(findings)), len(findings)))]
     before = ""
     for choice, name, of, usual in by_choice(findings):
-        held = sum(getattr(one.path, choice) == name for one in findings)
-        told = CHOICE_LABELS[choice] if choice != before else ""
-        rows.append((Cell(told), Cell(name), Cell("usual" if usual else ""), *_spread(of, held)))
+        count = sum(getattr(one.path, choice) == name for one in findings)
+        label = CHOICE_LABELS[choice] if choice != before else ""
+        rows.append((Cell(label), Cell(name), Cell("usual" if usual else ""), *_spread(of, count)))
         before = choice
     return tuple(rows)
 

@@ -23,9 +23,9 @@ def prediction_table(report: Report) -> Table | None:
 
     def row(p: PredictionFinding) -> Row:
         stroke = None if p.stroke is None else strokes.get(p.stroke)
-        held = {} if stroke is None else stroke.bootstrap
-        mu = held.get(model_mu(stroke, p)[0])
-        bound = held.get("tau_max")
+        intervals = {} if stroke is None else stroke.bootstrap
+        mu = intervals.get(model_mu(stroke, p)[0])
+        bound = intervals.get("tau_max")
         if bound is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
         missing = p.reasons.get("sed")
@@ -222,7 +222,7 @@ def force_table(report: Report) -> Table | None:
     strokes = {stroke.number: stroke.bootstrap for stroke in report.strokes}
 
     def row(p: PredictionFinding) -> Row:
-        held = {} if p.stroke is None else strokes.get(p.stroke, {})
+        intervals = {} if p.stroke is None else strokes.get(p.stroke, {})
         normal = p.normal_force_interval
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
 
@@ -236,9 +236,9 @@ def force_table(report: Report) -> Table | None:
         return (
             cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
             cell("normal_force", p.normal_force_error, normal, why),
-            cell("measured_normal", None, held.get("normal_force"), _SHORT),
+            cell("measured_normal", None, intervals.get("normal_force"), _SHORT),
             cell("tangential_force", p.tangential_force_error, p.tangential_force_interval, why),
-            cell("measured_tangential", None, held.get("tangential_force"), _SHORT),
+            cell("measured_tangential", None, intervals.get("tangential_force"), _SHORT),
             _depth(p, notes),
             cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
         )

@@ -109,7 +109,8 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     why = rival.reasons.get
     contrast = rival.contrast
     ends = None if rival.low is None or rival.high is None else (rival.low, rival.high)
-    given = None if rival.partial_low is None or rival.partial_high is None else (rival.partial_low, rival.partial_high)
+    low, high = rival.partial_low, rival.partial_high
+    partial = None if low is None or high is None else (low, high)
     less = (Cell(NONE), Cell(NONE), Cell(NONE))
     if contrast is not None:
         inside = None if contrast.low is None or contrast.high is None else (contrast.low, contrast.high)
@@ -125,7 +126,7 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
         Cell(str(rival.n)),
         notes.estimate(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
         *less,
-        notes.estimate(rival.partial, correlation, why("partial"), given, "it takes five surfaces"),
+        notes.estimate(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
         notes.number(rival.left_out_error, places(1), why("left_out_error")),
         _weight(rival, notes),
     )
@@ -150,10 +151,10 @@ def _named(names: Sequence[str]) -> str:
     responses = [name for name in names if name in RESPONSES]
     if len(responses) < MANY:
         return _listed(names)
-    others = len(RESPONSES) - 1
-    how = "all" if len(responses) == others else f"{len(responses)} of the"
+    count = len(RESPONSES) - 1
+    how = "all" if len(responses) == count else f"{len(responses)} of the"
     rest = [name for name in names if name not in RESPONSES]
-    return _listed([f"{how} {others} other responses of the model", *rest])
+    return _listed([f"{how} {count} other responses of the model", *rest])
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -96,8 +96,8 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
     if exponent is not None and exponent.plain is not None:
         plain = exponent.plain
         words = f"{digits(plain.estimate, 2)} ({digits(plain.low, 2)} to {digits(plain.high, 2)}) with µ taken as exact"
-        if exponent.both is not None:
-            value, low, high = exponent.both
+        if exponent.deming is not None:
+            value, low, high = exponent.deming
             words += f", {digits(value, 2)} ({digits(low, 2)} to {digits(high, 2)}) with errors in both"
         sentences.append(f"{name}: estimates grow as a power of µ, with an exponent of {words}.")
     elif exponent is not None and exponent.reason:

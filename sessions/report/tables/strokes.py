@@ -97,8 +97,8 @@ def _table(
     planned = any(stroke.trial is not None for stroke in report.strokes)
 
     def named(stroke: StrokeFinding) -> Row:
-        asked = (stroke.trial, stroke.index) if planned else ()
-        where = (notes.number(v, places(0), "no trial asks for it") for v in asked)
+        stimulus = (stroke.trial, stroke.index) if planned else ()
+        where = (notes.number(v, places(0), "no trial asks for it") for v in stimulus)
         return (Cell(str(stroke.number)), *where, *row(stroke))
 
     groups = grouped(report, report.strokes, lambda s: s.experiment, named)
@@ -123,7 +123,7 @@ def planted_table(report: Report) -> Table | None:
     notes = Notes()
     # Of several strokes in a trial the model gets the first.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
-    given = {prediction.trial: prediction for prediction in report.predictions}
+    predictions = {prediction.trial: prediction for prediction in report.predictions}
     columns = (
         "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
         "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
@@ -135,7 +135,7 @@ def planted_table(report: Report) -> Table | None:
             Cell(str(p.trial)),
             Cell(NONE if stroke is None or stroke.index is None else str(stroke.index)),
         ]
-        prediction = given.get(p.trial)
+        prediction = predictions.get(p.trial)
         name, mu = model_mu(stroke, prediction)
         quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
             (name, p.mu, mu, places(3), 1.0),

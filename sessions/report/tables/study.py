@@ -98,13 +98,13 @@ def _agreement(study: StudyFindings) -> Table | None:
     rows = tuple(
         (
             Cell(one.descriptor),
-            Cell(str(found.n)),
-            Cell(digits(found.kendall_w, 2)),
-            Cell(p_value(found.friedman_p)),
-            Cell(p_value(found.page_p)),
+            Cell(str(agreement.n)),
+            Cell(digits(agreement.kendall_w, 2)),
+            Cell(p_value(agreement.friedman_p)),
+            Cell(p_value(agreement.page_p)),
         )
         for one in study.descriptors
-        if (found := one.agreement) is not None
+        if (agreement := one.agreement) is not None
     )
     columns = "descriptor | subjects | Kendall's W | Friedman's p | Page's p"
     caption = (
@@ -118,12 +118,12 @@ def _normalised(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
-            given = raw[index]
+            score = raw[index]
             yield (
                 Cell(str(index)),
-                Cell(str(given.n)),
-                Cell(digits(given.mean, 1)),
-                range_cell(given.low, given.high, places(1)),
+                Cell(str(score.n)),
+                Cell(digits(score.mean, 1)),
+                range_cell(score.low, score.high, places(1)),
                 Cell(str(mean.n)),
                 Cell(digits(mean.mean, 2)),
                 range_cell(mean.low, mean.high, places(2)),
@@ -167,10 +167,10 @@ def _estimates(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         if one.estimates is None:
             return
-        for index, given in one.estimates.geometric.items():
+        for index, geometric in one.estimates.geometric.items():
             level = one.estimates.equal_moduli[index]
-            cells = [Cell(str(index)), Cell(str(given.n))]
-            for mean in (given, level):
+            cells = [Cell(str(index)), Cell(str(geometric.n))]
+            for mean in (geometric, level):
                 cells.append(Cell(significant(math.exp(mean.mean), 3)))
                 if mean.low is None or mean.high is None:
                     cells.append(notes.number(None, str, "one subject alone has no interval"))

@@ -135,7 +135,7 @@ def planted_table(study: StudyFindings) -> Table | None:
             Cell(one.effect),
             Cell(UNITS[one.effect]),
             Cell(significant(one.planted, 3)),
-            Cell(significant(one.found, 3)),
+            Cell(significant(one.estimate, 3)),
             range_cell(one.low, one.high, three_figures),
             Cell("yes" if one.covered else "no"),
         )
@@ -155,6 +155,6 @@ def planted_table(study: StudyFindings) -> Table | None:
 
 def flaws_table(study: StudyFindings) -> Table | None:
     """Return what was spoilt in a simulated study, and whether it was found."""
-    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.found else "no")) for one in study.flaws)
+    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.detected else "no")) for one in study.flaws)
     caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
     return table("table-planted-flaws", caption, "session | planted | found", [Group("", rows)])

@@ -57,20 +57,20 @@ def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[Row]:
 
 
 def _row(row: TrialRow, notes: Notes) -> Row:
-    given = row.score if row.score is not None else row.estimate
+    answer = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 
     def ends(low: float | None, high: float | None) -> Ends | None:
         return None if low is None or high is None else (low, high)
 
     def estimate(name: str, shown: Callable[[float], str], unit: float = 1.0, without: str = _FEW) -> Cell:
-        held = ends(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
-        return notes.estimate(getattr(row, name), shown, why, held, without, unit=unit)
+        interval = ends(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
+        return notes.estimate(getattr(row, name), shown, why, interval, without, unit=unit)
 
     return (
         Cell(str(row.trial)),
         Cell(str(row.index)),
-        notes.number(given, places(1), f"no score: {row.outcome}"),
+        notes.number(answer, places(1), f"no score: {row.outcome}"),
         estimate("mu", places(3)),
         estimate("tau_max", tau, 1e3),
         estimate("normal_force", places(2)),

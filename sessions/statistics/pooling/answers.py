@@ -49,7 +49,7 @@ def constant_stimuli(trials: Sequence[tuple[Visit, TrialRow]]) -> ConstantStimul
             answers[visit.subject].append(comparison(visit.session, row.standard, pair, row.choice))
     if not answers:
         return None
-    functions = {subject: function_of(given, friction) for subject, given in sorted(answers.items())}
+    functions = {subject: function_of(choices, friction) for subject, choices in sorted(answers.items())}
     pse = [one.pse.value for one in functions.values() if one.pse is not None]
     jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
     return ConstantStimuli(functions, average(pse), average(jnd))
@@ -83,12 +83,12 @@ def exponent(trials: Sequence[tuple[Visit, TrialRow]]) -> Exponent | None:
     """Return Stevens' exponent of magnitude estimates by the µ of the same strokes; None where nobody gave any."""
     if all(row.estimate is None for _, row in trials):
         return None
-    held = [
+    complete = [
         (visit.subject, row.index, row.estimate, row.mu)
         for visit, row in trials
         if row.estimate is not None and row.estimate > 0.0 and row.mu is not None and row.mu > 0.0
     ]
-    if not held:
+    if not complete:
         return Exponent(0, 0, None, reason="no trial has both an estimate above 0 and a µ of its own stroke")
-    subjects, surfaces, answers, mu = zip(*held, strict=True)
+    subjects, surfaces, answers, mu = zip(*complete, strict=True)
     return stevens_exponent(subjects, surfaces, answers, mu)

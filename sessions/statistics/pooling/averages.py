@@ -58,15 +58,15 @@ def averages(table: Mapping[str, Mapping[int, float]]) -> dict[int, Average]:
 
 def estimates(trials: Sequence[tuple[Visit, TrialRow]], quantity: str) -> Estimates | None:
     """Return what magnitude estimates say, beside that quantity of the model; None where nobody gave any."""
-    given = [
+    rows = [
         (v.subject, row.index, row.estimate, row.response(quantity)) for v, row in trials if row.estimate is not None
     ]
-    if not given:
+    if not rows:
         return None
-    no_logarithm = {subject for subject, _, value, _ in given if value <= 0.0}
+    no_logarithm = {subject for subject, _, value, _ in rows if value <= 0.0}
     logs: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
     pairs: list[tuple[str, float, float]] = []
-    for subject, index, value, response in given:
+    for subject, index, value, response in rows:
         if subject not in no_logarithm:
             logs[subject][index].append(math.log(value))
             pairs += [] if response is None else [(subject, response, math.log(value))]

@@ -107,7 +107,7 @@ class Recovered:
     descriptor: str
     effect: str
     planted: float
-    found: float
+    estimate: float
     low: float
     high: float
 
@@ -134,7 +134,7 @@ class PlantedFlaw:
 
     session: str
     expected: str  # for people
-    found: bool
+    detected: bool
 
 
 @dataclass(frozen=True, slots=True)

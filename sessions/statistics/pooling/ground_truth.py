@@ -165,7 +165,7 @@ def found_flaws(
         rows = {row.trial: row for row in visit.rows}
         if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
             rows_found.append(
-                PlantedFlaw(session, faults["expected"], found=False)
+                PlantedFlaw(session, faults["expected"], detected=False)
             )  # a trial that the session does not have
             continue
         seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
@@ -188,5 +188,5 @@ def found_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]
     if not rows:
         return None
     errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in rows]
-    held = [row.mu_low <= mu <= row.mu_high for row, mu in rows if row.mu_low is not None and row.mu_high is not None]
-    return PlantedFriction(len(rows), float(np.median(errors)), max(errors), len(held), sum(held))
+    holds = [row.mu_low <= mu <= row.mu_high for row, mu in rows if row.mu_low is not None and row.mu_high is not None]
+    return PlantedFriction(len(rows), float(np.median(errors)), max(errors), len(holds), sum(holds))

@@ -66,15 +66,15 @@ def pooled(
     counted = [visit for visit in ordered if visit.session not in copies]
     kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
     tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
-    asked = options or VisitOptions()
+    chosen = options or VisitOptions()
     descriptors = tuple(
-        _descriptor(name, asked, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
+        _descriptor(name, chosen, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
         for name in dict.fromkeys(row.descriptor for _, row in kept)
     )
     descriptors = _with_holm(descriptors)
     return StudyFindings(
         simulated=_simulated(ordered),
-        options=asked,
+        options=chosen,
         visits=ordered,
         failed=tuple(sorted(failed)),
         copies=tuple(copies.items()),
@@ -171,9 +171,9 @@ def _descriptor(
 
 def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
     """Return a scored trial with those quantities that its row has."""
-    held = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
-    held |= {label: row.response(name) for label, name in RESPONSES.items()}
-    return RivalTrial(subject, row.index, score, {name: value for name, value in held.items() if value is not None})
+    numbers = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
+    numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
+    return RivalTrial(subject, row.index, score, {name: value for name, value in numbers.items() if value is not None})
 
 
 def response_term(quantity: Quantity) -> str:
@@ -242,8 +242,8 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     """Return the correlation within subjects when each subject in turn is left out."""
     rows: list[tuple[str, float]] = []
     for subject in dict.fromkeys(point[0] for point in points):
-        others = [point for point in points if point[0] != subject]
-        repeated = repeated_correlation(*zip(*others, strict=True)) if others else None
+        rest = [point for point in points if point[0] != subject]
+        repeated = repeated_correlation(*zip(*rest, strict=True)) if rest else None
         if repeated is not None:
             rows.append((subject, repeated.r))
     return tuple(rows)
@@ -252,6 +252,6 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
 def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
     """Return what scores say that were standardised; `points` are subject, index and response to its own stroke."""
     means = averages(table)
-    both = [(subject, i, x, table[subject][i]) for subject, i, x in points if i in table.get(subject, {})]
-    within = repeated_correlation([p[0] for p in both], [p[2] for p in both], [p[3] for p in both])
-    return Normalised(means, _related(both), within)
+    pairs = [(subject, i, x, table[subject][i]) for subject, i, x in points if i in table.get(subject, {})]
+    within = repeated_correlation([p[0] for p in pairs], [p[2] for p in pairs], [p[3] for p in pairs])
+    return Normalised(means, _related(pairs), within)

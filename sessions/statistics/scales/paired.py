@@ -166,8 +166,8 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
     """Return the values about their mean and then the first's advantage (n + 1,); None without a finite maximum."""
     met, chosen = counts
     design = _design(len(met))
-    held = met > 0
-    x, n, y = design[held], met[held], chosen[held]
+    compared = met > 0
+    x, n, y = design[compared], met[compared], chosen[compared]
     beta = np.zeros(x.shape[1])
     if begin is not None:
         beta = np.append(begin[:-2] - begin[-2], begin[-1])
@@ -217,11 +217,11 @@ def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
     """Return the deviance of a fit from a chance of its own for every ordered pair, and its degrees of freedom."""
     met, chosen = counts
     eta = fitted[:-1, None] - fitted[None, :-1] + fitted[-1]
-    held = met > 0
-    chance = _chances(eta, model)[0][held]
-    n, y = met[held], chosen[held]
+    compared = met > 0
+    chance = _chances(eta, model)[0][compared]
+    n, y = met[compared], chosen[compared]
     terms = _x_log(y, n * chance) + _x_log(n - y, n * (1.0 - chance))
-    return float(2.0 * terms.sum()), int(held.sum()) - len(fitted) + 1
+    return float(2.0 * terms.sum()), int(compared.sum()) - len(fitted) + 1
 
 
 def _x_log(count: Array, expected: Array) -> Array:

@@ -77,12 +77,12 @@ class Psychometric:
 
 def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychometric:
     """Return the function fitted to answers; `lapse`, where given, is held at that share."""
-    held = [one for one in levels if one.presented]
-    none = Psychometric(sum(one.presented for one in held))
-    ratios = {one.log_ratio for one in held}
+    shown = [one for one in levels if one.presented]
+    none = Psychometric(sum(one.presented for one in shown))
+    ratios = {one.log_ratio for one in shown}
     if len(ratios) < LEAST_LEVELS:
         return replace(none, reason=f"it takes {LEAST_LEVELS} comparisons of different friction")
-    task = _Task(held, lapse)
+    task = _Task(shown, lapse)
     if task.flat:
         return replace(none, reason="answers hardly go with friction: the JND lies beyond all comparisons")
     slope = task.profile(_SLOPE)
@@ -96,7 +96,7 @@ def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychom
         rises=slope.value > 0.0,
         log_likelihood=task.likelihood,
         deviance=task.deviance(),
-        freedom=len(held) - task.parameters,
+        freedom=len(shown) - task.parameters,
     )
 
 

@@ -28,7 +28,7 @@ class Exponent:
     subjects: int
     trials: int
     plain: Term | None  # slope of the mixed model, the magnitude taken as exact
-    both: tuple[float, float, float] | None = None  # Deming's slope through the surfaces, and its 95 % interval
+    deming: tuple[float, float, float] | None = None  # Deming's slope through the surfaces, and its 95 % interval
     error_ratio: float | None = None  # variance of a surface's log answer by that of its log magnitude [-]
     reason: str = ""
 
@@ -67,13 +67,13 @@ def stevens_exponent(
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
     """Return log answers and magnitudes (s, k, 2), each subject's mean taken away; None where a cell is empty."""
-    held: defaultdict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
+    by_cell: defaultdict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
     for subject, surface, one, other in zip(subjects, surfaces, y.tolist(), x.tolist(), strict=True):
-        held[subject, surface].append((one, other))
+        by_cell[subject, surface].append((one, other))
     people, indices = sorted(set(subjects)), sorted(set(surfaces))
-    if any((subject, index) not in held for subject in people for index in indices):
+    if any((subject, index) not in by_cell for subject in people for index in indices):
         return None
-    cells = np.array([[np.mean(held[subject, index], axis=0) for index in indices] for subject in people])
+    cells = np.array([[np.mean(by_cell[subject, index], axis=0) for index in indices] for subject in people])
     return cells - cells.mean(axis=1, keepdims=True)
 
 
