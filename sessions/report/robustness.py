@@ -9,11 +9,12 @@ from sessions.report.wording import correlation, digits, ends_of
 from sessions.statistics.scores import Relation, relation
 
 REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
+OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."
 _Value = Callable[[PredictionFinding], float | None]
 
 
 def robustness(report: Report) -> list[str]:
-    """Return three sentences: what the other strain, the ending's place and a given force make of r with the scores."""
+    """Return what the other strain, the ending's place, a given force and another finger make of r with the scores."""
     kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
     other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
     return [
@@ -27,9 +28,10 @@ def robustness(report: Report) -> list[str]:
         _in_variant(
             report,
             Variant(kind, "computed", "force"),
-            "Under the measured normal force, and not at a given depth, r",
+            "Under the measured normal force, in place of a given depth",
             "Under the measured normal force, which was not tried here, the sign of r may differ.",
         ),
+        OTHER_FINGERS,
     ]
 
 

@@ -12,6 +12,7 @@ from sessions.prediction.model_facts import UNKNOWNS
 from sessions.recording.provenance import software_versions
 from sessions.report import Fact
 from sessions.report.commands import area_words, calibration_words, model_words
+from sessions.report.robustness import OTHER_FINGERS
 from sessions.report.tables.multiverse import paths_sentence
 from sessions.report.tables.psychometric import compared_in_study, psychometric_sentences
 from sessions.report.tables.rivals import rivals_sentences
@@ -32,6 +33,11 @@ def summary(study: StudyFindings) -> list[str]:
         sentences += _related(one, study)
         sentences += scale_sentences(one)
         sentences += [paths_sentence(one.descriptor, one.paths)] if one.paths else []
+    if any(one.repeated is not None for one in study.descriptors):
+        sentences.append(
+            "With the receptor elsewhere or under the measured force the sign may differ, too, as the report of each "
+            f"session says. {OTHER_FINGERS}"
+        )
     sentences += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
     if study.friction is not None:
         f = study.friction
@@ -223,7 +229,7 @@ def _missing(study: StudyFindings) -> list[str]:
             if row.sed is None and row.why and row.outcome != "open":
                 alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
     for places in alike.values():
-        first = "" if len({told for _, told in places}) == 1 else "of the first: "
+        first = "" if len({reason for _, reason in places}) == 1 else "of the first: "
         named = _listed([place for place, _ in places])
         why = f"{first}{_stopped(places[0][1])}"
         sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
@@ -276,10 +282,10 @@ def again(study: StudyFindings) -> list[Fact]:
         Fact("many paths", study.options.paths),
         Fact("held against scores", BY_NAME[study.response].label, BY_NAME[study.response].meaning),
     ]
-    made: defaultdict[str, list[str]] = defaultdict(list)
+    software: defaultdict[str, list[str]] = defaultdict(list)
     for visit in study.visits:
-        made[", ".join(f"{name} {version}" for name, version in visit.made_by.items())].append(visit.session)
-    facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in made.items()]
+        software[", ".join(f"{name} {version}" for name, version in visit.made_by.items())].append(visit.session)
+    facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in software.items()]
     facts += [Fact(visit.session, f"SHA-256 {visit.sha256}", "session.sqlite") for visit in study.visits]
     return [fact for fact in facts if fact.value]
 
