@@ -1,6 +1,7 @@
 // Looks at each frame's page once it is shown, and writes what it finds as JSON into the first <pre>.
-// Texts overlap where their boxes share more than two pixels each way. Small raised letters, and words that are slanted,
-// are left out: their boxes are larger than they are.
+// Texts overlap where their boxes share more than two pixels each way. A box is one em high: that of a browser is as high as
+// the font's own lines, and fonts differ. Small raised letters, and words that are slanted, are left out: their boxes are
+// larger than they are.
 const slanted = (element) => {
   const turned = /rotate\(\s*(-?[\d.]+)/.exec((element.getAttribute("transform") || "") + (element.getAttribute("style") || ""));
   return turned && turned[1] % 90 != 0;
@@ -18,7 +19,12 @@ const boxes_of = (page) => {
     const range = page.createRange();
     range.selectNodeContents(node);
     const rectangles = element.closest("svg") ? [element.getBoundingClientRect()] : range.getClientRects();
-    for (const box of rectangles) if (box.width > 0 && box.height > 0) boxes.push([box, node.data.trim().slice(0, 30)]);
+    const em = element.closest("svg") ? Infinity : parseFloat(getComputedStyle(element).fontSize);
+    for (const box of rectangles) {
+      const spare = Math.max(0, box.height - em) / 2;
+      const letters = { left: box.left, right: box.right, top: box.top + spare, bottom: box.bottom - spare };
+      if (box.width > 0 && box.height > 0) boxes.push([letters, node.data.trim().slice(0, 30)]);
+    }
   }
   return boxes.sort((one, other) => one[0].top - other[0].top);
 };

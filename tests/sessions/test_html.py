@@ -338,7 +338,7 @@ def shown(text, tmp_path_factory):
 def test_a_page_that_asks_fails_overlaps_or_is_cut_is_found_out(tmp_path):
     bad = (
         '<p>one<img src="http://127.0.0.1:9/x.png"><script>nothing()</script>'
-        '<p style="position: absolute; top: 14px">another'
+        '<p style="position: absolute; top: 8px">another'
         '<pre style="width: 50px; overflow: auto">far too long a line</pre>'
         '<svg width="50" height="20"><text x="0" y="15">wider than its picture</text></svg>'
     )
