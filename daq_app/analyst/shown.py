@@ -138,6 +138,11 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     )
 
 
+def picture_errors(report: Report | None, picture: str) -> str:
+    """Return the condition and the errors of what a picture of `session_pictures` shows; "" where it has no SED."""
+    return greatest_errors(report) if picture.partition(" ")[0] in ("relation", "response") else ""
+
+
 def _effect(report: Report | None) -> str:
     """Return the greatest effect on the SED of what the model leaves out; "" where none is known."""
     facts = [fact for fact in (() if report is None else report.left_out) if fact.name != "warning"]

@@ -15,7 +15,7 @@ from daq_app.analyst.frame import Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.raw import RawFile
 from daq_app.analyst.seen import film_words, named_errors
-from daq_app.analyst.shown import greatest_errors, sed_words
+from daq_app.analyst.shown import picture_errors, sed_words
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
@@ -205,7 +205,7 @@ class Work:
             return f"{words}. {tr(FIELD_ERRORS)}"
         if what == "compared":
             return "\n".join(named_errors(one) for one in (self._report, self._other) if one is not None)
-        return greatest_errors(self._report) if what in ("relation", "response") else ""
+        return picture_errors(self._report, name)
 
     def _field(self, of: str, every: Mapping[int, Field]) -> Field | None:
         """Return the finger of a stroke, settled, or at a step of the history that was drawn last."""

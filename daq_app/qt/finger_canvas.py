@@ -245,7 +245,8 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def _place(self) -> None:
         """Show the part that is looked at, or all of it at the foot of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
-        self.setMinimumSize(80, round(above + BAR_LINES * line) + self._least)  # two stand beside each other
+        least = self._least * (1 if self._look.lost is None else 2)  # a place that is marked can be told from others
+        self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other
         self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
         axis: Any = self._bar.getAxis("bottom")
         words = QFontMetricsF(self._font).horizontalAdvance(self._look.field.axis)

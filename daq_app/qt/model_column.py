@@ -19,7 +19,7 @@ from daq_app.analyst.seen import (
     shown_film,
     was_tried,
 )
-from daq_app.analyst.shown import greatest_errors, scene_table, session_pictures
+from daq_app.analyst.shown import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.compared_view import PICTURE, ComparedView
 from daq_app.qt.field_bar import OWN, FieldBar
@@ -130,7 +130,6 @@ class ModelColumn(QWidget):
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
         self.both.setVisible(state.compared is not None)
         self._paint()
-        self.session_errors.show_text(greatest_errors(state.report))
         self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
             names = [words for _, words in session_pictures(state.report)]
@@ -165,6 +164,7 @@ class ModelColumn(QWidget):
         if self.tabs.currentIndex() != SESSION or not 0 <= self.which.currentIndex() < len(names):
             return
         name, words = names[self.which.currentIndex()]
+        self.session_errors.show_text(picture_errors(state.report, name))
         drawn = state.drawn.get(name)
         if drawn is None:
             self.picture.show_picture("", tr("Drawing: {words}", words=words), b"")

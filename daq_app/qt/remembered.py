@@ -4,7 +4,7 @@ import json
 import os
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray
+from PySide6.QtCore import QByteArray, QSize
 from PySide6.QtWidgets import QWidget
 
 from daq_app.qt.screens import settings
@@ -14,6 +14,7 @@ from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr_noop
 THEMES = tr_noop(("system", "light", "dark"))
 SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
 RECENT = 12  # sessions that are offered
+FRAME = QSize(16, 48)  # that a desktop draws around a window, title bar included [px]
 DRAWER = "window/drawer open"
 DRAWER_SIZES = "window/drawer sizes"
 _LANGUAGE = "window/language"
@@ -84,7 +85,12 @@ def save_place(window: QWidget) -> None:
 
 
 def restore_place(window: QWidget) -> None:
-    """Put a window where it was; Qt brings it back onto a screen that is there."""
+    """Put a window where it was; Qt brings it back onto a screen that is there.
+
+    A new one is as large as it likes where there is room: left to itself Qt takes at most two thirds of a screen.
+    """
     kept = settings().value(_GEOMETRY)
     if isinstance(kept, QByteArray):
         window.restoreGeometry(kept)
+    else:
+        window.resize(window.sizeHint().boundedTo(window.screen().availableSize() - FRAME))

@@ -1,9 +1,10 @@
 """The rooms of the window, its menu, and what it remembers, in the real window."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QWidget
 
@@ -130,6 +131,19 @@ def test_the_window_opens_where_it_was_closed(driver):
     remembered.restore_place(after)
     assert after.geometry() == before.geometry()
     before.close()
+
+
+@pytest.mark.usefixtures("application")
+def test_a_window_opens_for_the_first_time_as_large_as_it_likes_where_the_screen_has_room(monkeypatch):
+    monkeypatch.setattr(remembered, "settings", lambda: SimpleNamespace(value=lambda _: None))
+    window = QWidget()
+    screen = window.screen().availableSize()
+    for likes, takes in (((0.9, 0.8), (0.9, 0.8)), ((2.0, 0.5), (1.0, 0.5))):
+        wanted, taken = (QSize(int(screen.width() * a), int(screen.height() * b)) for a, b in (likes, takes))
+        window.sizeHint = lambda wanted=wanted: wanted
+        remembered.restore_place(window)
+        assert window.size().height() == taken.height()
+        assert taken.width() - 16 <= window.width() <= taken.width()
 
 
 def test_about_names_the_versions_it_stands_on():
