@@ -1,8 +1,9 @@
 """The tables of the accuracy page and of the docs: text in cells, made of rows and of nothing else."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
+from typing import TypeVar
 
 from daq_app.console import number
 from solver.prediction import percent
@@ -19,6 +20,8 @@ from solver.verification.speed import Speed
 from solver.verification.targets import Target
 from solver.verification.truth import NUMBERS, Truth
 from solver.verification.warm import Warm
+
+R = TypeVar("R")
 
 CELL_WORDS = 25  # the limit for a cell of the docs: tests/test_documents_prose.py
 
@@ -41,6 +44,11 @@ class Table:
 def _cell(text: str) -> str:
     words = text.replace("|", "\\|").split(" ")
     return " ".join(words if len(words) <= CELL_WORDS else [*words[: CELL_WORDS - 1], "…"])
+
+
+def _of_rows(name: str, caption: str, rows: Sequence[R], columns: Mapping[str, Callable[[R], str]]) -> Table:
+    """Return a table with a line for each row, each cell made by its column."""
+    return Table(name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows))
 
 
 def tables(measured: Measured) -> dict[str, Table]:
@@ -71,20 +79,17 @@ def machine(measured: Measured) -> Table:
 def targets(measured: Measured) -> Table:
     """Return what was asked of the speed."""
     rows: list[Target] = measured.of(Target)
-    cells = [
-        (
-            row.work, row.at_error, _limit(row.reach, row.unit), _limit(row.aim, row.unit),
-            "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
-            "–" if row.floors is None else number(row.floors, 2), row.verdict, row.how,
-        )
-        for row in rows
-    ]  # fmt: skip
     caption = (
         "What is asked of the speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
         "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said."
     )
-    header = ("work", "at error", "reach", "aim", "measured", "floors", "verdict", "how")
-    return Table("targets", caption, header, tuple(cells))
+    return _of_rows("targets", caption, rows, {
+        "work": lambda row: row.work, "at error": lambda row: row.at_error,
+        "reach": lambda row: _limit(row.reach, row.unit), "aim": lambda row: _limit(row.aim, row.unit),
+        "measured": lambda row: "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
+        "floors": lambda row: "–" if row.floors is None else number(row.floors, 2),
+        "verdict": lambda row: row.verdict, "how": lambda row: row.how,
+    })  # fmt: skip
 
 
 def truths(measured: Measured) -> Table:
@@ -108,23 +113,18 @@ def truths(measured: Measured) -> Table:
 def speeds(measured: Measured) -> Table:
     """Return time against error, mesh by mesh."""
     rows: list[Speed] = sorted(measured.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
-    cells = [
-        (
-            row.kinematics, f"{row.dofs:,}", _ms(row.setup_s), _ms(row.floor_s), _ms(row.first_s), _ms(row.next_s),
-            "–" if row.judged_error is None else percent(row.judged_error), ", ".join(row.failed) or "–",
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = (
-        "strain", "unknowns", "set-up [ms]", "floor [ms]", "first [ms]", "next [ms]",
-        "largest error", "no answer",
-    )  # fmt: skip
     caption = (
         "Time against true error, mesh by mesh of Q2/P-1 elements, eliminated by nested dissection. Floor: one "
         "assembly, factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these "
         "is in a picture of the decision on what the solver is made of, docs/decisions."
     )
-    return Table("speeds", caption, header, tuple(cells))
+    return _of_rows("speeds", caption, rows, {
+        "strain": lambda row: row.kinematics, "unknowns": lambda row: f"{row.dofs:,}",
+        "set-up [ms]": lambda row: _ms(row.setup_s), "floor [ms]": lambda row: _ms(row.floor_s),
+        "first [ms]": lambda row: _ms(row.first_s), "next [ms]": lambda row: _ms(row.next_s),
+        "largest error": lambda row: "–" if row.judged_error is None else percent(row.judged_error),
+        "no answer": lambda row: ", ".join(row.failed) or "–",
+    })  # fmt: skip
 
 
 def estimates(measured: Measured) -> Table:
@@ -156,49 +156,41 @@ def _share(answers: Sequence[bool | None]) -> str:
 def warm(measured: Measured) -> Table:
     """Return the warm stepper's rows."""
     rows: list[Warm] = measured.of(Warm)
-    cells = [
-        (
-            f"{row.kinematics} strain", row.case, str(row.readings), _ms(row.median_s), _ms(row.p99_s),
-            _ms(row.once_p99_s), percent(row.worst_error),
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = ("", "surface", "readings", "median [ms]", "p99 [ms]", "p99 of one pass [ms]", "largest error, by peak")
     caption = "The warm stepper, fed reading by reading; p99 of each reading's median over five passes."
-    return Table("warm", caption, header, tuple(cells))
+    return _of_rows("warm", caption, rows, {
+        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+        "readings": lambda row: str(row.readings), "median [ms]": lambda row: _ms(row.median_s),
+        "p99 [ms]": lambda row: _ms(row.p99_s), "p99 of one pass [ms]": lambda row: _ms(row.once_p99_s),
+        "largest error, by peak": lambda row: percent(row.worst_error),
+    })  # fmt: skip
 
 
 def histories(measured: Measured) -> Table:
     """Return courses against direct states."""
     rows: list[Marched] = measured.of(Marched)
-    cells = [
-        (
-            f"{row.kinematics} strain", row.case, str(row.dofs), _ms(row.direct_s), _ms(row.marched_s),
-            number(row.marched_s / row.direct_s, 2), f"{abs(row.difference):.0e}",
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = ("", "surface", "unknowns", "direct [ms]", "200 substeps [ms]", "times", "difference of the SED")
-    return Table("histories", "A course of 200 substeps against the state found directly.", header, tuple(cells))
+    return _of_rows("histories", "A course of 200 substeps against the state found directly.", rows, {
+        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+        "unknowns": lambda row: str(row.dofs), "direct [ms]": lambda row: _ms(row.direct_s),
+        "200 substeps [ms]": lambda row: _ms(row.marched_s),
+        "times": lambda row: number(row.marched_s / row.direct_s, 2),
+        "difference of the SED": lambda row: f"{abs(row.difference):.0e}",
+    })  # fmt: skip
 
 
 def costs(measured: Measured) -> Table:
     """Return where the time goes."""
     rows: list[Cost] = measured.of(Cost)
-    cells = [
-        (
-            f"{row.kinematics} strain", percent(row.tolerance), f"{row.dofs:,}", _ms(row.took_s), _ms(row.setup_s),
-            _ms(row.wall_s), _ms(row.estimate_s),
-            ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = ("", "tolerance", "unknowns", "in all [ms]", "set-up [ms]", "solve [ms]", "estimate [ms]", "by part")
     caption = (
         "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
         "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a profiler."
     )
-    return Table("costs", caption, header, tuple(cells))
+    return _of_rows("costs", caption, rows, {
+        "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),
+        "unknowns": lambda row: f"{row.dofs:,}", "in all [ms]": lambda row: _ms(row.took_s),
+        "set-up [ms]": lambda row: _ms(row.setup_s), "solve [ms]": lambda row: _ms(row.wall_s),
+        "estimate [ms]": lambda row: _ms(row.estimate_s),
+        "by part": lambda row: ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
+    })  # fmt: skip
 
 
 def starts(measured: Measured) -> Table:
@@ -215,30 +207,25 @@ def starts(measured: Measured) -> Table:
 def orders(measured: Measured) -> Table:
     """Return observed orders of convergence."""
     rows: list[Order] = measured.of(Order)
-    cells = [
-        (
-            row.problem, row.quantity, row.kinematics, " / ".join(f"{error:.1e}" for error in row.errors),
-            " / ".join(number(1e3 * took) for took in row.took_s), f"{row.order:.2f}", f"{row.least:g}",
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = ("problem", "quantity", "strain", "errors, coarse to fine", "time [ms]", "order", "at least")
     caption = "Observed orders of convergence. Time: of a solve on each mesh, the mesh included."
-    return Table("orders", caption, header, tuple(cells))
+    return _of_rows("orders", caption, rows, {
+        "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
+        "strain": lambda row: row.kinematics,
+        "errors, coarse to fine": lambda row: " / ".join(f"{error:.1e}" for error in row.errors),
+        "time [ms]": lambda row: " / ".join(number(1e3 * took) for took in row.took_s),
+        "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
+    })  # fmt: skip
 
 
 def problems(measured: Measured) -> Table:
     """Return the published problems."""
     rows: list[Problem] = measured.of(Problem)
-    cells = [
-        (
-            row.problem, row.source, row.quantity, number(row.expected, 5), number(row.obtained, 5), percent(row.off),
-            row.of, percent(row.allowed), "met" if row.met else "MISSED",
-        )
-        for row in rows
-    ]  # fmt: skip
-    header = ("problem", "source", "quantity", "expected", "obtained", "off", "of", "allowed", "verdict")
-    return Table("problems", "Published problems, run through the same code as the finger.", header, tuple(cells))
+    return _of_rows("problems", "Published problems, run through the same code as the finger.", rows, {
+        "problem": lambda row: row.problem, "source": lambda row: row.source, "quantity": lambda row: row.quantity,
+        "expected": lambda row: number(row.expected, 5), "obtained": lambda row: number(row.obtained, 5),
+        "off": lambda row: percent(row.off), "of": lambda row: row.of, "allowed": lambda row: percent(row.allowed),
+        "verdict": lambda row: "met" if row.met else "MISSED",
+    })  # fmt: skip
 
 
 def hard_small(measured: Measured) -> Table:

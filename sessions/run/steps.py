@@ -92,23 +92,25 @@ class Note(Struct, frozen=True):
     text: str
 
 
-class Redo(Struct, frozen=True):
+class _WithReason(Struct, frozen=True):
+    """Somebody decides something, and says why."""
+
+    reason: str
+
+
+class Redo(_WithReason, frozen=True):
     """The trial in hand is to be done again; just before a trial begins, the one before it.
 
     Of two stimuli that are compared both are presented again.
     """
-
-    reason: str
 
 
 class UndoRedo(Struct, frozen=True):
     """The last redo was a mistake: what it discarded counts again. Meant until the next stroke."""
 
 
-class Skip(Struct, frozen=True):
+class Skip(_WithReason, frozen=True):
     """The trial in hand is to be left out, and with the first of two that are compared also the second."""
-
-    reason: str
 
 
 class Pause(Struct, frozen=True):
@@ -123,10 +125,8 @@ class RestOver(Struct, frozen=True):
     """The time of a rest is up."""
 
 
-class Abort(Struct, frozen=True):
+class Abort(_WithReason, frozen=True):
     """The session ends now."""
-
-    reason: str
 
 
 class Finish(Struct, frozen=True):
@@ -234,16 +234,18 @@ class AskFinish(Struct, frozen=True):
     """Wait for the experimenter to end the session, or to have the last trial repeated."""
 
 
-class Tell(Struct, frozen=True):
+class _Sentence(Struct, frozen=True):
+    """Something is said."""
+
+    sentence: str
+
+
+class Tell(_Sentence, frozen=True):
     """Say something that needs no answer."""
 
-    sentence: str
 
-
-class Refuse(Struct, frozen=True):
+class Refuse(_Sentence, frozen=True):
     """The event is not meant now; nothing has changed."""
-
-    sentence: str
 
 
 class EndSession(Struct, frozen=True):

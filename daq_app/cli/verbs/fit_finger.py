@@ -43,29 +43,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_visit(parser)
     parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
     parser.add_argument(
-        "--shift",
-        type=within("--shift", float, -1e9, 1e9),
-        default=0.0,
-        metavar="S",
-        help="added to the log's times (0)",
-    )
-    parser.add_argument(
         "--finger", type=Path, metavar="FILE", help="scene file with the finger's dimensions (else the session's own)"
     )
-    parser.add_argument(
-        "--mu",
-        type=within("--mu", float, 0.0, 5.0),
-        default=MU,
-        metavar="MU",
-        help=f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly changes)",
-    )
-    parser.add_argument(
-        "--prior",
-        type=within("--prior", float, 1.1, 4.0),
-        default=FACTOR,
-        metavar="FACTOR",
-        help=f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)",
-    )
+    for name, least, greatest, usual, metavar, words in (
+        ("--shift", -1e9, 1e9, 0.0, "S", "added to the log's times (0)"),
+        ("--mu", 0.0, 5.0, MU, "MU", f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly "
+         "changes)"),
+        ("--prior", 1.1, 4.0, FACTOR, "FACTOR", f"one standard deviation of each stiffness about the published one, as "
+         f"a factor ({FACTOR:g}, assumed)"),
+    ):  # fmt: skip
+        kind = within(name, float, least, greatest)
+        parser.add_argument(name, type=kind, default=usual, metavar=metavar, help=words)
     parser.add_argument(
         "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
     )
