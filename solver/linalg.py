@@ -104,9 +104,9 @@ def places(elements: Indices) -> Array:
     sides = elements[:, 4:8].ravel()  # each mid-side node is met by two elements at most
     order = np.argsort(sides, kind="stable")
     twice = np.flatnonzero(sides[order][1:] == sides[order][:-1])
-    beside = np.full(4 * count, -1)
-    beside[order[twice]], beside[order[twice + 1]] = order[twice + 1] // 4, order[twice] // 4
-    beside = beside.reshape(count, 4)
+    neighbours = np.full(4 * count, -1)
+    neighbours[order[twice]], neighbours[order[twice + 1]] = order[twice + 1] // 4, order[twice] // 4
+    neighbours = neighbours.reshape(count, 4)
     ways = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
     out = np.full((count, 2), np.nan)
     for seed in range(count):
@@ -115,7 +115,7 @@ def places(elements: Indices) -> Array:
         out[seed] = 0.0
         edge = np.array([seed])
         while len(edge):
-            near = beside[edge]
+            near = neighbours[edge]
             new = (near >= 0) & np.isnan(out[near, 0])
             out[near[new]] = (out[edge][:, None] + ways)[new]
             edge = distinct(near[new])
@@ -228,7 +228,7 @@ class Elimination:
         self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
         self._still = np.zeros(plan.size)
         values, waiting = np.empty(plan.factors), np.empty(plan.waiting)
-        self.felt = self.carried[plan.size - skin :]
+        self.skin_force = self.carried[plan.size - skin :]
         self.factors = factors_of(plan, values)
         self._eliminate = bind_arguments(multifrontal.eliminate, plan, values, waiting, self.stiffness)
         self._condense = bind_arguments(multifrontal.condense, self.factors)
@@ -242,7 +242,7 @@ class Elimination:
         """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `back_substitute`."""
         self.carried[:] = force
         self._condense(self.carried)
-        return self.felt
+        return self.skin_force
 
     def back_substitute(self, skin: Array, *, still: bool = False) -> Array:
         """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""

@@ -157,8 +157,8 @@ def percent(part: float) -> str:
     return f"{100.0 * part:.2g} %" if abs(part) < 1.0 else f"{100.0 * part:.0f} %"
 
 
-def _response(found: Response) -> dict[str, float | None]:
-    value, error = _plain(np.array(found))
+def _response(response: Response) -> dict[str, float | None]:
+    value, error = _plain(np.array(response))
     return {"value": value, "error": error}
 
 

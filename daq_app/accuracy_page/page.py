@@ -10,8 +10,8 @@ from daq_app.accuracy_page.figures import plates
 from daq_app.accuracy_page.tables import tables
 from sessions.report.figures.style import Plate
 from sessions.report.html import drawn, swap_in
-from solver.verification.asked import PROCESSOR_TIME
 from solver.verification.measuring import Measured
+from solver.verification.request import PROCESSOR_TIME
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
 # anchor, words, and the figures and tables under them, by name

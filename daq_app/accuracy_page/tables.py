@@ -240,7 +240,7 @@ def hard_finite(measured: Measured) -> Table:
 
 def _hard(measured: Measured, kinematics: str) -> Table:
     rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
-    cells = [(row.case, row.must, f"FAILED, {row.flaw}: {row.told}" if row.flaw else row.told) for row in rows]
+    cells = [(row.case, row.must, f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary) for row in rows]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
     return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), tuple(cells))

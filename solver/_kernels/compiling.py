@@ -43,11 +43,11 @@ def _cache_folder() -> Path:
     for file in sorted(_FOLDER.glob("*.py")):
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
-    given = os.environ.get("NUMBA_CACHE_DIR")
+    named = os.environ.get("NUMBA_CACHE_DIR")
     places = [_FOLDER / "__pycache__"] if only_mine(_FOLDER) else []
     places.append(user_cache_path("daq-app", appauthor=False))
-    if given:
-        places.insert(0, Path(given).parent if Path(given).name == version else Path(given))
+    if named:
+        places.insert(0, Path(named).parent if Path(named).name == version else Path(named))
     for place in places:
         with suppress(OSError):
             (place / version).mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -60,8 +60,8 @@ def only_mine(folder: Path) -> bool:
     """Return whether this user may write in `folder` and no other may, where the system has owners of files."""
     if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
         return os.access(folder, os.W_OK)
-    found = folder.stat()
-    return found.st_uid == os.getuid() and not found.st_mode & 0o022
+    status = folder.stat()
+    return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
 os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, when it is imported
@@ -197,10 +197,10 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
         key = (loop, tuple([_kind(argument) for argument in first]), ending)
         entry = _ENTRIES.get(key)
         if entry is None:
-            found: Any = loop
+            dispatcher: Any = loop
             types = tuple(_numba.typeof(argument) for argument in (*first, *last))
-            found.compile(types)  # or load
-            entry = _ENTRIES[key] = found.overloads[types].entry_point
+            dispatcher.compile(types)  # or load
+            entry = _ENTRIES[key] = dispatcher.overloads[types].entry_point
         return entry(*first, *last)
 
     return call

@@ -142,7 +142,7 @@ def displace(
     skin: Array,
     carried: Array,
     own: Array,
-    asked: Flags,
+    wanted_nodes: Flags,
     plan: SymbolicFactorization,
     factors: Factors,
     body: RecoveryArrays,
@@ -151,12 +151,12 @@ def displace(
     """Fill `out` (nodes, 2, c) with the displacements of a reduced body when those of its skin are `skin` (c, m).
 
     Added are those of the forces `carried` (n,), from `condense`, with the skin held, and `own` (e, 2) of the centres
-    alone. Only nodes `asked` for (nodes,) are sure to be filled.
+    alone. Only `wanted_nodes` (nodes,) are sure to be filled.
     """
     nodes, recovery_matrix = body
     size = carried.shape[0]
     used, needed = np.zeros(nodes.shape[0], np.bool_), np.zeros(plan.start.shape[0], np.bool_)
-    need(asked, nodes, plan, size, used, needed)
+    need(wanted_nodes, nodes, plan, size, used, needed)
     inside = np.zeros(size)
     for c in range(skin.shape[0]):
         for i in range(skin.shape[1]):
@@ -184,13 +184,15 @@ def place(
 
 
 @compiled
-def need(asked: Flags, nodes: Indices, plan: SymbolicFactorization, size: int, used: Flags, needed: Flags) -> None:
-    """Mark the elements (e,) `used` and the parts (p,) `needed` for the displacements of nodes `asked` for."""
+def need(
+    wanted_nodes: Flags, nodes: Indices, plan: SymbolicFactorization, size: int, used: Flags, needed: Flags
+) -> None:
+    """Mark the elements (e,) `used` and the parts (p,) `needed` for the displacements of `wanted_nodes` (nodes,)."""
     wanted = np.zeros(size, np.bool_)
     for e in range(nodes.shape[0]):
-        whole = asked[nodes[e, 8]]
+        whole = wanted_nodes[nodes[e, 8]]
         for i in range(16):
-            if whole or asked[nodes[e, i // 2]]:
+            if whole or wanted_nodes[nodes[e, i // 2]]:
                 used[e] = True
                 if plan.unknown[e, i] >= 0:
                     wanted[plan.unknown[e, i]] = True

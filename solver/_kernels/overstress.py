@@ -56,17 +56,17 @@ def integrate(
             own[2 * i] += c * (mx[i] - whole / 3.0 * hx[i])
             own[2 * i + 1] += c * (my[i] - whole / 3.0 * hy[i])
         if anew:
-            both, part, third = c * 2.0 / 9.0 * whole, c * 2.0 / 3.0, c * whole / 3.0
+            dyadic, part, third = c * 2.0 / 9.0 * whole, c * 2.0 / 3.0, c * whole / 3.0
             for i in range(9):
                 px, py = c * (t0 * gx[i] + t2 * gy[i]), c * (t2 * gx[i] + t1 * gy[i])
                 for k in range(i + 1):
                     laplace = px * gx[k] + py * gy[k]
                     xx, yy = mx[i] * hx[k] + hx[i] * mx[k], my[i] * hy[k] + hy[i] * my[k]
                     xy, yx = mx[i] * hy[k] + hx[i] * my[k], my[i] * hx[k] + hy[i] * mx[k]
-                    full[2 * i, 2 * k] += laplace - part * xx + (both + third) * hx[i] * hx[k]
-                    full[2 * i + 1, 2 * k + 1] += laplace - part * yy + (both + third) * hy[i] * hy[k]
-                    full[2 * i, 2 * k + 1] += both * hx[i] * hy[k] + third * hy[i] * hx[k] - part * xy
-                    full[2 * i + 1, 2 * k] += both * hy[i] * hx[k] + third * hx[i] * hy[k] - part * yx
+                    full[2 * i, 2 * k] += laplace - part * xx + (dyadic + third) * hx[i] * hx[k]
+                    full[2 * i + 1, 2 * k + 1] += laplace - part * yy + (dyadic + third) * hy[i] * hy[k]
+                    full[2 * i, 2 * k + 1] += dyadic * hx[i] * hy[k] + third * hy[i] * hx[k] - part * xy
+                    full[2 * i + 1, 2 * k] += dyadic * hy[i] * hx[k] + third * hx[i] * hy[k] - part * yx
 
 
 @compiled

@@ -31,7 +31,7 @@ class MeshSolution:
 
     finger: FiniteFinger
     sizing: Sizing
-    shape: EquilibriumState
+    state: EquilibriumState
     setup_s: float  # meshes and tables [s]
 
 
@@ -72,16 +72,16 @@ class Meshes:
             begun = perf_counter()
             finger = self.finger(scene, sizing)
             setup = perf_counter() - begun
-            near = None if self._last is None or self._last.finger is not finger else self._last.shape
+            near = None if self._last is None or self._last.finger is not finger else self._last.state
             try:
                 self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, stop, near), setup)
                 self._coarse[scene, sizing] = self._last
             except SolveFailure as failure:
                 self._coarse[scene, sizing] = failure
-        found = self._coarse[scene, sizing]
-        if isinstance(found, SolveFailure):
-            raise found
-        return found
+        solution = self._coarse[scene, sizing]
+        if isinstance(solution, SolveFailure):
+            raise solution
+        return solution
 
 
 def coarse_solution(
@@ -98,12 +98,12 @@ def coarse_solution(
     beyond = False
     try:
         low = meshes.coarse(scene, sizing, stop)
-        if low.shape.reaches_end:
+        if low.state.reaches_end:
             sizing = replace(sizing, margin=WIDER)
             low = meshes.coarse(scene, sizing, stop)
-        if sound(low.finger, low.shape):
+        if sound(low.finger, low.state):
             return low
-        beyond = folded(low.finger, low.shape)
+        beyond = folded(low.finger, low.state)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
             raise  # decided on a mesh of its own, whatever this one is
@@ -126,10 +126,10 @@ def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], meshes: Meshe
     begun = perf_counter()
     finger = meshes.finger(scene, sizing)
     setup = perf_counter() - begun
-    shape = settled(finger, scene, stop)
-    if sizing.margin < WIDER and shape.reaches_end:
+    state = settled(finger, scene, stop)
+    if sizing.margin < WIDER and state.reaches_end:
         return _plain(scene, replace(sizing, margin=WIDER), stop, meshes)
-    return MeshSolution(finger, sizing, shape, setup)
+    return MeshSolution(finger, sizing, state, setup)
 
 
 def _on_coarse(
@@ -150,10 +150,10 @@ def refine(
     scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], meshes: Meshes
 ) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
-    steps = steps_asked(scene, low.finger, stop, low.shape)
+    steps = steps_asked(scene, low.finger, stop, low.state)
     sizing = replace(low.sizing, fineness=fineness)
     top = solution_on(scene, sizing, low, stop, meshes, 1 if steps is None else steps.times)
-    if top.sizing.margin < WIDER and top.shape.reaches_end:
+    if top.sizing.margin < WIDER and top.state.reaches_end:
         wider = replace(sizing, margin=WIDER)
         top = solution_on(scene, wider, low, stop, meshes, 1 if steps is None else steps.times)
     return NestedSolution(low, top, steps)
@@ -169,21 +169,21 @@ def solution_on(
     """
     begun = _begun(scene, sizing, below, meshes)
     try:
-        return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
+        return replace(begun, state=settled(begun.finger, scene, stop, begun.state, times))
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
     begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, meshes)
-    return replace(begun, shape=settled(begun.finger, scene, stop, begun.shape, times))
+    return replace(begun, state=settled(begun.finger, scene, stop, begun.state, times))
 
 
 def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
-    """Return a mesh above the state `below`, with the shape that a settled one is sought from."""
+    """Return a mesh above the state `below`, with the state that a settled one is sought from."""
     begun = perf_counter()
     finger = meshes.finger(scene, sizing)
     if finger is below.finger:
         return below
-    start = finger.transfer(below.shape, below.finger)
+    start = finger.transfer(below.state, below.finger)
     return MeshSolution(finger, sizing, start, perf_counter() - begun)
 
 
@@ -197,16 +197,16 @@ def on_nested(
     begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
     try:
-        if top.shape.load.path_dependent:
+        if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
-                judged = steps_asked(scene, top.finger, stop, top.shape)
+                judged = steps_asked(scene, top.finger, stop, top.state)
                 steps = None if judged is None else replace(judged, times=1)
-            shape = end(scene, finger, stop=stop)
+            state = end(scene, finger, stop=stop)
         else:
             steps = None
-            shape = nearby(finger, scene, begun.shape, stop) or settled(finger, scene, stop, begun.shape)
+            state = nearby(finger, scene, begun.state, stop) or settled(finger, scene, stop, begun.state)
     except SolveFailure:
         return None, steps
-    given = None if scene.viscoelastic else forces_of(scene, shape.load)
-    (values,), (changes,) = edge_changes(finger.newton, [(shape, given)], finger.numbers_and_row)
+    forces = None if scene.viscoelastic else forces_of(scene, state.load)
+    (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
     return nested_numbers(values, changes, steps), steps

@@ -74,12 +74,12 @@ def forces_missed(scene: Scene, normal: float, tangential: float) -> dict[str, f
     `normal_force_missed` by the force given, `drag_missed` by what friction could carry under it. Raises NotConverged
     where that is more than a state found leaves over.
     """
-    given, drag = scene.normal_force, scene.tangential_force
-    if given is None:
+    force, drag = scene.normal_force, scene.tangential_force
+    if force is None:
         return {}
-    missed = {"normal_force_missed": abs(normal / given - 1.0)}
+    missed = {"normal_force_missed": abs(normal / force - 1.0)}
     if drag is not None and scene.friction.mu > 0.0:
-        missed["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * given)
+        missed["drag_missed"] = abs(tangential + scene.loading.direction * drag) / (float(scene.friction.mu) * force)
     if max(missed.values()) > MISSED:
         raise NotConverged("No state was found that has the forces given: give others, or a depth.")
     return missed

@@ -26,7 +26,7 @@ from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import never
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Given, Newton
+from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
 from solver.scene.scene import Scene
@@ -34,6 +34,14 @@ from solver.scene.scene import Scene
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node
 SHIFT = 4  # place of the bone's shift among the numbers
+
+
+def half_width(change: Array, edges: Array) -> Array:
+    """Return how far numbers may be off which change by so much on the nested mesh.
+
+    `edges` is what they change by there when edges of contact move by a node.
+    """
+    return FROM_HALVING * np.abs(change) + FROM_EDGES * edges
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -120,7 +128,7 @@ class Errors(NamedTuple):
 
 def edge_changes(
     newton: Newton,
-    states: Sequence[tuple[EquilibriumState, Given | None]],
+    states: Sequence[tuple[EquilibriumState, ForceLoad | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
 ) -> tuple[Array, Array]:
     """Return the numbers (c, n) of states, and what each changes by when its edges of contact move by a node (c, n).
@@ -129,7 +137,7 @@ def edge_changes(
     is under or None for its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no
     equilibrium.
     """
-    moved = [_with_moved_edges(newton, state, given) for state, given in states]
+    moved = [_with_moved_edges(newton, state, forces) for state, forces in states]
     known = [one for edges in moved for sides in edges for one in sides if one is not None]
     values = numbers([*(state for state, _ in states), *known])
     here, there = values[: len(states)], iter(values[len(states) :])
@@ -155,7 +163,7 @@ def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> Nested
 
 
 def _with_moved_edges(
-    newton: Newton, state: EquilibriumState, given: Given | None
+    newton: Newton, state: EquilibriumState, forces: ForceLoad | None
 ) -> list[list[EquilibriumState | None]]:
     """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge by edge.
 
@@ -163,12 +171,12 @@ def _with_moved_edges(
     """
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
-    kept = newton.condensed.found is state.u  # the tangent of the last iteration is there still
+    kept = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
     linearise = newton.relinearise if kept else newton.linearise
-    solvable, alone = linearise(state, state.load, x, 0, given), np.count_nonzero(state.touching) == 1
+    solvable, alone = linearise(state, state.load, x, 0, forces), np.count_nonzero(state.touching) == 1
     return [
         [
-            _moved(newton, state, given, x, *pair) if solvable else None
+            _moved(newton, state, forces, x, *pair) if solvable else None
             for pair in ((edge, edge + 1), (edge + 1, edge))
             if not (alone and state.touching[pair[0]])
         ]
@@ -177,7 +185,7 @@ def _with_moved_edges(
 
 
 def _moved(
-    newton: Newton, state: EquilibriumState, given: Given | None, x: Array, node: int, other: int
+    newton: Newton, state: EquilibriumState, forces: ForceLoad | None, x: Array, node: int, other: int
 ) -> EquilibriumState | None:
     """Return the equilibrium of the body, linearised at `state`, with `node` in the contact state of the `other`.
 
@@ -186,9 +194,9 @@ def _moved(
     states, senses = state.state.copy(), state.sense.copy()
     states[node], senses[node] = states[other], senses[other]
     begin = replace(state, state=states, sense=senses)
-    if newton.solve_contact(begin, state.load, x, 0, given) == SINGULAR:
+    if newton.solve_contact(begin, state.load, x, 0, forces) == SINGULAR:
         return None
-    deeper, along = newton.system.motion.tolist() if given is not None else (0.0, 0.0)
+    deeper, along = newton.system.motion.tolist() if forces is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
     after = newton.moved(begin, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
     return replace(after, state=states, sense=senses)  # and not those that the moved edge would call for
@@ -202,13 +210,13 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     """
     if nested is None:
         return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
-    off = FROM_HALVING * np.abs(nested.numbers - numbers) + FROM_EDGES * nested.of_edges
+    off = half_width(nested.numbers - numbers, nested.of_edges)
     if steps is not None:
         off += steps.error
     relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
-    found = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
-    return _without_given(scene, found)
+    estimates = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
+    return _without_given(scene, estimates)
 
 
 def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
@@ -221,19 +229,19 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     """Return the errors of the SED of a row of receptors `row` (r,), relative (r,); nan where nothing is known."""
     if nested is None:
         return np.full(len(row), np.nan)
-    off = FROM_HALVING * np.abs(nested.row - row) + FROM_EDGES * nested.row_of_edges
+    off = half_width(nested.row - row, nested.row_of_edges)
     return off / np.maximum(row, np.finfo(float).tiny)
 
 
-def _without_given(scene: Scene, found: Errors) -> Errors:
+def _without_given(scene: Scene, estimates: Errors) -> Errors:
     """Return the errors without those of what the scene gives, and of the drag where nothing rubs."""
     by_force, dragged = scene.normal_force is not None, scene.loading.dragged
     rubs = not scene.friction.frictionless
-    return found._replace(
-        normal=None if by_force else found.normal,
-        tangential=None if dragged else found.tangential if rubs else 0.0,
-        indentation=found.indentation if by_force else None,
-        shift=found.shift if dragged else None,
+    return estimates._replace(
+        normal=None if by_force else estimates.normal,
+        tangential=None if dragged else estimates.tangential if rubs else 0.0,
+        indentation=estimates.indentation if by_force else None,
+        shift=estimates.shift if dragged else None,
     )
 
 
@@ -263,13 +271,13 @@ class ContrastError(NamedTuple):
     warning: str = ""  # a sentence where that is too much of it, or of a force or depth
 
 
-def contrast_error(found: Sequence[Prediction]) -> ContrastError:
+def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     """Return what differences between these surfaces may be off by.
 
     Of forces and depth only what is off by more than sensors tell is warned of. A surface that has no state on the
     nested mesh is left out: nothing is known of it.
     """
-    known = [(one, one.nested) for one in found if one.nested is not None]
+    known = [(one, one.nested) for one in predictions if one.nested is not None]
     if len(known) < 2:
         return ContrastError(0.0)
     count = len(COMPARED)
@@ -277,8 +285,7 @@ def contrast_error(found: Sequence[Prediction]) -> ContrastError:
     change = np.abs([nested.numbers[:count] for _, nested in known]) - numbers
     edges = np.array([nested.of_edges[:count] for _, nested in known])
     pairs = np.array(list(combinations(range(len(known)), 2))).T
-    worst = FROM_HALVING * np.abs(change[pairs[0]] - change[pairs[1]])
-    worst += FROM_EDGES * np.hypot(edges[pairs[0]], edges[pairs[1]])
+    worst = half_width(change[pairs[0]] - change[pairs[1]], np.hypot(edges[pairs[0]], edges[pairs[1]]))
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(np.maximum(np.ptp(numbers, axis=0), LEAST * mean / WARNED), np.finfo(float).tiny)
     minded = off_by > NOTICED * mean
@@ -312,21 +319,21 @@ def estimated(
     newton: Newton,
     state: EquilibriumState,
     nested: tuple[Newton, EquilibriumState],
-    given: Given | None = None,
+    forces: ForceLoad | None = None,
     fewer: Sequence[EquilibriumState] = (),
 ) -> Estimated:
     """Return the `numbers` (n,) of a state and how far each may be off.
 
-    `nested` is the same state on the halved mesh (`solver.mesh.mesh`), `given` the forces it is under, if any. Where
+    `nested` is the same state on the halved mesh (`solver.mesh.mesh`), `forces` the forces it is under, if any. Where
     the state is the end of a load path on which skin sticks, `fewer` are its ends on the same mesh after `PARTS` of
     the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
     """
     value = numbers(newton, state)
     finer, there = nested
     (corrected,), (edges,) = edge_changes(
-        finer, [(there, given)], lambda states: np.array([numbers(finer, one) for one in states])
+        finer, [(there, forces)], lambda states: np.array([numbers(finer, one) for one in states])
     )
-    error = FROM_HALVING * np.abs(corrected - value) + FROM_EDGES * edges
+    error = half_width(corrected - value, edges)
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

@@ -93,9 +93,9 @@ def sideways(displacement: Array, touching: Indices) -> float:
 
 def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     """Return a sentence for everything left out that this scene would have needed."""
-    found: list[str] = []
+    sentences: list[str] = []
     if "finite strain" in left_out:
-        found += _of_strain(left_out["finite strain"])
+        sentences += _of_strain(left_out["finite strain"])
     needs = {
         "bone compliance": 'ask for finger.bone = "meshed"',
         "history": 'ask for solve.course = "history"',
@@ -108,8 +108,8 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
         if change is not None and change > WORTH_TELLING:
-            found.append(f"Leaving out {name} may have changed the ending's SED by {percent(change)}: {cure}.")
-    return tuple(found)
+            sentences.append(f"Leaving out {name} may have changed the ending's SED by {percent(change)}: {cure}.")
+    return tuple(sentences)
 
 
 def _of_strain(entry: Mapping[str, Any]) -> list[str]:
@@ -244,11 +244,11 @@ Answers = Callable[[Sequence[Scene]], tuple[Answer, ...]]
 MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 
-def measured(found: Prediction, answers: Answers) -> Prediction:
-    """Return `found` with measured differences in place of estimates where they can be had."""
+def measured(prediction: Prediction, answers: Answers) -> Prediction:
+    """Return `prediction` with measured differences in place of estimates where they can be had."""
     begun = perf_counter()
-    scene = replace(found.scene, solve=replace(found.scene.solve, evidence="estimated", tolerance=COARSE))
-    left_out = {name: dict(entry) for name, entry in found.model["left_out"].items()}
+    scene = replace(prediction.scene, solve=replace(prediction.scene.solve, evidence="estimated", tolerance=COARSE))
+    left_out = {name: dict(entry) for name, entry in prediction.model["left_out"].items()}
     plain = replace(scene, solve=replace(scene.solve, course="steady"))
     base = answers((plain,))[0]
     if isinstance(base, Prediction):
@@ -256,12 +256,18 @@ def measured(found: Prediction, answers: Answers) -> Prediction:
             if name in left_out:
                 estimated = left_out[name]["estimate"]
                 left_out[name] |= {"estimated": estimated, **entry}
-    kept = tuple(one for one in found.warnings if one not in warnings(found.scene, found.model["left_out"]))
+    return with_left_out(prediction, left_out, begun)
+
+
+def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], begun: float) -> Prediction:
+    """Return `prediction` with other entries of what it leaves out, made since `begun`, and their warnings."""
+    usual = warnings(prediction.scene, prediction.model["left_out"])
+    kept = tuple(one for one in prediction.warnings if one not in usual)
     return replace(
-        found,
-        model={**found.model, "left_out": left_out},
-        warnings=(*kept, *warnings(found.scene, left_out)),
-        evidence_s=perf_counter() - begun + (found.evidence_s or 0.0),
+        prediction,
+        model={**prediction.model, "left_out": left_out},
+        warnings=(*kept, *warnings(prediction.scene, left_out)),
+        evidence_s=perf_counter() - begun + (prediction.evidence_s or 0.0),
     )
 
 
@@ -295,12 +301,12 @@ def _difference(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
 
 def _beyond_errors(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
     """Return the same of a solve on another mesh, the estimate left as it was where both meshes explain the change."""
-    found = _difference(base, other, how)
+    entry = _difference(base, other, how)
     if not isinstance(other, Prediction) or base.sed_ending == 0.0:
-        return found
-    change, errors = found["estimate"], base.error_estimate + other.error_estimate
+        return entry
+    change, errors = entry["estimate"], base.error_estimate + other.error_estimate
     if change > errors:
-        return found
+        return entry
     return {"how": f"{MEASURED}{how}: {change:.2g}, within both meshes' errors, {errors:.2g}; the estimate stands"}
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from solver.accuracy.adaptivity import MARGIN
-from solver.accuracy.omitted_effects import RELAXATION, sideways, warnings
+from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, relaxing_laws
@@ -32,7 +32,7 @@ STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide
 
 
 @dataclass(frozen=True, slots=True)
-class Held:
+class ResidualOverstress:
     """What is still held, and when."""
 
     part: float  # of the settled SED of the ending, by which it is larger [-]
@@ -59,51 +59,43 @@ def relaxing(scene: Scene) -> Scene | None:
     return replace(scene, materials=replace(scene.materials, **soft))
 
 
-def with_held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Prediction:
-    """Return `found` with the evidence on viscosity marched, where that can be.
+def with_viscosity(prediction: Prediction, stop: Callable[[], bool] = lambda: False) -> Prediction:
+    """Return `prediction` with the evidence on viscosity marched, where that can be.
 
     Raises Cancelled as `stop` says.
     """
-    scene, begun = found.scene, perf_counter()
+    scene, begun = prediction.scene, perf_counter()
     if scene.materials.relax and scene.solve.course == "history":
-        return found
-    still = held(found, stop)
-    took = perf_counter() - begun
+        return prediction
+    still = residual_overstress(prediction, stop)
     if still is None:
-        return replace(found, evidence_s=took)
+        return replace(prediction, evidence_s=perf_counter() - begun)
     whose = "with the scene's own series"
     if not scene.materials.relax:
         whose = (
             "to the moduli of the scene with the times of Pawluk and Howe (1999) and assumed weights of a fifth each"
         )
-    before = found.model["left_out"]
+    before = prediction.model["left_out"]
     entry = {
         "estimate": still.part,
         "from": {**before["viscosity"]["from"], "slide_s": still.slide_s},
         "how": "change of the ending's SED when an elastic finger's slide has settled, all soft tissues relaxing "
         f"{whose}: press and slide marched on a coarse mesh in few steps",
     }
-    left_out = {**before, "viscosity": entry}
-    kept = tuple(one for one in found.warnings if one not in warnings(scene, before))
-    return replace(
-        found,
-        model={**found.model, "left_out": left_out},
-        warnings=(*kept, *warnings(scene, left_out)),
-        evidence_s=took,
-    )
+    return with_left_out(prediction, {**before, "viscosity": entry}, begun)
 
 
-def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | None:
-    """Return what tissues would still hold in the scene of `found`, whose skin says how long the slide lasts.
+def residual_overstress(prediction: Prediction, stop: Callable[[], bool] = lambda: False) -> ResidualOverstress | None:
+    """Return what tissues would still hold in the scene of `prediction`, whose skin says how long the slide lasts.
 
     None where the rough mesh has no such course. Raises Cancelled where `stop` says so.
     """
-    scene = relaxing(found.scene.driven(found.indentation))
-    if scene is None or not found.sed_ending > 0.0:
+    scene = relaxing(prediction.scene.driven(prediction.indentation))
+    if scene is None or not prediction.sed_ending > 0.0:
         return None
     direction = scene.loading.direction
-    touching = found.mesh.skin[[state != "open" for state in found.skin.state]]
-    slide = sideways(found.displacement, touching) if direction else 0.0
+    touching = prediction.mesh.skin[[state != "open" for state in prediction.skin.state]]
+    slide = sideways(prediction.displacement, touching) if direction else 0.0
     kind, depth = scene.solve.kinematics, scene.loading.depth
     lasting = slide / scene.loading.speed if direction else 0.0
     press, along = (np.arange(1, steps + 1) / steps for steps in STEPS[kind])
@@ -122,7 +114,7 @@ def held(found: Prediction, stop: Callable[[], bool] = lambda: False) -> Held | 
     except SolveFailure:
         return None
     assert isinstance(way, RelaxingWay)
-    return Held(abs(way.energies[-1][0] / at_last - 1.0), lasting) if at_last > 0.0 else None
+    return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), lasting) if at_last > 0.0 else None
 
 
 def _small(scene: Scene) -> tuple[Way, float]:
@@ -139,7 +131,7 @@ def _small(scene: Scene) -> tuple[Way, float]:
 def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: float) -> tuple[LinearFinger, RelaxingBody]:
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
     scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
-    made = LinearFinger.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
-    body = RelaxingBody(made.geometry.mesh, relaxing_laws(materials), checked=True)
+    coarse = LinearFinger.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
+    body = RelaxingBody(coarse.geometry.mesh, relaxing_laws(materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
-    return made, body
+    return coarse, body

@@ -16,7 +16,7 @@ class CondensedBody(Protocol):
     middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
     fixed_length: Array  # (k,) skin that each node stands for whatever the state [mm]
     stiffness: Array  # (2 k, 2 k) x, y of one node, x, y of the next [N/mm per mm]
-    found: Array | None  # displacements of the equilibrium that the tangent led to, where it may serve once more
+    equilibrium: Array | None  # displacements of the equilibrium that the tangent led to, where it may serve once more
     load: Array  # (2 k,) of the skin, or of all that moves: dead loads [N/mm]
     force: Array  # (2 k,) of the skin on the surface, were there no surface [N/mm]
 

@@ -217,7 +217,7 @@ def _excess(H: Array, log: Array) -> Array:
 class CondensedFinite:
     """A body at finite strain with the memory for its tangent."""
 
-    found: Array | None  # displacements of the equilibrium that the tangent led to
+    equilibrium: Array | None  # displacements of the equilibrium that the tangent led to
 
     def __init__(self, body: FiniteBody) -> None:
         """Set memory aside for `body`."""
@@ -230,7 +230,7 @@ class CondensedFinite:
             np.zeros((count, 16, 16)), self.all_forces, np.zeros((count, 2, 17)), np.zeros((count, 3)),
             np.zeros((count, 3, 18)), np.zeros((count, 3)),
         )  # fmt: skip
-        self.stiffness, self.force = self.inside.stiffness, self.inside.felt
+        self.stiffness, self.force = self.inside.stiffness, self.inside.skin_force
         self.compliance, self.motions = np.zeros((0, 0)), np.zeros((0, 0))
         self.bulk = float((body.lame / body.shear).max())
         self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.mesh.skin))
@@ -238,7 +238,7 @@ class CondensedFinite:
         self._assemble = bind_arguments(element_loops.assemble, elements, self.system)
         self._forces = bind_arguments(element_loops.forces, elements, self.system)
         self._advance = bind_arguments(element_loops.advance, elements, self.system)
-        self.found = None
+        self.equilibrium = None
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
@@ -251,7 +251,7 @@ class CondensedFinite:
 
     def linearise(self, u: Array, pressure: Array) -> bool:
         """Assemble and eliminate the tangent at a state; False where it is turned inside out or has no factors."""
-        self.found = None
+        self.equilibrium = None
         if not self.assemble(u, pressure) > 0.0 or not self.inside.factorise(self.system.tangent):
             return False
         self._condense()

@@ -67,8 +67,8 @@ class LinearElimination:
 
     def skin_load(self, carried: Carried) -> Array:
         """Return what the skin feels (2 k,) of a load; nothing where it is held."""
-        felt = -carried[0][self._plan.size - len(self.stiffness) :]
-        return np.where(self._mesh.driven[self._mesh.skin].ravel(), 0.0, felt)
+        force = -carried[0][self._plan.size - len(self.stiffness) :]
+        return np.where(self._mesh.driven[self._mesh.skin].ravel(), 0.0, force)
 
     def displacement(self, skin: Array, carried: Carried, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, c) that go with those of the skin (2 k, c) under a load.
@@ -110,7 +110,7 @@ class CondensedLinear:
         self.motions = np.zeros((2 * len(rest), 0))  # of the body as a whole that the surface alone balances
         self.springs = self.motions  # all that nothing holds, orthonormal
         self.force = -load
-        self.found: Array | None = None
+        self.equilibrium: Array | None = None
         self._compliance: Array | None = None
 
     @property

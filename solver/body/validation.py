@@ -126,17 +126,17 @@ def _check_skin(mesh: Mesh) -> None:
 
 def check_loads(mesh: Mesh, loads: Array | None, prescribed: Array | None) -> None:
     """Raise BodyError unless dead `loads` and `prescribed` are (nodes, 2) and finite, and move only what is held."""
-    for name, given in (("loads", loads), ("prescribed", prescribed)):
-        if given is None:
+    for name, array in (("loads", loads), ("prescribed", prescribed)):
+        if array is None:
             continue
-        given = np.asarray(given)
-        if given.dtype.kind not in "fiu" or given.shape != mesh.nodes.shape:
+        array = np.asarray(array)
+        if array.dtype.kind not in "fiu" or array.shape != mesh.nodes.shape:
             raise BodyError(
-                f"{name} has the shape {given.shape} of {given.dtype}; it must be numbers in {mesh.nodes.shape}, a row "
+                f"{name} has the shape {array.shape} of {array.dtype}; it must be numbers in {mesh.nodes.shape}, a row "
                 "for every node"
             )
-        if not np.isfinite(given).all():
-            row = int(np.argmin(np.isfinite(given).all(axis=1)))
+        if not np.isfinite(array).all():
+            row = int(np.argmin(np.isfinite(array).all(axis=1)))
             raise BodyError(f"row {row} of {name} is not finite; give 0 where there is none")
     if prescribed is not None and np.asarray(prescribed)[~mesh.driven].any():
         row, along = (int(at[0]) for at in np.nonzero(prescribed * ~mesh.driven))

@@ -143,9 +143,9 @@ def tangent(law: Law, F: Array) -> Array:
     excess = F - inverse
     unit = np.einsum("ab,AB->aAbB", np.eye(2), np.eye(2))
     crossed = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
-    both = np.einsum("...aA,...bB->...aAbB", excess, excess)
+    stretched = np.einsum("...aA,...bB->...aAbB", excess, excess)
     squeezed = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    return shear * (unit + crossed) + more * both - pressure * crossed + law.lame * squeezed
+    return shear * (unit + crossed) + more * stretched - pressure * crossed + law.lame * squeezed
 
 
 LAWS = (NeoHooke, Ogden)

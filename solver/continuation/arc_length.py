@@ -61,11 +61,11 @@ class Followed(Protocol):
         """The iterations on its body."""
         ...
 
-    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
+    def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         ...
 
-    def crosses(self, shape: EquilibriumState) -> bool:
+    def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         ...
 
@@ -159,7 +159,7 @@ def follow(
         step = _further(finger, way[-1], by, direction, rate, length, target, BRANCH.shortest * reach)
         if step is None:
             lost = rate > BRANCH.steep and way[-1].compression.least > folds + BRANCH.apart
-            return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
+            return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
         point, length = step
         if point.compression.least < folds:
             last = way[-1]
@@ -167,26 +167,26 @@ def follow(
                 max((last.compression.least - folds) / (last.compression.least - point.compression.least), 0.0), 1.0
             )
             value = max(way[best].value, last.value + part * (point.value - last.value))
-            return Branch(tuple(point.shape for point in way[: best + 1]), value, limited=True)
-        easy = point.shape.iterations - way[-1].shape.iterations <= BRANCH.easy
+            return Branch(tuple(point.state for point in way[: best + 1]), value, limited=True)
+        easy = point.state.iterations - way[-1].state.iterations <= BRANCH.easy
         way.append(point)
         if point.value > way[best].value:
             best = len(way) - 1
         if point.value >= target * (1.0 - 1e-12):
-            return Branch(tuple(point.shape for point in way), point.value, limited=False)
+            return Branch(tuple(point.state for point in way), point.value, limited=False)
         length *= BRANCH.growth if easy else 1.0
         before = direction, rate
-        direction, rate = _tangent(finger.newton, point.shape, by)
+        direction, rate = _tangent(finger.newton, point.state, by)
         if direction @ before[0] + rate * before[1] < 0.0:
             direction, rate = -direction, -rate
         if rate <= 0.0:
             break
-    return Branch(tuple(point.shape for point in way[: best + 1]), way[best].value, limited=True)
+    return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Point:
-    shape: EquilibriumState
+    state: EquilibriumState
     compression: SkinCompression
     value: float
 
@@ -203,13 +203,13 @@ def _further(
 ) -> tuple[_Point, float] | None:
     """Return the next point of the branch and how long the step was that led to it; None where no step does."""
     while length >= shortest:
-        found = _next(finger.newton, last.shape, by, direction, rate, length, target)
-        if found is not None:
-            compression = finger.skin_compression(found)
+        state = _next(finger.newton, last.state, by, direction, rate, length, target)
+        if state is not None:
+            compression = finger.skin_compression(state)
             if compression.least >= last.compression.least - BRANCH.apart and not jumped_branch(
-                finger, last.shape, found
+                finger, last.state, state
             ):
-                return _Point(found, compression, value_of(found.load, by)), length
+                return _Point(state, compression, value_of(state.load, by)), length
         length /= 2.0
     return None
 
@@ -230,9 +230,9 @@ def jumped_branch(finger: Followed, before: EquilibriumState, after: Equilibrium
     return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
 
 
-def _tangent(newton: Newton, shape: EquilibriumState, by: int) -> tuple[Array, float]:
+def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, float]:
     """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
-    newton.linearise(shape, shape.load, newton.skin_x)
+    newton.linearise(state, state.load, newton.skin_x)
     direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
     size = np.sqrt(direction @ direction + 1.0)
     return direction / size, 1.0 / size
@@ -245,10 +245,10 @@ def _next(
     root = np.sqrt(len(newton.steps))
     value = value_of(start.load, by)
     to_target = rate * length >= target - value
-    shape, load = start, start.load
+    state, load = start, start.load
     gone = np.zeros(len(newton.steps))
     for _ in range(BRANCH.corrections):
-        if not newton.linearise(shape, load, newton.skin_x):
+        if not newton.linearise(state, load, newton.skin_x):
             return None
         to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
         now = value_of(load, by)
@@ -261,14 +261,14 @@ def _next(
             change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
         step = to + change * along
         load = with_value(load, by, now + change)
-        shape, largest, changed = newton.moved(shape, load, step * root, newton.skin_x)
+        state, largest, changed = newton.moved(state, load, step * root, newton.skin_x)
         gone = gone + step
         if not largest < 10.0:
             return None
         if largest < BRANCH.tolerance and not changed:
             way = np.sqrt(gone @ gone + (value_of(load, by) - value) ** 2)
             straight = direction @ gone + rate * (value_of(load, by) - value)
-            return shape if straight > BRANCH.turn * way else None
+            return state if straight > BRANCH.turn * way else None
     return None
 
 
@@ -321,9 +321,9 @@ def _impedance(along: Array, mixed: Array, across: Array) -> Waves | None:
     """
     inverse = np.linalg.inv(across)
     system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ along, -inverse @ (mixed + mixed.T)]])
-    found = np.linalg.eig(system.astype(np.complex128))
-    p: Waves = np.asarray(found[0], np.complex128)
-    waves: Waves = np.asarray(found[1], np.complex128)
+    eigen = np.linalg.eig(system.astype(np.complex128))
+    p: Waves = np.asarray(eigen[0], np.complex128)
+    waves: Waves = np.asarray(eigen[1], np.complex128)
     decay = p.imag > 0.0
     if decay.sum() != 2:
         return None

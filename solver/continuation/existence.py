@@ -79,7 +79,7 @@ def of_friction(scene: Scene, load: LoadState, target: float, stop: Callable[[],
 
     Raises NotConverged where not even the frictionless state is found, Cancelled where `stop` says so.
     """
-    return _reach(_asked(scene, load._replace(mu=0.0), BY_FRICTION, target, stop))
+    return _reach(_question(scene, load._replace(mu=0.0), BY_FRICTION, target, stop))
 
 
 def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: False) -> Reach:
@@ -87,90 +87,96 @@ def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: F
 
     Raises NotConverged where there is none even at a hundredth of it, Cancelled where `stop` says so.
     """
-    return _reach(_asked(scene, load, BY_DEPTH, load.depth, stop))
+    return _reach(_question(scene, load, BY_DEPTH, load.depth, stop))
 
 
-def sound(finger: FiniteFinger, shape: EquilibriumState, least: float = PROOF.sound) -> bool:
+def sound(finger: FiniteFinger, state: EquilibriumState, least: float = PROOF.sound) -> bool:
     """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
-    compression = finger.skin_compression(shape)
-    return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(shape)
+    compression = finger.skin_compression(state)
+    return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
 
 
-def folded(finger: FiniteFinger, shape: EquilibriumState) -> bool:
+def folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether the skin has a crease or crosses itself."""
-    return finger.skin_compression(shape).kink > BRANCH.crease or finger.crosses(shape)
+    return finger.skin_compression(state).kink > BRANCH.crease or finger.crosses(state)
 
 
-def _asked(scene: Scene, load: LoadState, by: int, target: float, stop: Callable[[], bool]) -> _Question:
+def _question(scene: Scene, load: LoadState, by: int, target: float, stop: Callable[[], bool]) -> _Question:
     return _Question(scene.finger, scene.materials, scene.receptor, load._replace(travel=0.0), by, target, scene, stop)
 
 
 @lru_cache(maxsize=32)
-def _reach(asked: _Question) -> Reach:
+def _reach(question: _Question) -> Reach:
     """Answer, and keep what was answered: all meshes of a scene ask the same."""
-    folds = folds_at(finite_laws(asked.materials)[EPIDERMIS])
-    sizing = Sizing(FINENESS, asked.load.depth, margin=MARGIN)
-    rough = FiniteFinger.of(asked.scene, sizing)
-    branch = _followed(rough, _start(rough, asked), asked, folds)
+    folds = folds_at(finite_laws(question.materials)[EPIDERMIS])
+    sizing = Sizing(FINENESS, question.load.depth, margin=MARGIN)
+    rough = FiniteFinger.of(question.scene, sizing)
+    branch = _followed(rough, _start(rough, question), question, folds)
     if not branch.limited and sound(rough, branch.last, PROOF.plain):
-        return _told(rough, branch, folds)
-    fine, branch, place = _finely(rough, branch.states, asked, folds)
+        return _reach_of(rough, branch, folds)
+    fine, branch, place = _finely(rough, branch.states, question, folds)
     if abs(_squeezed(fine, branch.last) - place) > PROOF.astray:
-        fine, branch, _ = _finely(fine, branch.states, asked, folds)
-    return _told(fine, branch, folds)
+        fine, branch, _ = _finely(fine, branch.states, question, folds)
+    return _reach_of(fine, branch, folds)
 
 
 def _finely(
-    finger: FiniteFinger, states: tuple[EquilibriumState, ...], asked: _Question, folds: float
+    finger: FiniteFinger, states: tuple[EquilibriumState, ...], question: _Question, folds: float
 ) -> tuple[FiniteFinger, Branch, float]:
     """Follow the branch on a mesh that is fine where the last of these `states` is squeezed most; return that place."""
     place = _squeezed(finger, states[-1])
-    fine = FiniteFinger.of(asked.scene, Sizing(FINENESS, asked.load.depth, margin=MARGIN, fold=place))
-    return fine, _followed(fine, _begun(fine, finger, states, asked), asked, folds), place
+    fine = FiniteFinger.of(question.scene, Sizing(FINENESS, question.load.depth, margin=MARGIN, fold=place))
+    return fine, _followed(fine, _begun(fine, finger, states, question), question, folds), place
 
 
-def _followed(finger: FiniteFinger, start: EquilibriumState, asked: _Question, folds: float) -> Branch:
+def _followed(finger: FiniteFinger, start: EquilibriumState, question: _Question, folds: float) -> Branch:
     """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and what is asked for is a step away."""
-    target = asked.target if asked.by == BY_DEPTH else min(asked.target, LARGEST_MU)
-    branch = continue_branch(finger, start, asked.by, target, folds, asked.stop)
-    if branch.limited or target == asked.target:
+    target = question.target if question.by == BY_DEPTH else min(question.target, LARGEST_MU)
+    branch = continue_branch(finger, start, question.by, target, folds, question.stop)
+    if branch.limited or target == question.target:
         return branch
-    last = settled(finger.newton, branch.last.load._replace(mu=asked.target), branch.last, BRANCH.tolerance, asked.stop)
-    return Branch((*branch.states, last), asked.target, limited=False)
+    last = settled(
+        finger.newton, branch.last.load._replace(mu=question.target), branch.last, BRANCH.tolerance, question.stop
+    )
+    return Branch((*branch.states, last), question.target, limited=False)
 
 
-def _told(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
+def _reach_of(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
     least = finger.skin_compression(branch.last).least
     return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers([branch.last])[0])
 
 
-def _squeezed(finger: FiniteFinger, shape: EquilibriumState) -> float:
+def _squeezed(finger: FiniteFinger, state: EquilibriumState) -> float:
     """Return the arc position where the skin is squeezed most [mm]."""
-    place = finger.skin_compression(shape).place
+    place = finger.skin_compression(state).place
     return float(finger.geometry.arcs[place : place + 2].mean())
 
 
-def _start(finger: FiniteFinger, asked: _Question) -> EquilibriumState:
+def _start(finger: FiniteFinger, question: _Question) -> EquilibriumState:
     """Return the state at which the branch begins. Raises NotConverged."""
-    if asked.by == BY_FRICTION:
-        return settled(finger.newton, asked.load, None, BRANCH.tolerance, asked.stop)
+    if question.by == BY_FRICTION:
+        return settled(finger.newton, question.load, None, BRANCH.tolerance, question.stop)
     for part in PROOF.starts:
         try:
             start = settled(
-                finger.newton, asked.load._replace(depth=part * asked.target), None, BRANCH.tolerance, asked.stop
+                finger.newton,
+                question.load._replace(depth=part * question.target),
+                None,
+                BRANCH.tolerance,
+                question.stop,
             )
         except NotConverged:
             continue
         if sound(finger, start):
             return start
     raise NotConverged(
-        f"no sliding state was found at mu = {asked.load.mu:.3g} even at {PROOF.starts[-1] * asked.target:.3g} mm: "
-        "ask for less friction"
+        f"no sliding state was found at mu = {question.load.mu:.3g} even at {PROOF.starts[-1] * question.target:.3g} "
+        "mm: ask for less friction"
     )
 
 
 def _begun(
-    fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...], asked: _Question
+    fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...], question: _Question
 ) -> EquilibriumState:
     """Return a state of the branch on the `fine` mesh from which to go on: the last that is as good on the rough one.
 
@@ -180,12 +186,12 @@ def _begun(
         if rough.skin_compression(state).lowest < PROOF.smooth:
             continue
         try:
-            shape = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance, asked.stop)
+            fine_state = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance, question.stop)
         except NotConverged:
             continue
-        if sound(fine, shape) or state is states[0]:
-            return shape
-    return _start(fine, asked)
+        if sound(fine, fine_state) or state is states[0]:
+            return fine_state
+    return _start(fine, question)
 
 
 APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]
@@ -204,19 +210,19 @@ def steady(
     directly, is proven by following the branch on meshes made for it. Raises NoSteadyState with both
     limits where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
     """
-    found: list[EquilibriumState] = []
-    for shape in _tried(finger.newton, load, tolerance, start, stop):
-        if sound(finger, shape, PROOF.plain):
-            return shape
-        found.append(shape)
+    candidates: list[EquilibriumState] = []
+    for state in _tried(finger.newton, load, tolerance, start, stop):
+        if sound(finger, state, PROOF.plain):
+            return state
+        candidates.append(state)
     proof = _reach_towards(finger.scene, load, stop)
     if proof.lost:
         raise _not_known(load, proof.value)
     if proof.limited:
         raise _refused(finger.scene, load, proof, stop)
-    for shape in found:
-        if _proven(finger, shape, proof):
-            return shape
+    for state in candidates:
+        if _proven(finger, state, proof):
+            return state
     if steep(load):
         raise NotConverged(
             f"At {load.depth:.3g} mm of indentation there is settled sliding at mu = {load.mu:.3g}, nearly all of the "
@@ -225,23 +231,23 @@ def steady(
     begin = settled(finger.newton, load._replace(mu=0.0), None, tolerance, stop)
     branch = follow(finger, begin, BY_FRICTION, load.mu, 0.0, stop)
     if not branch.limited:
-        shape = settled(finger.newton, load, branch.last, tolerance, stop)
-        if _proven(finger, shape, proof):
-            return shape
+        state = settled(finger.newton, load, branch.last, tolerance, stop)
+        if _proven(finger, state, proof):
+            return state
     raise NotConverged(
         f"At {load.depth:.3g} mm of indentation and mu = {load.mu:.3g} there is settled sliding, but near the limit of "
         "friction, and this mesh does not find it: ask for a little less friction, or another tolerance"
     )
 
 
-def stands(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool]) -> bool:
+def stands(finger: FiniteFinger, state: EquilibriumState, stop: Callable[[], bool]) -> bool:
     """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
-    if sound(finger, shape, PROOF.plain):
+    if sound(finger, state, PROOF.plain):
         return True
-    if not sound(finger, shape):
+    if not sound(finger, state):
         return False
-    proof = _reach_towards(finger.scene, shape.load, stop)
-    return not proof.limited and _proven(finger, shape, proof)
+    proof = _reach_towards(finger.scene, state.load, stop)
+    return not proof.limited and _proven(finger, state, proof)
 
 
 def steep(load: LoadState) -> bool:
@@ -283,11 +289,11 @@ def _tried(
             yield way()
 
 
-def doubts(finger: FiniteFinger, shape: EquilibriumState, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
+def doubts(finger: FiniteFinger, state: EquilibriumState, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
     """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
-    if shape.load.sense == 0 or sound(finger, shape, PROOF.plain):
+    if state.load.sense == 0 or sound(finger, state, PROOF.plain):
         return ()
-    proof = of_friction(finger.scene, shape.load, shape.load.mu, stop)
+    proof = of_friction(finger.scene, state.load, state.load.mu, stop)
     if not proof.near:
         return ()
     return (
@@ -355,11 +361,11 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState, stop: Callable[[
     return proof.limited and not proof.lost
 
 
-def _proven(finger: FiniteFinger, shape: EquilibriumState, proof: Reach) -> bool:
+def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
     """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
-    if folded(finger, shape):
+    if folded(finger, state):
         return False
-    return bool(np.all(np.abs(finger.numbers([shape])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
+    return bool(np.all(np.abs(finger.numbers([state])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
 
 
 def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float, stop: Callable[[], bool]) -> EquilibriumState:

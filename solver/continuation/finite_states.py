@@ -17,7 +17,7 @@ from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march
 from solver.equilibrium.load_stepping import balanced, sliding_load
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
 from solver.progress import report_progress
 from solver.scene.scene import Scene
@@ -68,12 +68,12 @@ def nearby(
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
-            shape = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.few)
+            state = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.few)
         else:
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
-            found = balanced(newton, near, Given(force, None), limit=FORCE_SEARCH.few)
-            shape = newton.settle(found, found.load, limit=FORCE_SEARCH.few)
-        return shape if stands(finger, shape, stop) else None
+            state = balanced(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.few)
+            state = newton.settle(state, state.load, limit=FORCE_SEARCH.few)
+        return state if stands(finger, state, stop) else None
     except NotConverged:
         return None
 
@@ -158,66 +158,66 @@ def _sliding_under(
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
-            found = _at_force(newton, near, force, stop) if capped else balanced(newton, near, Given(force, None))
-            return steady(finger, found.load, start=found, stop=stop)
+            state = _at_force(newton, near, force, stop) if capped else balanced(newton, near, ForceLoad(force, None))
+            return steady(finger, state.load, start=state, stop=stop)
     if capped:
         with suppress(NotConverged):
             *_, bare = _grown(newton, load._replace(mu=0.0), force, stop)
             begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading, stop)
-            found = _at_force(newton, begin, force, stop)
-            return steady(finger, found.load, start=found, stop=stop)
-    shape: EquilibriumState | None = None
+            state = _at_force(newton, begin, force, stop)
+            return steady(finger, state.load, start=state, stop=stop)
+    last: EquilibriumState | None = None
     try:
         for reached in _grown(newton, load, force, stop):
-            shape = reached
+            last = reached
     except NotConverged:
-        if shape is None:
+        if last is None:
             raise
-        return _deeper(finger, shape, force, stop)
-    assert shape is not None
-    return steady(finger, shape.load, start=shape, stop=stop)
+        return _deeper(finger, last, force, stop)
+    assert last is not None
+    return steady(finger, last.load, start=last, stop=stop)
 
 
 def _grown(newton: Newton, load: LoadState, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
     """Yield slides with the friction of `load` as the normal force grows to `force`. Raises NotConverged."""
     begin = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, load.mu, load.tau, load.sense))
-    grows = [Given(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
+    grows = [ForceLoad(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
     return load_stepping.march(newton, grows, begin, stop=stop)
 
 
 def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
-    shape, depth = start, start.load.depth
+    state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
-        shape = sliding.settled(newton, shape.load._replace(depth=depth), shape, stop=stop)
-        if abs(shape.force[1] / force - 1.0) < FORCE_MET:
-            return shape
-        if not newton.linearise(shape, shape.load, newton.skin_x):
+        state = sliding.settled(newton, state.load._replace(depth=depth), state, stop=stop)
+        if abs(state.force[1] / force - 1.0) < FORCE_MET:
+            return state
+        if not newton.linearise(state, state.load, newton.skin_x):
             break
         stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
         if not stiffness > 0.0:
             break
         depth += float(
-            np.clip((force - shape.force[1]) / stiffness, -FORCE_SEARCH.furthest * depth, FORCE_SEARCH.furthest * depth)
+            np.clip((force - state.force[1]) / stiffness, -FORCE_SEARCH.furthest * depth, FORCE_SEARCH.furthest * depth)
         )
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
-def _deeper(finger: FiniteFinger, shape: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
-    """Return settled sliding under `force` [N/mm] deeper than `shape`, from where it did not grow on.
+def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
+    """Return settled sliding under `force` [N/mm] deeper than `state`, from where it did not grow on.
 
     How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
-    proof = of_depth(finger.scene, shape.load._replace(depth=FORCE_SEARCH.beyond * shape.load.depth), stop)
+    proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth), stop)
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        shape = _risen_to(finger, shape, proof, force, stop)
-    found = _at_force(finger.newton, shape, force, stop)
-    return steady(finger, found.load, start=found, stop=stop)
+        state = _risen_to(finger, state, proof, force, stop)
+    state = _at_force(finger.newton, state, force, stop)
+    return steady(finger, state.load, start=state, stop=stop)
 
 
 def _risen_to(
-    finger: FiniteFinger, shape: EquilibriumState, proof: Reach, force: float, stop: Callable[[], bool]
+    finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float, stop: Callable[[], bool]
 ) -> EquilibriumState:
     """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
 
@@ -228,11 +228,11 @@ def _risen_to(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            shape = steady(finger, shape.load._replace(depth=(1.0 + APART) * depth), start=shape, stop=stop)
+            state = steady(finger, state.load._replace(depth=(1.0 + APART) * depth), start=state, stop=stop)
         except NoSteadyState as failure:
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
-        depth, most = shape.load.depth, float(shape.force[1])
-    return shape
+        depth, most = state.load.depth, float(state.force[1])
+    return state
 
 
 def steady_body(
@@ -258,10 +258,10 @@ def steady_body(
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
-    found = sliding.settled(newton, load, branch.last, stop=stop)
-    if jumped_branch(body, branch.last, found):
+    state = sliding.settled(newton, load, branch.last, stop=stop)
+    if jumped_branch(body, branch.last, state):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
-    return found
+    return state
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -271,16 +271,16 @@ class _OwnBody:
     body: FiniteBody
     newton: Newton
 
-    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
+    def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
-        mesh, every = self.body.mesh, np.ones(len(shape.state) // 2, bool)
-        return SkinCompression(*skin_loops.pinched(mesh.nodes, shape.u, mesh.skin, every, shape.state, 0))
+        mesh, every = self.body.mesh, np.ones(len(state.state) // 2, bool)
+        return SkinCompression(*skin_loops.pinched(mesh.nodes, state.u, mesh.skin, every, state.state, 0))
 
-    def crosses(self, shape: EquilibriumState) -> bool:
+    def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
         mesh = self.body.mesh
-        return skin_loops.crosses(mesh.nodes, shape.u, mesh.skin)
+        return skin_loops.crosses(mesh.nodes, state.u, mesh.skin)
 
-    def spoilt(self, shape: EquilibriumState) -> bool:
+    def spoilt(self, state: EquilibriumState) -> bool:
         """Return whether contact has come to an end of the skin, or an element is crushed."""
-        return shape.reaches_end or self.body.smallest_det(shape.u) < FORCE_SEARCH.crushed
+        return state.reaches_end or self.body.smallest_det(state.u) < FORCE_SEARCH.crushed

@@ -63,17 +63,17 @@ def continue_branch(
     while reached < load.mu and step > LIMIT_SEARCH.close * max(reached, min(0.01, load.mu)):
         aim = min(reached + step, load.mu)
         try:
-            found = slide_beside(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
+            further = slide_beside(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
         except ContactLost:
             step /= 2.0
             continue
-        if found.reaches_end:  # the skin that may touch ends: what lies beyond is not known
+        if further.reaches_end:  # the skin that may touch ends: what lies beyond is not known
             step, unknown = step / 2.0, first is not None
             continue
-        if first is not None and not found.load.depth > 0.0:  # pressed by a surface that it does not reach
+        if first is not None and not further.load.depth > 0.0:  # pressed by a surface that it does not reach
             step /= 2.0
             continue
-        state, reached, step = found, aim, 2.0 * step
+        state, reached, step = further, aim, 2.0 * step
     if reached == load.mu:
         return state, reached
     return None, 0.0 if unknown else reached
@@ -85,16 +85,16 @@ class Bodies:
     def __init__(self, scene: Scene) -> None:
         """Make none yet."""
         self._scene = scene
-        self._made: dict[int, Newton] = {}
+        self._by_power: dict[int, Newton] = {}
 
     def at(self, depth: float) -> Newton:
         """Return a body whose mesh serves `depth` [mm], from 0.7 to 1.4 times the one it was made for."""
         power = round(log2(depth))
-        if power not in self._made:
-            self._made[power] = self.made_for(2.0**power, FINENESS)
-        return self._made[power]
+        if power not in self._by_power:
+            self._by_power[power] = self.build_for(2.0**power, FINENESS)
+        return self._by_power[power]
 
-    def made_for(self, depth: float, fineness: float) -> Newton:
+    def build_for(self, depth: float, fineness: float) -> Newton:
         """Return a body with a mesh of its own."""
         scene = self._scene
         mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
@@ -109,10 +109,10 @@ def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
     bodies = Bodies(scene)
     if scene.normal_force is None:
         return None, _deepest(bodies, load, scene.loading.depth)
-    found = _strongest(bodies, scene, scene.normal_force, load)
-    if found is None:
+    strongest = _strongest(bodies, scene, scene.normal_force, load)
+    if strongest is None:
         return None, None
-    return found[0], _deepest(bodies, load, LIMIT_SEARCH.beyond * found[1], found[1])
+    return strongest[0], _deepest(bodies, load, LIMIT_SEARCH.beyond * strongest[1], strongest[1])
 
 
 def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = None) -> float | None:
@@ -129,10 +129,10 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
         if high < least:
             return None
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
-    found = _largest(slides, low, high)
-    finer = bodies.made_for(found, LIMIT_SEARCH.finer * FINENESS)
-    ends = [continue_branch(finer, load._replace(depth=part * found))[0] is None for part in (0.97, 1.03)]
-    return found if ends == [False, True] else None
+    deepest = _largest(slides, low, high)
+    finer = bodies.build_for(deepest, LIMIT_SEARCH.finer * FINENESS)
+    ends = [continue_branch(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
+    return deepest if ends == [False, True] else None
 
 
 def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
@@ -151,16 +151,16 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
 
     def slides(force: float) -> bool:
         with suppress(ContactLost):
-            found = reached(bodies.at(rubless(force)), force)
-            if found is not None:
-                depths.append(found.load.depth)
-            return found is not None
+            state = reached(bodies.at(rubless(force)), force)
+            if state is not None:
+                depths.append(state.load.depth)
+            return state is not None
         return False
 
     if not slides(LIMIT_SEARCH.least * force):
         return None
     most = _largest(slides, LIMIT_SEARCH.least * force, force)
-    finer = bodies.made_for(rubless(most), LIMIT_SEARCH.finer * FINENESS)
+    finer = bodies.build_for(rubless(most), LIMIT_SEARCH.finer * FINENESS)
     ends = [reached(finer, part * most) is None for part in (0.97, 1.03)]
     return most if ends == [False, True] else None, max(depths)
 
@@ -186,19 +186,19 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
         return full_slip(newton, load)
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        found = slide_under(newton, load, loading.normal_force, deepest)
+        slide = slide_under(newton, load, loading.normal_force, deepest)
     except ContactLost:
         if loading.tangential_force is None:
             raise
         # the drag may be met where sliding would wedge
         return march(scene, finger, times).last
     if loading.tangential_force is None:
-        return found
-    most = abs(float(found.force[0]))
+        return slide
+    most = abs(float(slide.force[0]))
     if loading.tangential_force > most * (1.0 + 1e-9):
         raise beyond_friction(loading.tangential_force, most, loading.normal_force)
     if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
-        return found
+        return slide
     return march(scene, finger, times).last
 
 
@@ -225,10 +225,10 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
     if force is None or scene.loading.direction == 0 or state.sticking > 0.0:
         return False
     try:
-        beside = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
+        harder = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
     except ContactLost:
         return False
-    return beside.load.depth < state.load.depth
+    return harder.load.depth < state.load.depth
 
 
 def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
@@ -320,15 +320,15 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
     with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
         limit_force, limit_depth = limits(scene, sliding_load(scene))
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
-    others = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
+    elsewhere = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
     along = "+x" if scene.loading.direction > 0 else "-x"
-    given = "at this depth" if force is None else "under this force"
+    where = "at this depth" if force is None else "under this force"
     message = (
         f"There is no steady sliding along {along} at {at}: the drag presses the finger against the surface faster "
-        f"than it yields, so it wedges; followed from mu = 0, steady sliding {given} ends at mu = {limit_mu:.3g}"
+        f"than it yields, so it wedges; followed from mu = 0, steady sliding {where} ends at mu = {limit_mu:.3g}"
     )
-    if others:
-        message += f", and with this friction at {others}"
+    if elsewhere:
+        message += f", and with this friction at {elsewhere}"
     return NoSteadyState(
         f"{message}.", limit_mu=limit_mu, limit_indentation=limit_depth, limit_normal_force=limit_force
     )

@@ -31,7 +31,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
     finger = _finger(_bare(scenes[0], deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
-    return tuple(None if found is None else found.load.depth for found in pressed)
+    return tuple(None if state is None else state.load.depth for state in pressed)
 
 
 def expected_depth(scene: Scene) -> float:
@@ -44,18 +44,18 @@ def expected_depth(scene: Scene) -> float:
         finger = _finger(_bare(scene, deepest))
     except (SceneError, NotConverged):  # who makes the meshes that count will tell
         return deepest
-    found = _pressed(finger, scene, force, deepest)
+    state = _pressed(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
     held = scene.loading.direction == 0 or scene.loading.dragged
-    if held and (found is None or drag < NEARLY * abs(found.force[0])):
+    if held and (state is None or drag < NEARLY * abs(state.force[0])):
         # Then it goes about as deep as one that slides with so much drag and no more.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
-        found = _pressed(finger, replace(scene, friction=friction), force, deepest)
-    if found is None:
+        state = _pressed(finger, replace(scene, friction=friction), force, deepest)
+    if state is None:
         return deepest
     # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
-    highest = float(finger.body.condensed.rest[found.touching, 1].max())
-    return max(found.load.depth, COVERED * highest, SHALLOW)
+    highest = float(finger.body.condensed.rest[state.touching, 1].max())
+    return max(state.load.depth, COVERED * highest, SHALLOW)
 
 
 def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
@@ -98,7 +98,7 @@ def _finger(bare: Scene) -> LinearFinger:
 def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
     """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
     try:
-        found = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
+        state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:
         return None
-    return None if found.reaches_end or found.load.depth > deepest else found
+    return None if state.reaches_end or state.load.depth > deepest else state

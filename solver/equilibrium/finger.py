@@ -224,11 +224,11 @@ class FiniteFinger(Finger[FinitePatches]):
         """Do as `Finger` says."""
         return FinitePatches.of(self.body, placed)
 
-    def transfer(self, shape: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
-        """Return `shape`, found on `other`, as a start on this mesh."""
+    def transfer(self, state: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
+        """Return `state`, found on `other`, as a start on this mesh."""
         if other not in self._bridges:
             self._bridges[other] = MeshTransfer.of(other.places, self.places)
-        return self._bridges[other].carried(shape)
+        return self._bridges[other].carried(state)
 
     @cached_property
     def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":
@@ -239,15 +239,15 @@ class FiniteFinger(Finger[FinitePatches]):
         """Where nodes and quadrature points lie, for states that are carried."""
         return Places.of(self.geometry, self.body)
 
-    def skin_compression(self, shape: EquilibriumState) -> SkinCompression:
+    def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         at = self.geometry
         touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first of it that may touch
-        return SkinCompression(*skin_loops.pinched(at.mesh.nodes, shape.u, at.whole, at.loose, shape.state, touchable))
+        return SkinCompression(*skin_loops.pinched(at.mesh.nodes, state.u, at.whole, at.loose, state.state, touchable))
 
-    def crosses(self, shape: EquilibriumState) -> bool:
+    def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
-        return skin_loops.crosses(self.geometry.mesh.nodes, shape.u, self.geometry.whole)
+        return skin_loops.crosses(self.geometry.mesh.nodes, state.u, self.geometry.whole)
 
 
 KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": FiniteFinger}  # by kinematics
@@ -265,8 +265,8 @@ def relaxing_laws(materials: Materials) -> list[Prony]:
 
 def finite_laws(materials: Materials) -> list[Law]:
     """Return the laws at finite strain of a settled response: the shear modulus relaxed, the bulk modulus as it was."""
-    both = zip(materials.by_region, relaxing_laws(materials), strict=True)
-    return [_finite(tissue, law.relaxed) for tissue, law in both]
+    pairs = zip(materials.by_region, relaxing_laws(materials), strict=True)
+    return [_finite(tissue, law.relaxed) for tissue, law in pairs]
 
 
 def _finite(tissue: Material, moduli: Moduli) -> Law:
@@ -330,15 +330,15 @@ class MeshTransfer:
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
-    def carried(self, shape: EquilibriumState) -> EquilibriumState:
-        """Return `shape`, found on the old mesh, as a start on the new one."""
-        return self.touched(shape, *self.fields(shape.u, shape.pressure))
+    def carried(self, state: EquilibriumState) -> EquilibriumState:
+        """Return `state`, found on the old mesh, as a start on the new one."""
+        return self.touched(state, *self.fields(state.u, state.pressure))
 
-    def touched(self, shape: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
-        """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `shape` does."""
-        state, sense = shape.state[self.nearest], shape.sense[self.nearest]
+    def touched(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
+        """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `start` does."""
+        state, sense = start.state[self.nearest], start.sense[self.nearest]
         state[state == STICK] = SLIP
-        return EquilibriumState(u, pressure, state, sense, self.forces @ shape.reaction, shape.load, shape.iterations)
+        return EquilibriumState(u, pressure, state, sense, self.forces @ start.reaction, start.load, start.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
         """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).

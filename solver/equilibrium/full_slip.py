@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.failures import ContactLost, NotConverged
 from solver.progress import report_progress
 
@@ -47,15 +47,15 @@ def settled(
     load = load.checked()
     if newton.condensed.constant:
         return _at_once(newton, load, start)
-    shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
-    begin = shape.load if start is not None else LoadState(0.0, load.mu, load.tau, load.sense)
+    state = EquilibriumState.undeformed(newton.condensed) if start is None else start
+    begin = state.load if start is not None else LoadState(0.0, load.mu, load.tau, load.sense)
     most = newton.systems + CONTROL.work
 
     def step(part: float) -> None:
-        nonlocal shape
+        nonlocal state
         if part < 1.0:
             report_progress(f"coming to sliding at mu = {load.mu:.3g} in small steps", part)
-        shape = newton.settle(shape, _between(begin, load, part), tolerance if part == 1.0 else CONTROL.leading)
+        state = newton.settle(state, _between(begin, load, part), tolerance if part == 1.0 else CONTROL.leading)
 
     def refusal(done: float, part: float, reason: NotConverged) -> NotConverged:
         last = _between(begin, load, done)
@@ -66,7 +66,7 @@ def settled(
 
     control = StepControl(smallest=1.0 if begin == load else CONTROL.smallest)
     advance(step, refusal, control, stop, exhausted=lambda: newton.systems > most)
-    return shape
+    return state
 
 
 def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
@@ -104,8 +104,8 @@ def slide_beside(
     rest = EquilibriumState.undeformed(newton.condensed)
     states = guess.astype(np.int32)
     begin = replace(rest, state=states, sense=np.full(len(states), load.sense, np.int32))
-    given = None if force is None else Given(force, None)
-    return newton.solved(begin, load, newton.skin_x, given, rounds)
+    forces = None if force is None else ForceLoad(force, None)
+    return newton.solved(begin, load, newton.skin_x, forces, rounds)
 
 
 def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:
@@ -114,9 +114,9 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
     `deepest` [mm] is the scale of the first guesses, by default the height of the skin. Raises ContactLost.
     """
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    found = _first_of(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
-    if deepest is None or found.load.depth > 0.0:
-        return found
+    state = _first_of(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
+    if deepest is None or state.load.depth > 0.0:
+        return state
     raise ContactLost("the touching points have no forces that amount to the normal force")
 
 
@@ -126,13 +126,13 @@ def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None
     for number, part in enumerate(CONTROL.parts):
         guess = np.where(height <= float(height.min()) + part * scale, SLIP, OPEN)
         try:
-            found = slide_beside(newton, load, guess, force)
+            state = slide_beside(newton, load, guess, force)
         except ContactLost:
             if number == len(CONTROL.parts) - 1:
                 raise
             continue
-        if force is None or found.load.depth > 0.0 or number == len(CONTROL.parts) - 1:
-            return found
+        if force is None or state.load.depth > 0.0 or number == len(CONTROL.parts) - 1:
+            return state
     raise AssertionError  # there is always a guess
 
 
@@ -140,7 +140,7 @@ def _between(begin: LoadState, end: LoadState, part: float) -> LoadState:
     """Return the load state `part` of the way; a bound that was not there before takes its value at once."""
     if part == 1.0:
         return end
-    both = begin.tau < float("inf") and end.tau < float("inf")
-    tau = begin.tau + part * (end.tau - begin.tau) if both else end.tau
+    bounded = begin.tau < float("inf") and end.tau < float("inf")
+    tau = begin.tau + part * (end.tau - begin.tau) if bounded else end.tau
     mu = begin.mu + part * (end.mu - begin.mu)
     return LoadState(begin.depth + part * (end.depth - begin.depth), mu, tau, end.sense)

@@ -14,7 +14,7 @@ from solver._kernels.compiling import OPEN, STICK
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of, never
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, followed_to
 from solver.progress import report_progress
@@ -136,7 +136,7 @@ class Way:
 
         def step(part: float) -> None:
             there = aim if part == 1.0 else begin.towards(aim, part)
-            self.instants.append(Instant(there.time, self.found(self.last, there)))
+            self.instants.append(Instant(there.time, self.solve_step(self.last, there)))
             self.aim = there
 
         advance(step, self._refusal, CONTROL, self._stop)
@@ -144,12 +144,12 @@ class Way:
     def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
         return followed_to(self.last.load.depth, self.last.load.travel, reason)
 
-    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
+    def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, coming from `before`. Raises NotConverged."""
         if not self.by_force:
             return self.newton.settle(before, before.load._replace(depth=aim.press, travel=-aim.along), self._tolerance)
-        given = Given(aim.press, aim.along) if self.by_drag else Given(aim.press, None, -aim.along)
-        return balanced(self.newton, lowered(self.newton.condensed, before), given)
+        forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
+        return balanced(self.newton, lowered(self.newton.condensed, before), forces)
 
 
 class RelaxingWay(Way):
@@ -170,11 +170,11 @@ class RelaxingWay(Way):
         self.energies: list[tuple[float, ...]] = []
         self.sense = 0  # of the friction force on all that touches, whatever comes to touch; 0: it is found
 
-    def found(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
+    def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
         step = aim.time - self.aim.time
         self.newton = self.tissue.ready(step)
-        state = super().found(replace(before, load=before.load._replace(sense=self.sense)), aim)
+        state = super().solve_step(replace(before, load=before.load._replace(sense=self.sense)), aim)
         self.energies.append(self.tissue.took(state, step))
         return state
 

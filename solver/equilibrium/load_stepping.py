@@ -16,7 +16,7 @@ from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.validation import check_loads
-from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import Cancelled, report_progress
 from solver.scene.scene import Scene
@@ -82,13 +82,13 @@ def sliding_load(scene: Scene) -> LoadState:
     return load_of(scene)._replace(sense=-(scene.loading.direction or 1))
 
 
-def forces_of(scene: Scene, load: LoadState) -> Given | None:
+def forces_of(scene: Scene, load: LoadState) -> ForceLoad | None:
     """Return the forces that a scene gives to a state under `load`, None where it gives a depth."""
     force, drag = scene.normal_force, scene.tangential_force
     if force is None:
         return None
     held = None if drag is None or not load.path_dependent else -scene.loading.direction * drag
-    return Given(force, held, load.travel)
+    return ForceLoad(force, held, load.travel)
 
 
 def press_and_slide(
@@ -108,7 +108,7 @@ def press_and_slide(
 
 def march(
     newton: Newton,
-    course: Iterable[LoadState | Given],
+    course: Iterable[LoadState | ForceLoad],
     start: EquilibriumState | None = None,
     tolerance: float = 1e-7,
     stop: Callable[[], bool] = never,
@@ -119,22 +119,22 @@ def march(
     it was or slips from there. Raises NotConverged, saying where, Cancelled where `stop` says so, and ValueError for a
     load state or forces that are none.
     """
-    shape = EquilibriumState.undeformed(newton.condensed) if start is None else start
+    state = EquilibriumState.undeformed(newton.condensed) if start is None else start
     for number, aim in enumerate(aims := [aim.checked() for aim in course]):
         if len(aims) > 1:
             report_progress("pressing and sliding step by step", number / len(aims))
 
-        def step(part: float, begin: EquilibriumState = shape, aim: LoadState | Given = aim) -> None:
-            nonlocal shape
-            if isinstance(aim, Given):
+        def step(part: float, begin: EquilibriumState = state, aim: LoadState | ForceLoad = aim) -> None:
+            nonlocal state
+            if isinstance(aim, ForceLoad):
                 drag, normal = begin.force.tolist()
-                there = Given(normal, drag, begin.load.travel).towards(aim, part)
-                shape = balanced(newton, lowered(newton.condensed, shape), there)
+                there = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
+                state = balanced(newton, lowered(newton.condensed, state), there)
             else:
-                shape = newton.settle(shape, between(begin.load, aim, part), tolerance)
+                state = newton.settle(state, between(begin.load, aim, part), tolerance)
 
-        advance(step, lambda _done, _part, why: followed_to(shape.load.depth, shape.load.travel, why), stop=stop)
-        yield shape
+        advance(step, lambda _done, _part, why: followed_to(state.load.depth, state.load.travel, why), stop=stop)
+        yield state
 
 
 def between(begin: LoadState, end: LoadState, part: float) -> LoadState:
@@ -163,28 +163,28 @@ def loaded(
     """
     newton, condensed = Newton(body.condensed), body.condensed
     check_loads(body.mesh, loads, prescribed)
-    loads, prescribed = (None if given is None else np.asarray(given, np.float64) for given in (loads, prescribed))
-    shape = EquilibriumState.undeformed(condensed) if start is None else start
-    load = (shape.load if load is None else load).checked()
-    shape = replace(shape, load=load)
+    loads, prescribed = (None if array is None else np.asarray(array, np.float64) for array in (loads, prescribed))
+    state = EquilibriumState.undeformed(condensed) if start is None else start
+    load = (state.load if load is None else load).checked()
+    state = replace(state, load=load)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(body, loads)
     driven = body.mesh.driven
-    held_at = shape.u[driven]
+    held_at = state.u[driven]
     moved = 0.0 if prescribed is None else prescribed[driven] - held_at
     before = condensed.load.copy()
 
     def step(part: float) -> None:
-        nonlocal shape
+        nonlocal state
         condensed.load[:] = before + part * (vector - before)
-        u = shape.u.copy()
+        u = state.u.copy()
         u[driven] = held_at + part * moved
-        shape = newton.settle(replace(shape, u=u), load)
+        state = newton.settle(replace(state, u=u), load)
 
     def refusal(done: float, _part: float, reason: NotConverged) -> NotConverged:
         return NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}")
 
     advance(step, refusal, StepControl(first=1.0 / steps))
-    return shape
+    return state
 
 
 def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
@@ -234,85 +234,85 @@ def find_root(at: Callable[[float], tuple[float, State]], start: float, close: f
 
 
 def corrected(
-    newton: Newton, shape: EquilibriumState, given: Given, origin: Array, before: float, *, kept: bool = False
+    newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, kept: bool = False
 ) -> tuple[EquilibriumState, float, int] | None:
-    """Return the shape after one iteration towards the forces, its largest displacement, and changed contact states.
+    """Return the state after one iteration towards the forces, its largest displacement, and changed contact states.
 
     `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
     `kept` the tangent is the last one. None where there is no way.
     """
-    load = shape.load
-    if given.tangential is None:
-        load = load._replace(travel=given.travel)
+    load = state.load
+    if forces.tangential is None:
+        load = load._replace(travel=forces.travel)
     linearise = newton.relinearise if kept else newton.linearise
-    if not linearise(shape, load, origin + load.travel - before, 0, given):
+    if not linearise(state, load, origin + load.travel - before, 0, forces):
         return None
     deeper, along = newton.system.motion.tolist()
     load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-    after, largest, changed = newton.moved(shape, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before)
+    after, largest, changed = newton.moved(state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before)
     return after, max(largest, abs(deeper), abs(along)), changed
 
 
 def balanced(
-    newton: Newton, start: EquilibriumState, given: Given, tolerance: float = 1e-8, limit: int = 30
+    newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-8, limit: int = 30
 ) -> EquilibriumState:
-    """Return the equilibrium under `given`, one backward Euler step from `start`, whose load has friction and sense.
+    """Return the equilibrium under `forces`, one backward Euler step from `start`, whose load has friction and sense.
 
     Raises NotConverged where `limit` iterations do not do it.
     """
     try:
-        shape = _iterated(newton, start, start, given, tolerance, limit)
+        state = _iterated(newton, start, start, forces, tolerance, limit)
     except ContactLost:  # as where friction is so small that all but one node slip
-        if given.tangential is None:
+        if forces.tangential is None:
             raise
-        return _met_by_travel(newton, start, start, given, tolerance, limit)
-    return _met_by_travel(newton, start, shape, given, tolerance, limit) if _slips_freely(shape, given) else shape
+        return _met_by_travel(newton, start, start, forces, tolerance, limit)
+    return _met_by_travel(newton, start, state, forces, tolerance, limit) if _slips_freely(state, forces) else state
 
 
 def _iterated(
-    newton: Newton, start: EquilibriumState, begin: EquilibriumState, given: Given, tolerance: float, limit: int
+    newton: Newton, start: EquilibriumState, begin: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
     """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
     origin, before = start.place(newton.condensed)[:, 0], start.load.travel
-    shape = begin
+    state = begin
     if newton.condensed.constant:
-        if given.tangential is None:
-            shape = replace(shape, load=shape.load._replace(travel=given.travel))
-        return newton.solved(shape, shape.load, origin + shape.load.travel - before, given)
+        if forces.tangential is None:
+            state = replace(state, load=state.load._replace(travel=forces.travel))
+        return newton.solved(state, state.load, origin + state.load.travel - before, forces)
     for _ in range(limit):
-        done = corrected(newton, shape, given, origin, before)
+        done = corrected(newton, state, forces, origin, before)
         if done is None:
             raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
-        shape, largest, changed = done
+        state, largest, changed = done
         if not largest < CONTROL.unbounded:
             raise NotConverged("the displacements grow without bound")
         if largest < tolerance and not changed:
-            return shape
+            return state
     raise NotConverged(f"no equilibrium within {limit} iterations")
 
 
-def _slips_freely(shape: EquilibriumState, given: Given) -> bool:
+def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
     """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
-    if given.tangential is None or not shape.load.mu > 0.0 or (shape.state == STICK).any():
+    if forces.tangential is None or not state.load.mu > 0.0 or (state.state == STICK).any():
         return False
-    return abs(shape.force[0] - given.tangential) > UNMET * shape.load.mu * given.normal
+    return abs(state.force[0] - forces.tangential) > UNMET * state.load.mu * forces.normal
 
 
 def _met_by_travel(
-    newton: Newton, start: EquilibriumState, shape: EquilibriumState, given: Given, tolerance: float, limit: int
+    newton: Newton, start: EquilibriumState, state: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
-    """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `shape` on.
+    """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `state` on.
 
     The travel holds a body of which nothing sticks, and the drag grows with it. Raises NotConverged.
     """
-    wanted, near = given.tangential or 0.0, shape
+    wanted, near = forces.tangential or 0.0, state
 
     def at(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
-        near = _iterated(newton, start, near, Given(given.normal, None, travel), tolerance, limit)
+        near = _iterated(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - wanted, near
 
-    found = find_root(at, shape.load.travel, UNMET * shape.load.mu * given.normal)
-    if found is None:
+    there = find_root(at, state.load.travel, UNMET * state.load.mu * forces.normal)
+    if there is None:
         raise NotConverged("no travel meets the drag")
-    return found
+    return there

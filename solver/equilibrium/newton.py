@@ -93,26 +93,26 @@ class LoadState(NamedTuple):
 UNLOADED = LoadState(0.0, 0.0)
 
 
-class Given(NamedTuple):
+class ForceLoad(NamedTuple):
     """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
 
     normal: float  # [N/mm]
     tangential: float | None  # [N/mm]; None: `travel` is given instead
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
-    def checked(self) -> "Given":
+    def checked(self) -> "ForceLoad":
         """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
         drag = None if self.tangential is None else finite("tangential", self.tangential)
-        return Given(finite("normal", self.normal), drag, finite("travel", self.travel))
+        return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
 
-    def towards(self, other: "Given", part: float) -> "Given":
+    def towards(self, other: "ForceLoad", part: float) -> "ForceLoad":
         """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
         tangential = other.tangential
         if tangential is not None:
             begun = 0.0 if self.tangential is None else self.tangential
             tangential = begun + part * (tangential - begun)
         normal = self.normal + part * (other.normal - self.normal)
-        return Given(normal, tangential, self.travel + part * (other.travel - self.travel))
+        return ForceLoad(normal, tangential, self.travel + part * (other.travel - self.travel))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,38 +193,38 @@ class Newton:
         self._meet = bind_arguments(active_set.meet, self.skin, self.system.length)
 
     def linearise(
-        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, given: Given | None = None
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, forces: ForceLoad | None = None
     ) -> bool:
-        """Set up the system at `shape` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
+        """Set up the system at `state` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
-        times until none contradicts the linearised body. Where forces are `given`, the first step meets them too.
+        times until none contradicts the linearised body. Where there are `forces`, the first step meets them too.
         """
         self.systems += 1
-        if not self.condensed.linearise(shape.u, shape.pressure):
+        if not self.condensed.linearise(state.u, state.pressure):
             return False
-        return self.solve_contact(shape, load, anchor, rounds, given) != SINGULAR
+        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
 
     def relinearise(
-        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None = None
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
     ) -> bool:
-        """Do the same with the forces at `shape`, but the tangent and its factors that are there already."""
-        if not self.condensed.relinearise(shape.u):
+        """Do the same with the forces at `state`, but the tangent and its factors that are there already."""
+        if not self.condensed.relinearise(state.u):
             return False
-        return self.solve_contact(shape, load, anchor, rounds, given) != SINGULAR
+        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
 
     def solve_contact(
-        self, shape: EquilibriumState, load: LoadState, anchor: Array, rounds: int, given: Given | None = None
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
     ) -> int:
-        """Solve the contact of the linearised body at `shape`; return what `solve_active_set` does."""
+        """Solve the contact of the linearised body at `state`; return what `solve_active_set` does."""
         body = self.condensed
-        self._states.state[:], self._states.sense[:] = shape.state, shape.sense
+        self._states.state[:], self._states.sense[:] = state.state, state.sense
         kind, drag, push = DEPTH_GIVEN, 0.0, 0.0
-        if given is not None:
-            kind = PUSH_GIVEN if given.tangential is None else DRAG_GIVEN
-            drag, push = given.tangential or 0.0, given.normal
+        if forces is not None:
+            kind = PUSH_GIVEN if forces.tangential is None else DRAG_GIVEN
+            drag, push = forces.tangential or 0.0, forces.normal
         return self._active_set(
-            self.arrays(), self.skin, self._states, load_arguments(load), self._position(shape.u, load, anchor),
+            self.arrays(), self.skin, self._states, load_arguments(load), self._position(state.u, load, anchor),
             ForceControl(kind, float(drag), float(push), np.inf if body.constant else CONTROL.stride), rounds,
         )  # fmt: skip
 
@@ -243,15 +243,15 @@ class Newton:
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def moved(
-        self, shape: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
+        self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
-        """Return the shape after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
+        """Return the state after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
         body, skin = self.condensed, np.ascontiguousarray(skin)
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
-        u, pressure, largest = body.recover(shape.u, shape.pressure, skin, scale)
+        u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
         states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
         changed = self._meet(states, self._position(u, load, anchor), load_arguments(load))
-        return EquilibriumState(u, pressure, *states, load, shape.iterations + 1), largest, changed
+        return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changed
 
     def settle(
         self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
@@ -275,27 +275,27 @@ class Newton:
         self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
     ) -> EquilibriumState:
         """Do as `settle` from `start`, whose states are those that `load` brings at once, `anchor` (k,) being known."""
-        shape = before = start
-        kept = self.condensed.found is start.u
+        state = before = start
+        kept = self.condensed.equilibrium is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
             if kept:
-                if not self.relinearise(shape, load, anchor, CONTROL.rounds):
+                if not self.relinearise(state, load, anchor, CONTROL.rounds):
                     kept = False
                     continue
-                before = shape
-            elif not self.linearise(shape, load, anchor, CONTROL.rounds):
+                before = state
+            elif not self.linearise(state, load, anchor, CONTROL.rounds):
                 scale /= 2.0  # the last step went too far
                 if (
-                    shape is before
+                    state is before
                     or scale < CONTROL.shortest
                     or not self.linearise(before, load, anchor, CONTROL.rounds)
                 ):
                     raise NotConverged("the body would turn inside out")
-                shape = before
-            elif shape is not before:
-                before, scale = shape, min(1.0, 2.0 * scale)
-            shape, largest, changed = self.moved(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+                state = before
+            elif state is not before:
+                before, scale = state, min(1.0, 2.0 * scale)
+            state, largest, changed = self.moved(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
@@ -304,8 +304,8 @@ class Newton:
                 raise NotConverged("states of contact come again and again")
             left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
             if largest * left < CONTROL.margin * tolerance and not changed and scale == 1.0:
-                self.condensed.found = shape.u
-                return shape
+                self.condensed.equilibrium = state.u
+                return state
             new = not kept
             still = largest < CONTROL.near if last == 0.0 else fall < CONTROL.slow
             # A step along a tangent that has turned changes volume to second order, and a stiff body answers strongly.
@@ -315,20 +315,20 @@ class Newton:
 
     def solved(
         self,
-        shape: EquilibriumState,
+        state: EquilibriumState,
         load: LoadState,
         anchor: Array,
-        given: Given | None = None,
+        forces: ForceLoad | None = None,
         rounds: int | None = None,
     ) -> EquilibriumState:
-        """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `shape`.
+        """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `state`.
 
-        Under `given` forces depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
+        Under `forces` depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
         """
         self.systems += 1
         self.condensed.relinearise(self._rest)  # from which all is one step
         rounds = CONTROL.patience + 4 * len(self.skin_x) if rounds is None else rounds
-        used = self.solve_contact(replace(shape, u=self._rest), load, anchor, rounds, given)
+        used = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
         if used == SINGULAR:
             raise ContactLost("the touching points have no unique forces")
         if used == UNSETTLED:
@@ -336,10 +336,10 @@ class Newton:
         u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
         deeper, along = self.system.motion.tolist()
         load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-        iterations = shape.iterations + used
-        found = self._states
+        iterations = state.iterations + used
+        contact = self._states
         return EquilibriumState(
-            u, shape.pressure, found.state.copy(), found.sense.copy(), found.reaction.copy(), load, iterations
+            u, state.pressure, contact.state.copy(), contact.sense.copy(), contact.reaction.copy(), load, iterations
         )
 
     def _entered(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
@@ -349,17 +349,17 @@ class Newton:
         return replace(start, state=states.state, sense=states.sense)
 
 
-def lowered(body: CondensedBody, shape: EquilibriumState) -> EquilibriumState:
-    """Return the shape with its lowest node on the surface where nothing touches: forces need one that does.
+def lowered(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:
+    """Return the state with its lowest node on the surface where nothing touches: forces need one that does.
 
     A body that nothing holds needs as many nodes as it has motions.
     """
-    if shape.touching.any():
-        return shape
-    state, count = shape.state.copy(), max(body.motions.shape[1], 1)
-    lowest = np.argsort(shape.place(body)[:, 1], kind="stable")[:count]
-    state[lowest] = SLIP if shape.load.frictionless else STICK
-    return replace(shape, state=state)
+    if start.touching.any():
+        return start
+    state, count = start.state.copy(), max(body.motions.shape[1], 1)
+    lowest = np.argsort(start.place(body)[:, 1], kind="stable")[:count]
+    state[lowest] = SLIP if start.load.frictionless else STICK
+    return replace(start, state=state)
 
 
 def load_arguments(load: LoadState) -> LoadArguments:

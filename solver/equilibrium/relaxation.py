@@ -178,7 +178,7 @@ class RelaxingBody:
 class CondensedRelaxing(CondensedFinite):
     """A body that relaxes, whose own laws are the relaxed ones."""
 
-    found: Array | None
+    equilibrium: Array | None
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
@@ -191,7 +191,7 @@ class CondensedRelaxing(CondensedFinite):
     def ready(self, step: float) -> None:
         """Prepare a step in time [s]."""
         self.tensor = self.past.over(step).reshape(self.tensor.shape)
-        self.found = None
+        self.equilibrium = None
 
     def took(self, u: Array, step: float) -> None:
         """Remember the step that was made ready and led to displacements `u` (nodes, 2)."""

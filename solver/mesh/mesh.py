@@ -54,19 +54,19 @@ class Mesh:
         Those others are refused where a body is made of them (`solver.body.validation`).
         """
         for f in fields(self):
-            given = np.asarray(getattr(self, f.name))
+            array = np.asarray(getattr(self, f.name))
             kinds, taken = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
-            if given.dtype.kind in kinds or not given.size:
-                given = np.ascontiguousarray(given, taken)
-            view = given.view()
+            if array.dtype.kind in kinds or not array.size:
+                array = np.ascontiguousarray(array, taken)
+            view = array.view()
             view.flags.writeable = False
             object.__setattr__(self, f.name, view)
 
     @property
     def fixed(self) -> Indices:
         """Return the numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
-        both = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
-        return distinct(np.concatenate([2 * both[0], 2 * both[1] + 1]))
+        along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
+        return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
 
     @property
     def driven(self) -> Flags:
@@ -187,14 +187,14 @@ class HalvedMesh:
         held = mesh.driven[elements[of]] | (new == 0.0)[..., None]
         driven = np.concatenate([mesh.driven, held.all(axis=1)])
         nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[of]])])
-        made = Mesh(
+        halved = Mesh(
             nodes,
             grid[:, _QUARTERS].reshape(-1, 9),
             np.repeat(mesh.region, 4),
             _chained(mesh.skin, pairs, count),
             *_by_axis(driven),
         )
-        return HalvedMesh(made, mesh, pairs, new, of)
+        return HalvedMesh(halved, mesh, pairs, new, of)
 
     def chain(self, nodes: Indices) -> Indices:
         """Return a chain of edges (2 k + 1,) of the coarse mesh, end, middle, ... end, with its new nodes."""

@@ -299,31 +299,31 @@ class _Row:
             near = sizing.fold + np.linspace(-1.0, 1.0, 2001) * outline.finger.tip_radius
             arc = np.concatenate([arc, near[(near > outline.palmar_cut) & (near < outline.dorsal_cut)]])
         arc = distinct(arc)
-        asked = fine + scale * (
+        sizes = fine + scale * (
             SIZES.palmar_growth * np.maximum(low - arc, 0.0) + SIZES.dorsal_growth * np.maximum(arc - high, 0.0)
         )
         if sizing.fold is not None:
             least = _fold(outline.finger)
             from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.around * least, 0.0)
-            asked = np.minimum(asked, least + SIZES.from_fold * from_fold)
+            sizes = np.minimum(sizes, least + SIZES.from_fold * from_fold)
         near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
         if receptor.ending[1] < SIZES.point_along * outline.finger.tip_radius:
             near, far, largest = _around_point(arc, near, far, SIZES.at_point * outline.finger.tip_radius * scale)
-            asked = np.minimum(asked, largest)
+            sizes = np.minimum(sizes, largest)
         ends = [outline.palmar_cut, outline.palmar, near, far, outline.dorsal, outline.dorsal_cut]
         if outline.finger.nail_length > 0.0:
             ends.append(outline.nail_end)
         ends = _distinct(*ends)
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
-        return _Row(arc, _counted(arc, asked), ends, least, 0.2)
+        return _Row(arc, _counted(arc, sizes), ends, least, 0.2)
 
-    def asked(self) -> Array:
+    def sizes(self) -> Array:
         """Return how many elements, and which part of one, are asked for between each two of the ends."""
         return np.diff(np.interp(self.ends, self.place, self.number))
 
     def gaps(self) -> tuple[int, ...]:
         """Return how many elements there are between each two of the ends."""
-        return tuple(max(few, ceil(n - self.spare)) for few, n in zip(self.least, self.asked().tolist(), strict=True))
+        return tuple(max(few, ceil(n - self.spare)) for few, n in zip(self.least, self.sizes().tolist(), strict=True))
 
     def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
         """Return the lines between elements, so many between each two ends; with `shift` half an element further."""
@@ -350,20 +350,20 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     depth = distinct(np.concatenate([depth, np.linspace(0.0, skin + thick, 1000)]))
     of_bone = SIZES.at_bone + SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
     of_ending = SIZES.ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
-    asked = np.minimum(
+    sizes = np.minimum(
         size * np.minimum(SIZES.bulk, np.minimum(of_bone, of_ending)), SIZES.tall * (fine + SIZES.growth * depth)
     )
-    asked = np.minimum(asked, thin + SIZES.from_fold * depth)
+    sizes = np.minimum(sizes, thin + SIZES.from_fold * depth)
     near, far = receptor.depth - receptor.ending[0] / 2.0, receptor.depth + receptor.ending[0] / 2.0
     if receptor.ending[0] < SIZES.point_across * finger.tip_radius:
         top, bottom = (0.0, finger.epidermis) if receptor.depth < finger.epidermis else (finger.epidermis, skin)
         above, below, largest = _around_point(depth, near, far, SIZES.at_point * size)
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
-        asked = np.minimum(asked, largest)
+        sizes = np.minimum(sizes, largest)
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
     # one element between epidermis and ending would be too stiff in shear whatever its size
     least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
-    row = _Row(depth, _counted(depth, asked), ends, (*least, 2), 0.1)
+    row = _Row(depth, _counted(depth, sizes), ends, (*least, 2), 0.1)
     gaps = row.gaps()
     every = row.lines(gaps)
     lines, fat = every[: -gaps[-1]], every[-gaps[-1] - 1 :]

@@ -130,12 +130,12 @@ class SmallMeshing(Meshing):
                 position = len(done) + len(states)
                 report_part(self.progress, position / len(scenes))
                 try:
-                    found = self._solved(scenes[number], finger, position, len(scenes))
+                    solved = self._solved(scenes[number], finger, position, len(scenes))
                 except SolveFailure as failure:
                     done[number] = failure.in_a_sentence()
                     continue
-                if found is not None:
-                    states[number] = replace(found, setup_s=took - finger.solve_s)
+                if solved is not None:
+                    states[number] = replace(solved, setup_s=took - finger.solve_s)
                 elif last:
                     done[number] = BEYOND_THE_SKIN
                 else:
@@ -158,15 +158,15 @@ class SmallMeshing(Meshing):
         history = scene.solve.course == "history"
         for leg in scene.earlier_slides() if history else ():
             direct(leg, finger)
-        found = direct(scene, finger)
+        steady = direct(scene, finger)
         try:
-            steps = steps_asked(scene, finger, settled=found)
+            steps = steps_asked(scene, finger, settled=steady)
             times = steps_of_press(scene, finger) if steps is None else steps.times
         except SolveFailure:
             steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # nor will there be an estimate
         if times > 1 and steps is not None:
-            found = direct(scene, finger, times)
-        way, state, relaxing = None, found, history and scene.materials.relax
+            steady = direct(scene, finger, times)
+        way, state, relaxing = None, steady, history and scene.materials.relax
         if history:
             progress = self.progress
 
@@ -189,7 +189,7 @@ class SmallMeshing(Meshing):
             state, displacement = refined(scene, finger, state, displacement)
             checks = audit.audits(finger, state, displacement)
         solved = Solved(scene, state, displacement, checks, steps, way)
-        _audited(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(found)))
+        _audited(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audit.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
         return replace(solved, warnings=warnings, wall_s=perf_counter() - begun + finger.solve_s / count)
 
@@ -270,7 +270,7 @@ def _predicted(
 ) -> Prediction:
     """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
     top, steps = nested.top, nested.steps
-    finger, state, way = top.finger, top.shape, None
+    finger, state, way = top.finger, top.state, None
     setup = nested.coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
         times = steps_of_press(scene, nested.coarse.finger, stop) if steps is None else steps.times
@@ -284,7 +284,7 @@ def _predicted(
     newton = finger.newton if way is None else way.newton
     state, checks = _balanced(finger, newton, state)
     solved = Solved(scene, state, state.u, checks, steps, way)
-    _audited(scene, finger, solved, newton, lambda: finger.sed_ending(top.shape.u))
+    _audited(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
     before_estimate = perf_counter()
     report_progress("estimating errors, on the nested mesh")
@@ -297,34 +297,34 @@ def _predicted(
 
 
 def _balanced(
-    finger: FiniteFinger, newton: Newton, shape: EquilibriumState
+    finger: FiniteFinger, newton: Newton, state: EquilibriumState
 ) -> tuple[EquilibriumState, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
 
     `newton` is the finger's own, or that of its tissues as they relax. Displacements good to a part of a nanometre
     leave much of a light touch on a nearly incompressible body unbalanced.
     """
-    checks = _audits(finger, newton, shape)
+    checks = _audits(finger, newton, state)
     for _ in range(CORRECTIONS):
         if audit.unbalanced(checks) <= FINITE_IMBALANCE:
             break
-        x = shape.place(newton.condensed)[:, 0]
-        if not newton.linearise(shape, shape.load, x):
+        x = state.place(newton.condensed)[:, 0]
+        if not newton.linearise(state, state.load, x):
             break
-        after, _, _ = newton.moved(shape, shape.load, newton.steps[:, EQUILIBRIUM].copy(), x)
-        after = replace(after, state=shape.state, sense=shape.sense)  # a step of nanometres turns no slip into stick
+        after, _, _ = newton.moved(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+        after = replace(after, state=state.state, sense=state.sense)  # a step of nanometres turns no slip into stick
         better = _audits(finger, newton, after)
         worse = _contradicting(better) > max(_contradicting(checks), FINITE_IMBALANCE)
         if worse or audit.unbalanced(better) >= audit.unbalanced(checks):
             break
-        shape, checks = after, better
-    return shape, checks
+        state, checks = after, better
+    return state, checks
 
 
-def _audits(finger: FiniteFinger, newton: Newton, shape: EquilibriumState) -> dict[str, float]:
+def _audits(finger: FiniteFinger, newton: Newton, state: EquilibriumState) -> dict[str, float]:
     body = newton.condensed
-    over: Array | None = finger.body.nodal(body.excess(shape.u)) if isinstance(body, CondensedRelaxing) else None
-    return audit.audits(finger, shape, shape.u, over)
+    over: Array | None = finger.body.nodal(body.excess(state.u)) if isinstance(body, CondensedRelaxing) else None
+    return audit.audits(finger, state, state.u, over)
 
 
 def _contradicting(checks: dict[str, float]) -> float:

@@ -145,14 +145,14 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
             state = FinitePatches.of(body, places).state(prediction.displacement)
             return np.stack([field.finite(state) for field in FIELDS])
 
-    found = values(sketch.probes)
-    sound = np.isfinite(found).all(axis=0)
+    fields = values(sketch.probes)
+    sound = np.isfinite(fields).all(axis=0)
     if sound.all():
-        return found
+        return fields
     # In a sharp corner, as where bone ends at the skin, an element's own shape functions may turn its node inside out,
     # although no point over which the element is integrated is. The nearest such point then stands for the node.
     points = np.tile(_INSIDE * Q2P1.positions, (len(sketch.mesh.elements), 1))
-    return np.where(sound, found, values(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points)))
+    return np.where(sound, fields, values(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points)))
 
 
 def _patch(outline: Outline, scene: Scene) -> Array:

@@ -25,7 +25,15 @@ from solver.equilibrium import full_slip
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import slide_beside
 from solver.equilibrium.load_stepping import balanced, sliding_load
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, Given, LoadState, Newton, load_arguments
+from solver.equilibrium.newton import (
+    BY_DEPTH,
+    BY_FRICTION,
+    EquilibriumState,
+    ForceLoad,
+    LoadState,
+    Newton,
+    load_arguments,
+)
 from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
@@ -69,8 +77,8 @@ def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> 
         return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
     rows[:, 2] /= up[2]  # the depth makes up for what friction changes of the force
     rows[:, :2] -= rows[:, 2:] * up[:2]
-    found = _derivatives([By(mu, tau, None, force) for mu, tau, force in rows.tolist()])
-    return replace(found, normal=By(0.0, 0.0, None, 1.0))
+    derivatives = _derivatives([By(mu, tau, None, force) for mu, tau, force in rows.tolist()])
+    return replace(derivatives, normal=By(0.0, 0.0, None, 1.0))
 
 
 def _derivatives(rows: Sequence[By]) -> Derivatives:
@@ -131,8 +139,8 @@ def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
 
     By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
     """
-    beside = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
-    return endings.responses(beside).imag / IMAGINARY
+    perturbed = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
+    return endings.responses(perturbed).imag / IMAGINARY
 
 
 def drag_along(scene: Scene) -> int:
@@ -186,7 +194,7 @@ class Nearby:
         load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
             return full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
-        return balanced(newton, replace(here, load=load), Given(scene.normal_force, None), GOOD)
+        return balanced(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
 
     def _on_branch(self, there: EquilibriumState) -> bool:
         """Return whether a state at finite strain lies on the branch of this one, as far as this mesh can tell."""
@@ -205,18 +213,18 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     state is not met again.
     """
     finger: Finger[Any] | None = None
-    for found in predictions:
-        scene = found.scene
+    for prediction in predictions:
+        scene = prediction.scene
         if scene.loading.direction == 0 or scene.loading.dragged:
             yield None
             continue
-        if finger is None or isinstance(finger, FiniteFinger) or finger.geometry is not found.geometry:
-            finger = KINDS[scene.solve.kinematics].on(scene, found.geometry)
+        if finger is None or isinstance(finger, FiniteFinger) or finger.geometry is not prediction.geometry:
+            finger = KINDS[scene.solve.kinematics].on(scene, prediction.geometry)
         try:
             if isinstance(finger, FiniteFinger):
-                yield Nearby(scene, _met_again(finger, found), finger)
+                yield Nearby(scene, _met_again(finger, prediction), finger)
             elif isinstance(finger, LinearFinger):
-                yield Nearby(scene, _small_slide(finger, scene, states(found.skin)), finger)
+                yield Nearby(scene, _small_slide(finger, scene, states(prediction.skin)), finger)
         except NotConverged:
             yield None
 
@@ -226,12 +234,12 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
 
     Raises ValueError for others, and where a press is not met again.
     """
-    found: list[Array] = []
+    prediction: list[Array] = []
     for slide in nearby(predictions):
         if slide is None or not isinstance(slide.finger, LinearFinger):
             raise ValueError("no press at small strain that slides without friction")
-        found.append(by_stiffness(slide.finger, slide.here))
-    return np.array(found)
+        prediction.append(by_stiffness(slide.finger, slide.here))
+    return np.array(prediction)
 
 
 def states(skin: Skin) -> NDArray[np.int64]:
@@ -244,13 +252,15 @@ def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer])
     return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
-def _met_again(finger: FiniteFinger, found: Prediction) -> EquilibriumState:
-    """Return the settled slide of `found` at finite strain. Raises NotConverged where it is not met."""
-    scene, skin, sense = found.scene, found.skin, -found.scene.loading.direction
+def _met_again(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:
+    """Return the settled slide of `prediction` at finite strain. Raises NotConverged where it is not met."""
+    scene, skin, sense = prediction.scene, prediction.skin, -prediction.scene.loading.direction
     length = np.empty(len(skin.x))
     tributary(skin.x, finger.body.middle, length)
-    load = LoadState(found.indentation, float(scene.friction.mu), scene.friction.cap, sense)
+    load = LoadState(prediction.indentation, float(scene.friction.mu), scene.friction.cap, sense)
     state = states(skin).astype(np.int32)
     reaction = np.stack([skin.traction, skin.pressure], axis=1) * length[:, None]
-    modes, senses = finger.body.pressure(found.displacement), np.full(len(state), sense, np.int32)
-    return finger.newton.settle(EquilibriumState(found.displacement, modes, state, senses, reaction, load, 0), load)
+    modes, senses = finger.body.pressure(prediction.displacement), np.full(len(state), sense, np.int32)
+    return finger.newton.settle(
+        EquilibriumState(prediction.displacement, modes, state, senses, reaction, load, 0), load
+    )

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, edge_changes
+from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
 from solver.equilibrium.finger import KINDS, Finger
 from solver.equilibrium.load_path import Way, march
-from solver.equilibrium.newton import EquilibriumState, Given
+from solver.equilibrium.newton import EquilibriumState, ForceLoad
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
@@ -84,12 +84,13 @@ def course_numbers(course: History) -> CourseNumbers:
     return CourseNumbers(at, np.array([rates(course)[name] for name in NAMES]).T)
 
 
-def course_errors(found: Prediction) -> CourseNumbers:
+def course_errors(prediction: Prediction) -> CourseNumbers:
     """Return how far the numbers of a prediction's history may be off; all nan where the nested mesh has no course."""
-    assert found.history is not None
-    usual = course_numbers(found.history)
-    scene, sizing, kind = found.scene, replace(found.geometry.sizing, halved=True), KINDS[found.scene.solve.kinematics]
-    mesh, nested = kind.on(scene, found.geometry), kind.of(scene, sizing)
+    assert prediction.history is not None
+    usual = course_numbers(prediction.history)
+    scene, geometry = prediction.scene, prediction.geometry
+    kind = KINDS[scene.solve.kinematics]
+    mesh, nested = kind.on(scene, geometry), kind.of(scene, replace(geometry.sizing, halved=True))
 
     def marched(finger: Finger[Any], part: float) -> Way:
         return march(scene, finger, part, relaxing=scene.materials.relax)
@@ -114,7 +115,7 @@ def course_errors(found: Prediction) -> CourseNumbers:
     def error(name: str, changed_by_edges: Array) -> Array:
         value, nested_value, *few = (getattr(one, name) for one in (usual, finer, *fewer))
         by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(few, PARTS.tolist(), strict=True))
-        return FROM_HALVING * np.abs(nested_value - few[0]) + by_steps + FROM_EDGES * changed_by_edges
+        return half_width(nested_value - few[0], changed_by_edges) + by_steps
 
     return CourseNumbers(error("at", edges), error("rate", rate_edges))
 
@@ -122,6 +123,6 @@ def course_errors(found: Prediction) -> CourseNumbers:
 def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
     """Return what the numbers at an instant change by when edges of contact move by a node (5 + q,)."""
     by_force = scene.normal_force is not None
-    given = Given(float(state.normal.sum()), None, state.load.travel) if by_force else None
-    changes = edge_changes(nested.newton, [(state, given)], nested.all_numbers)[1][0]
+    forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
+    changes = edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0]
     return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])

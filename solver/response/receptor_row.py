@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, PARTS, Steps, edge_changes
+from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.receptor import FinitePatches, LinearPatches, Patches, endings
@@ -44,60 +44,62 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
     than an SA-II. nan where the finger ends before the ending does. `row_along` has their errors too.
     """
     out: list[Array] = []
-    for _, same in groupby(predictions, lambda found: (id(found.geometry), found.scene.solve.kinematics)):
+    for _, same in groupby(
+        predictions, lambda prediction: (id(prediction.geometry), prediction.scene.solve.kinematics)
+    ):
         group = list(same)
         along = _probed(group[0], arcs, receptor or group[0].scene.receptor)
-        out += [along.responses(found.displacement) for found in group]
+        out += [along.responses(prediction.displacement) for prediction in group]
     return np.array(out)
 
 
-def row_along(found: Prediction, arcs: Array = ROW, receptor: Receptor | None = None) -> Row:
+def row_along(prediction: Prediction, arcs: Array = ROW, receptor: Receptor | None = None) -> Row:
     """Return the same of one prediction with errors, for which its nested mesh is solved again."""
-    values = responses_along([found], arcs, receptor)[0]
+    values = responses_along([prediction], arcs, receptor)[0]
     try:
-        errors = _row_errors(found, values, arcs, receptor or found.scene.receptor)
+        errors = _row_errors(prediction, values, arcs, receptor or prediction.scene.receptor)
     except SolveFailure:
         errors = np.full(values.shape, np.nan)
     return Row(values, errors)
 
 
-def _row_errors(found: Prediction, values: Array, arcs: Array, receptor: Receptor) -> Array:
+def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Receptor) -> Array:
     """Return the errors of a row (q, r). Raises SolveFailure where the nested mesh has no such state."""
-    scene, sizing = found.scene, replace(found.geometry.sizing, halved=True)
+    scene, sizing = prediction.scene, replace(prediction.geometry.sizing, halved=True)
 
     def probed(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
         row = finger.patches(endings(finger.geometry, finger.centred, receptor, arcs))
         return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
 
-    nested, state, coarse = _nested(found, sizing)
+    nested, state, coarse = _nested(prediction, sizing)
     in_steps = state.load.path_dependent
     if in_steps:
         state = end(scene, nested)
     (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], probed(nested))
-    errors = FROM_HALVING * np.abs(finer - values.ravel()) + FROM_EDGES * edges
+    errors = half_width(finer - values.ravel(), edges)
     if in_steps:
         usual, *fewer = probed(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound
     return errors.reshape(values.shape)
 
 
-def _nested(found: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
+def _nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
     """Return the nested finger, its state, and the finger on which a course in fewer steps is judged."""
-    scene, meshes = found.scene, Meshes()
+    scene, meshes = prediction.scene, Meshes()
     if scene.solve.kinematics == "small":
         finger = LinearFinger.of(scene, sizing)
-        return finger, nearest(scene, finger), LinearFinger.on(scene, found.geometry)
+        return finger, nearest(scene, finger), LinearFinger.on(scene, prediction.geometry)
     low = coarse_solution(scene, expected_depth(scene), sizing.fineness, never, meshes)
     top = solution_on(scene, sizing, low, never, meshes)
-    return top.finger, top.shape, low.finger
+    return top.finger, top.state, low.finger
 
 
-def _probed(found: Prediction, arcs: Array, receptor: Receptor) -> Patches:
+def _probed(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:
     """Return endings like that of `receptor` on the mesh of a prediction."""
-    mesh, materials = found.geometry.mesh, found.scene.materials
+    mesh, materials = prediction.geometry.mesh, prediction.scene.materials
     elastic = Elastic.of(mesh, settled_moduli(materials))
-    row = endings(found.geometry, elastic, receptor, arcs)
-    if found.scene.solve.kinematics == "small":
+    row = endings(prediction.geometry, elastic, receptor, arcs)
+    if prediction.scene.solve.kinematics == "small":
         return LinearPatches(mesh, elastic, row)
     return FinitePatches.of(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
 

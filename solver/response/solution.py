@@ -7,7 +7,7 @@ from math import sqrt
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
-from solver.accuracy.residual_overstress import with_held
+from solver.accuracy.residual_overstress import with_viscosity
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
@@ -71,8 +71,8 @@ def solve_many(
         assert watch is not None
         watch(number, evident(answer), finger, way)
 
-    found = _answers(scenes, progress, seen if watch else None, rough)
-    return tuple(evident(answer) for answer in found)
+    answers = _answers(scenes, progress, seen if watch else None, rough)
+    return tuple(evident(answer) for answer in answers)
 
 
 def _answers(
@@ -81,34 +81,34 @@ def _answers(
     """Do the same, evidence as far as it comes with the answers."""
     out: dict[int, Answer] = {}
     for group in _groups(scenes):
-        found = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
-        out |= dict(zip(group, found, strict=True))
+        answers = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
+        out |= dict(zip(group, answers, strict=True))
     answers = (out[i] for i in range(len(scenes)))
     return tuple(one.in_a_sentence() if isinstance(one, SolveFailure) else one for one in answers)
 
 
-def _with_evidence(found: Answer, progress: Progress | None) -> Answer:
+def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
     """Return the answer with its evidence marched, and measured where its scene asks for that."""
-    if not isinstance(found, Prediction) or found.scene.solve.evidence == "quick":
-        return found
+    if not isinstance(prediction, Prediction) or prediction.scene.solve.evidence == "quick":
+        return prediction
     report_progress("estimating what the model leaves out")
-    found = with_held(found, lambda: progress is not None and not progress(1.0))
-    found = _with_earlier_slides(found, lambda scenes: _answers(scenes, progress))
-    if found.scene.solve.evidence == "estimated":
-        return found
+    prediction = with_viscosity(prediction, lambda: progress is not None and not progress(1.0))
+    prediction = _with_earlier_slides(prediction, lambda scenes: _answers(scenes, progress))
+    if prediction.scene.solve.evidence == "estimated":
+        return prediction
     report_progress("measuring what the model leaves out")
-    return measured(found, lambda scenes: _answers(scenes, progress))
+    return measured(prediction, lambda scenes: _answers(scenes, progress))
 
 
-def _with_earlier_slides(found: Prediction, solved: Answers) -> Prediction:
+def _with_earlier_slides(prediction: Prediction, solved: Answers) -> Prediction:
     """Return a settled answer with a warning of every slide before that would not have settled, on a coarse mesh."""
-    before = found.scene.earlier_slides() if found.scene.solve.course == "steady" else ()
+    before = prediction.scene.earlier_slides() if prediction.scene.solve.course == "steady" else ()
     quick = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in before]
     lost = [leg for leg in solved(quick) if isinstance(leg, SolveFailure)] if quick else []
     more = (
         f"A slide before this one, the other way, has no settled state that it could come from: {leg}" for leg in lost
     )
-    return replace(found, warnings=(*found.warnings, *more))
+    return replace(prediction, warnings=(*prediction.warnings, *more))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -131,14 +131,14 @@ def _solve_group(
     """Solve scenes that share a mesh on the coarsest that does."""
     kind = scenes[0].solve.kinematics
     depth = max(expected_depth(scene) for scene in scenes)
-    asked = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
-    fineness = FIRST if asked else DEFAULT[kind]
+    limited = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
+    fineness = FIRST if limited else DEFAULT[kind]
     on_mesh = MESHINGS[kind](depth, progress)
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
-    if marched and (asked or compared_sets(scenes)):
+    if marched and (limited or compared_sets(scenes)):
         return _marched(scenes, fineness, on_mesh, watch)
-    found = _refined(scenes, fineness, on_mesh, watch, rough)
-    return [_warned(answer, more) for answer, more in zip(found.answers, found.warnings, strict=True)]
+    refined = _refined(scenes, fineness, on_mesh, watch, rough)
+    return [_warned(answer, more) for answer, more in zip(refined.answers, refined.warnings, strict=True)]
 
 
 def _marched(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None) -> list[Answer]:
@@ -155,8 +155,8 @@ def _marched(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watc
         if watch is not None:
             watch(number, out[number], finger, way)
 
-    found = on_mesh.answers(scenes, ended.fineness, noted)
-    return [out.get(number, answer) for number, answer in enumerate(found)]
+    answers = on_mesh.answers(scenes, ended.fineness, noted)
+    return [out.get(number, answer) for number, answer in enumerate(answers)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,29 +178,34 @@ def _refined(
     """
     surfaces = compared_sets(scenes)
     first, kind = fineness, scenes[0].solve.kinematics
-    found: dict[int, Answer] = {}
+    answers: dict[int, Answer] = {}
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
     todo = list(range(len(scenes)))
     while True:
         solved = on_mesh.answers([scenes[i] for i in todo], fineness, watch)
         for i, answer in zip(todo, solved, strict=True):
-            coarser = found.get(i)
+            coarser = answers.get(i)
             if isinstance(answer, SolveFailure) and coarser is not None and _stands(coarser, answer):
                 lost[i] = answer
             else:
-                found[i] = answer
-        missed = [0.0 if i in lost else _missed(found[i], limits=fineness >= DEFAULT[kind]) for i in range(len(scenes))]
+                answers[i] = answer
+        missed = [
+            0.0 if i in lost else _missed(answers[i], limits=fineness >= DEFAULT[kind]) for i in range(len(scenes))
+        ]
         apart = [
-            contrast_error([p for i in together if isinstance(p := found[i], Prediction)]) for together in surfaces
+            contrast_error([p for i in together if isinstance(p := answers[i], Prediction)]) for together in surfaces
         ]
         contrasts = [
-            max((off.share / asked for i in together if (asked := scenes[i].solve.contrast_tolerance)), default=0.0)
+            max(
+                (off.share / tolerance for i in together if (tolerance := scenes[i].solve.contrast_tolerance)),
+                default=0.0,
+            )
             for together, off in zip(surfaces, apart, strict=True)
         ]
         worst = max(*missed, *contrasts, 0.0)
         if worst <= 1.0 or fineness >= FINEST[kind]:
             break
-        for answer in found.values():
+        for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
         again = {i for i, miss in enumerate(missed) if miss > 1.0}
@@ -210,14 +215,14 @@ def _refined(
         todo = sorted(again)
         fineness = min(fineness * min(max(SAFETY * sqrt(worst), GROWTH[0]), GROWTH[1]), FINEST[kind])
     if kind == "finite":  # where a fine mesh may lose its way
-        lost |= _fallen_back(scenes, found, first, on_mesh)
+        lost |= _fallen_back(scenes, answers, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    warnings = [_undone(of.get(i), missed[i], found[i], lost.get(i)) for i in range(len(scenes))]
-    return _Refined([found[i] for i in range(len(scenes))], warnings, fineness)
+    warnings = [_undone(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
+    return _Refined([answers[i] for i in range(len(scenes))], warnings, fineness)
 
 
 def _fallen_back(
-    scenes: list[Scene], found: dict[int, Answer], first: float, on_mesh: Meshing
+    scenes: list[Scene], answers: dict[int, Answer], first: float, on_mesh: Meshing
 ) -> dict[int, SolveFailure]:
     """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them.
 
@@ -225,12 +230,12 @@ def _fallen_back(
     """
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
-        if isinstance(failure := found[i], SolveFailure) and _doubtful(scene, failure):
+        if isinstance(failure := answers[i], SolveFailure) and _doubtful(scene, failure):
             answer = on_mesh.answers([scene], first / GROWTH[0])[0]
             if _stands(answer, failure):
-                found[i], lost[i] = answer, failure
-        if isinstance(found[i], NotConverged) and scene.friction.mu > STEEP:
-            found[i] = on_mesh.answers([scene], first * GROWTH[0])[0]
+                answers[i], lost[i] = answer, failure
+        if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
+            answers[i] = on_mesh.answers([scene], first * GROWTH[0])[0]
     return lost
 
 
@@ -285,5 +290,5 @@ def _missed(answer: Answer, *, limits: bool) -> float:
         return 0.0
     if answer.nested is None:
         return NOT_KNOWN
-    asked = answer.scene.solve.tolerance
-    return 0.0 if asked is None else answer.error_estimate / asked
+    tolerance = answer.scene.solve.tolerance
+    return 0.0 if tolerance is None else answer.error_estimate / tolerance

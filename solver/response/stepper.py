@@ -19,7 +19,7 @@ from solver.body.stiffness import Probes
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import corrected
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, Given, LoadState, lowered
+from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
@@ -115,18 +115,18 @@ class SmallStepper(Stepper):
         start = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not start.state.any():
             start = lowered(self.newton.condensed, start)
-        given = Given(normal, None, start.load.travel) if slides else Given(normal, tangential)
+        forces = ForceLoad(normal, None, start.load.travel) if slides else ForceLoad(normal, tangential)
         x = start.u[:, 0] + self.newton.skin_x
         try:
-            found = self.newton.solved(start, start.load, x, given, CHANGES)
+            state = self.newton.solved(start, start.load, x, forces, CHANGES)
         except ContactLost:
             self.forget()
             return float("nan")
-        if found.reaches_end:
+        if state.reaches_end:
             self.forget()
             return float("nan")
-        self.state = found
-        stretched = self.finger.ending_by_skin @ found.u.ravel()
+        self.state = state
+        stretched = self.finger.ending_by_skin @ state.u.ravel()
         return float(stretched @ stretched)
 
     def _most(self, normal: float) -> float:
@@ -213,33 +213,33 @@ class FiniteStepper(Stepper):
     def _followed(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
         newton = self.newton
-        shape = self._ready(normal, tangential)
-        origin, before = shape.place(newton.condensed)[:, 0], shape.load.travel
-        given, hurried = Given(normal, tangential), self._goes_far(normal)
+        state = self._ready(normal, tangential)
+        origin, before = state.place(newton.condensed)[:, 0], state.load.travel
+        forces, hurried = ForceLoad(normal, tangential), self._goes_far(normal)
         far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.hurried)
         for number in range(1, max(iterations, turns) + 1):
             kept = hurried and number == 1
-            done = corrected(newton, shape, given, origin, before, kept=kept)
+            done = corrected(newton, state, forces, origin, before, kept=kept)
             if kept and (done is None or done[1] > CONTROL.furthest):
                 continue
             if done is None or done[1] > CONTROL.furthest or done[0].reaches_end:
                 return self._lose(normal)
-            shape = done[0]
+            state = done[0]
             if number >= iterations and not kept and done[1] < far:
                 break
         self._stiffness = float(newton.follows(newton.steps)[1, BY_DEPTH])
-        compression = self.finger.skin_compression(shape)
+        compression = self.finger.skin_compression(state)
         if compression.least < CONTROL.least_stretch:
             return self._lose(normal)
-        self.state = shape
-        x, y = shape.force
-        behind = max(abs(y - normal), abs(x - tangential) if (shape.state == STICK).any() else 0.0)
+        self.state = state
+        x, y = state.force
+        behind = max(abs(y - normal), abs(x - tangential) if (state.state == STICK).any() else 0.0)
         self._behind = behind > CONTROL.met * normal
         if self._behind:
             return float("nan")
         if compression.lowest < CONTROL.least_stretch or compression.kink > CONTROL.largest_kink:
             return self._lose(normal)
-        return self.finger.sed_ending(shape.u)
+        return self.finger.sed_ending(state.u)
 
     def _goes_far(self, normal: float) -> bool:
         """Return whether the finger is about to move far: then the tangent of the last reading leads a part of the way.
@@ -256,14 +256,14 @@ class FiniteStepper(Stepper):
         return float("nan")
 
     def _ready(self, normal: float, tangential: float) -> EquilibriumState:
-        """Return the last shape with states that can carry the forces: something touches, and slides or does not."""
+        """Return the last state, its skin in contact states that can carry the forces: slip, or stick somewhere."""
         slides = abs(tangential) > SLIDING * self.mu * normal
-        shape = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
-        if not shape.touching.any():
-            shape.state[int(np.argmin(shape.place(self.newton.condensed)[:, 1]))] = SLIP if slides else STICK
-        elif not slides and not (shape.state == STICK).any():
-            shape.state[shape.state != OPEN] = STICK
-        return shape
+        state = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
+        if not state.touching.any():
+            state.state[int(np.argmin(state.place(self.newton.condensed)[:, 1]))] = SLIP if slides else STICK
+        elif not slides and not (state.state == STICK).any():
+            state.state[state.state != OPEN] = STICK
+        return state
 
 
 FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak

@@ -112,10 +112,10 @@ class Scene:
 
     def earlier_slides(self) -> tuple["Scene", ...]:
         """Return the settled slides on the way to the last one that go the other way, as scenes of their own."""
-        others = set(self.loading.directions[:-1]) - {self.loading.direction}
+        opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
         way = {1: "+x", -1: "-x"}
         solve = replace(self.solve, course="steady")
-        return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in others)
+        return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in opposite)
 
     def pressed_only(self) -> "Scene":
         """Return the scene up to the end of its pre-indentation, as a scene of its own."""

@@ -92,13 +92,13 @@ class Finger:
         0.75
         """
         x, y = self.bone_centre
-        beside = self.core_radius - abs(y) - self.bone_radius
+        dorsal = self.core_radius - abs(y) - self.bone_radius
         if x <= 0.0:  # the end of the bone may still reach past the centre of the tip
             angles = [math.radians(a) for a in range(-90, 91, 2)]
             ahead = [(x + self.bone_radius * math.cos(a), y + self.bone_radius * math.sin(a)) for a in angles]
             reach = max((math.hypot(*p) for p in ahead if p[0] > 0.0), default=0.0)
-            return min(beside, self.core_radius - reach)
-        return min(beside, self.core_radius - math.hypot(x, y) - self.bone_radius)
+            return min(dorsal, self.core_radius - reach)
+        return min(dorsal, self.core_radius - math.hypot(x, y) - self.bone_radius)
 
     def pulp_thickness(self) -> float:
         """Return the distance from the point of first touch to the end of the bone [mm].

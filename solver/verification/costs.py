@@ -16,8 +16,8 @@ from typing import cast
 
 from solver.response.solution import solve
 from solver.scene.tables import Solve
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import Kinematics
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
 from solver.verification.truth import KINEMATICS, cases
 
 # The part of a solve that a folder of the solver works for, or a file or a compiled loop of it that differs.
@@ -52,13 +52,13 @@ class Cost:
     parts: dict[str, float]  # shares of `took_s`
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Cost | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Cost | LeftOut]:
     """Return an iterator over a row a kinematics and tolerance."""
-    del found
+    del measurements
     works: list[tuple[Kinematics, float]] = [
-        (kind, tolerance) for tolerance in asked.pick((0.01, 0.003), (0.01,)) for kind in KINEMATICS
+        (kind, tolerance) for tolerance in request.pick((0.01, 0.003), (0.01,)) for kind in KINEMATICS
     ]
-    return rows_within(asked, works, "solves whose cost is broken down", lambda work: [_cost(*work)])
+    return rows_within(request, works, "solves whose cost is broken down", lambda work: [_cost(*work)])
 
 
 def _cost(kinematics: Kinematics, tolerance: float) -> Cost:

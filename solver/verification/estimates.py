@@ -13,10 +13,10 @@ from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
 from solver.scene.tables import Solve
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES, random_scene
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known
 
 TOLERANCES = (0.01, 0.003, 0.001)
@@ -73,16 +73,18 @@ class Guaranteed:
     worst_error: float | None  # where the truth is known
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Estimate | Guaranteed | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | Guaranteed | LeftOut]:
     """Yield the published surfaces at each tolerance, then random scenes until time is over."""
     for kinematics in KINEMATICS:
-        yield from _published(asked, found, kinematics)
+        yield from _published(request, measurements, kinematics)
     for kinematics in KINEMATICS:
-        yield from _random(asked, kinematics)
+        yield from _random(request, kinematics)
 
 
-def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[Estimate | Guaranteed | LeftOut]:
-    truths = known(found, kinematics)
+def _published(
+    request: Request, measurements: Measurements, kinematics: Kinematics
+) -> Iterator[Estimate | Guaranteed | LeftOut]:
+    truths = known(measurements, kinematics)
     chosen = [scene for scene in cases(kinematics) if scene.title in truths]
     if not chosen:
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
@@ -104,12 +106,12 @@ def _published(asked: Asked, found: Found, kinematics: Kinematics) -> Iterator[E
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
             )  # fmt: skip
 
-    tolerances = asked.pick(TOLERANCES, TOLERANCES[:1])
-    return rows_within(asked, tolerances, f"tolerances at {kinematics} strain", rows_at)
+    tolerances = request.pick(TOLERANCES, TOLERANCES[:1])
+    return rows_within(request, tolerances, f"tolerances at {kinematics} strain", rows_at)
 
 
-def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
-    wanted = 2 if asked.quick else RANDOM[kinematics]
+def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | LeftOut]:
+    wanted = 2 if request.quick else RANDOM[kinematics]
     refused = 0
 
     def rows_of(number: int) -> Iterator[Estimate]:
@@ -125,7 +127,7 @@ def _random(asked: Asked, kinematics: Kinematics) -> Iterator[Estimate | LeftOut
         else:
             yield from compared(answer, TOLERANCES[0], *truth)
 
-    yield from rows_within(asked, range(wanted), f"random scenes at {kinematics} strain", rows_of)
+    yield from rows_within(request, range(wanted), f"random scenes at {kinematics} strain", rows_of)
     if refused:
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 

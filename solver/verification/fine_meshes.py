@@ -74,6 +74,6 @@ def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -
             yield np.abs(finger.numbers([end(scene, finger, times)])[0])
             continue
         top = solution_on(scene, sizing, low, never, meshes, times)
-        if top.shape.reaches_end:
+        if top.state.reaches_end:
             top = solution_on(scene, replace(sizing, margin=WIDER), low, never, meshes, times)
-        yield np.abs(top.finger.numbers([top.shape])[0])
+        yield np.abs(top.finger.numbers([top.state])[0])

@@ -6,8 +6,8 @@ from itertools import pairwise
 from math import log
 from statistics import median
 
-from solver.verification.asked import Asked, Found, LeftOut
 from solver.verification.methods import MESHED
+from solver.verification.request import LeftOut, Measurements, Request
 from solver.verification.truth import cases
 
 MESHES = (3.0, 4.0, 6.0, 9.0, 13.0, 18.0, 26.0, 34.0, 46.0)
@@ -27,17 +27,17 @@ class Growth:
     floor_s: float  # one assembly, factorisation and solve: median
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Growth | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Growth | LeftOut]:
     """Yield a row for each kinematics and mesh, until the next would take too long."""
-    del found
+    del measurements
     for kinematics, meshed in MESHED.items():
         scene = cases(kinematics)[0]
         last: Growth | None = None
-        for fineness in asked.pick(MESHES, QUICK):
-            if last is not None and not asked.quick:
+        for fineness in request.pick(MESHES, QUICK):
+            if last is not None and not request.quick:
                 larger = last.dofs * (fineness / last.fineness) ** 1.6
                 awaited = (last.setup_s + 5.0 * last.floor_s) * (larger / last.dofs) ** 2.2
-                if awaited > SHARE * asked.left:
+                if awaited > SHARE * request.left:
                     yield LeftOut(
                         f"Growth at {kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
                     )

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from solver.equilibrium.load_stepping import march, press_and_slide
 from solver.scene.scene import Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import MESHED, Kinematics
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
 from solver.verification.truth import JUDGED, KINEMATICS, cases
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]
@@ -25,12 +25,12 @@ class Marched:
     difference: float  # of the SED, relative
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Marched | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Marched | LeftOut]:
     """Return an iterator over a row a surface and kinematics."""
-    del found
-    names = ("slipperiness 100", "stickiness 0") if asked.quick else JUDGED
+    del measurements
+    names = ("slipperiness 100", "stickiness 0") if request.quick else JUDGED
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
-    return rows_within(asked, scenes, "courses of 200 substeps", lambda scene: [_marched(scene)])
+    return rows_within(request, scenes, "courses of 200 substeps", lambda scene: [_marched(scene)])
 
 
 def _marched(scene: Scene) -> Marched:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from solver.verification.asked import Asked, Found
+from solver.verification.request import Measurements, Request
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +21,14 @@ class Machine:
     versions: dict[str, str]
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Machine]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Machine]:
     """Yield the one row."""
-    del found
+    del measurements
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     threads = os.environ.get("OPENBLAS_NUM_THREADS", "not limited")
     yield Machine(
         f"{platform.system()} {platform.release()}", _processor(), os.cpu_count() or 1, threads, load,
-        dict(asked.host.versions),
+        dict(request.host.versions),
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Pages of the docs with tables that are made and not typed, each between its marks."""
 
 
-def filled(text: str, name: str, made: str) -> str:
+def filled(text: str, name: str, text_between: str) -> str:
     r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
 
     >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
@@ -9,7 +9,7 @@ def filled(text: str, name: str, made: str) -> str:
     """
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"
     head, _, rest = text.partition(begin)
-    _, found, tail = rest.partition(end)
-    if not found:
+    _, mark, tail = rest.partition(end)
+    if not mark:
         raise ValueError(f"The page has no marks for {name}.")
-    return f"{head}{begin}\n{made}\n{end}{tail}"
+    return f"{head}{begin}\n{text_between}\n{end}{tail}"

@@ -11,7 +11,6 @@ import msgspec
 from solver.failures import SolveFailure
 from solver.response.solution import solve
 from solver.response.stepper import stepper
-from solver.verification.asked import Asked, Found, Host, LeftOut
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import Growth
@@ -21,6 +20,7 @@ from solver.verification.machine import Machine
 from solver.verification.orders import Order
 from solver.verification.processes import Cold, Memory
 from solver.verification.published.problems import Problem
+from solver.verification.request import Host, LeftOut, Measurements, Request
 from solver.verification.speed import Speed
 from solver.verification.subjects import SUBJECTS, Subject
 from solver.verification.targets import Target
@@ -61,7 +61,8 @@ class Measured:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data for a JSON file; a number that is none is null."""
         rows = {
-            name: [{"kind": type(row).__name__, **asdict(row)} for row in found] for name, found in self.rows.items()
+            name: [{"kind": type(row).__name__, **asdict(row)} for row in measurements]
+            for name, measurements in self.rows.items()
         }
         whole = {
             "begun": self.begun, "quick": self.quick, "stopped": self.stopped, "took_s": self.took_s,
@@ -97,7 +98,7 @@ def measured(
     loaded(progress)  # before the clock starts: the first run ever compiles what later ones load
     start = clock()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
-    found = Found()
+    measurements = Measurements()
     rows: dict[str, tuple[DataclassInstance, ...]] = {}
     took: dict[str, float] = {}
     left_out: list[str] = []
@@ -108,16 +109,16 @@ def measured(
             continue
         part = _share(subject, quick) / max(sum(_share(s, quick) for s in subjects[number:]), 1e-9)
         now = clock()
-        asked = Asked(quick, now + max(end - now, 0.0) * part, clock, host)
+        request = Request(quick, now + max(end - now, 0.0) * part, clock, host)
         mine: list[DataclassInstance] = []
         try:
-            for row in subject.measure(asked, found):
+            for row in subject.measure(request, measurements):
                 progress(min((clock() - start) / (end - start), 0.99), subject.doing)
                 if isinstance(row, LeftOut):
                     left_out.append(row.reason)
                 else:
                     mine.append(row)
-                    found.rows.append(row)
+                    measurements.rows.append(row)
         except KeyboardInterrupt:
             stopped = True
             left_out.append(f"Stopped during: {subject.doing}.")
@@ -132,10 +133,10 @@ def loaded(progress: Progress) -> None:
     progress(0.0, "loading compiled loops")
     for kinematics in ("small", "finite"):
         scene = cases(kinematics)[-1]
-        asked = replace(scene, solve=replace(scene.solve, tolerance=0.1))
-        solve(asked)
+        request = replace(scene, solve=replace(scene.solve, tolerance=0.1))
+        solve(request)
         if kinematics == "small":
-            solve(replace(asked, solve=replace(asked.solve, course="history")))
+            solve(replace(request, solve=replace(request.solve, course="history")))
         stepper(scene).step(1e-3, 0.0)
 
 

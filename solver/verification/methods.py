@@ -20,16 +20,16 @@ from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
-from solver.verification.asked import clock
+from solver.verification.request import clock
 
 Kinematics = Literal["small", "finite"]
-Made = TypeVar("Made", bound=Finger[Any])
+AnyFinger = TypeVar("AnyFinger", bound=Finger[Any])
 
 
-class Meshed(ABC, Generic[Made]):
+class Meshed(ABC, Generic[AnyFinger]):
     """One finger on one mesh; `fineness` is elements to a tip radius, `shift` moves its lines by half an element."""
 
-    finger: Made
+    finger: AnyFinger
     setup_s: float  # mesh and tables
     prepared_s = 0.0  # assembly and factorisation that all surfaces share; 0 where each surface has its own
 

@@ -13,8 +13,8 @@ from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.scene.scene import Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.published import contacts, locking
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 
 Errors = Sequence[float]
 Size = TypeVar("Size", int, float)
@@ -45,11 +45,11 @@ def slope(sizes: Errors, errors: Errors) -> float:
     return round(float(np.polyfit(np.log(sizes), np.log(errors), 1)[0]), 12)
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Order | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Order | LeftOut]:
     """Return an iterator over a row for each quantity, until time is over."""
-    del found
+    del measurements
     works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, pressed]
-    return rows_within(asked, works, "problems whose order is observed", lambda work: work(asked.quick))
+    return rows_within(request, works, "problems whose order is observed", lambda work: work(request.quick))
 
 
 def _row(
@@ -95,26 +95,26 @@ def pressed(quick: bool) -> Iterator[Order]:
 def small_finger(quick: bool) -> Iterator[Order]:
     """Yield the SED of the finger's ending at small strain: order 2, over shifted meshes of nearly one size."""
 
-    def sed(asked: Scene, fineness: float, shift: bool) -> float:
-        finger = LinearFinger.of(asked, Sizing(fineness, 2.0, shift))
-        return float(finger.numbers([settled(asked, finger)])[0, 0])
+    def sed(case: Scene, fineness: float, shift: bool) -> float:
+        finger = LinearFinger.of(case, Sizing(fineness, 2.0, shift))
+        return float(finger.numbers([settled(case, finger)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
     for surface in (STICKINESS[0], STICKINESS[4]):
-        asked = scene(surface)
-        yield _finger(asked.title, "small", partial(sed, asked), overkill, finenesses, 1.8)
+        case = scene(surface)
+        yield _finger(case.title, "small", partial(sed, case), overkill, finenesses, 1.8)
 
 
 def finite_finger(quick: bool) -> Iterator[Order]:
     """Yield the same at finite strain."""
-    asked = scene(SLIPPERINESS[4])
+    case = scene(SLIPPERINESS[4])
 
     def sed(fineness: float, shift: bool) -> float:
-        finger = FiniteFinger.of(asked, Sizing(fineness, asked.loading.depth, shift, margin=3.0))
-        return finger.sed_ending(finite_settled(finger, asked, lambda: False).u)
+        finger = FiniteFinger.of(case, Sizing(fineness, case.loading.depth, shift, margin=3.0))
+        return finger.sed_ending(finite_settled(finger, case, lambda: False).u)
 
     finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
-    yield _finger(asked.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)
+    yield _finger(case.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)
 
 
 def _finger(
@@ -132,12 +132,12 @@ def _finger(
 
 def _each(meshes: Sequence[Size], error: Callable[[Size], Value]) -> tuple[list[Value], list[float]]:
     """Return what `error` finds on each mesh, and how long it took [s]."""
-    found, took = list[Value](), list[float]()
+    errors, took = list[Value](), list[float]()
     for mesh in meshes:
         begun = clock()
-        found.append(error(mesh))
+        errors.append(error(mesh))
         took.append(clock() - begun)
-    return found, took
+    return errors, took
 
 
 def _rms(values: Errors) -> float:

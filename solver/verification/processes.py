@@ -10,8 +10,8 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
-from solver.verification.asked import Asked, Found, LeftOut
 from solver.verification.methods import Kinematics
+from solver.verification.request import LeftOut, Measurements, Request
 from solver.verification.truth import KINEMATICS
 
 SCENE = """[friction]
@@ -67,14 +67,14 @@ class Memory:
     solve_mb: float  # largest, above idle
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Memory | LeftOut]:
     """Yield cold starts and the memory of a solve in each kinematics."""
-    del found
+    del measurements
     with tempfile.TemporaryDirectory() as folder:
-        for what, command in _commands(Path(folder), asked.host.python):
-            if asked.left <= 0.0 and not what.startswith("daq-app"):
+        for what, command in _commands(Path(folder), request.host.python):
+            if request.left <= 0.0 and not what.startswith("daq-app"):
                 continue
-            runs = 5 if not asked.quick else 2 if what.startswith("daq-app") else 1
+            runs = 5 if not request.quick else 2 if what.startswith("daq-app") else 1
             try:
                 took, passed = zip(*(_run(command) for _ in range(runs)), strict=True)
                 yield Cold(what, runs, median(took), median(passed))
@@ -82,7 +82,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Cold | Memory | LeftOut]:
                 yield LeftOut(f"The cold start of {what} could not be measured: {bad}.")
     for kinematics in KINEMATICS:
         left_out = LeftOut(f"Memory of a solve at {kinematics} strain is left to a full run.")
-        yield left_out if asked.quick else _memory(kinematics, asked.host.python)
+        yield left_out if request.quick else _memory(kinematics, request.host.python)
 
 
 def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str]]]:

@@ -9,8 +9,8 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.response.answers import alike
 from solver.scene.scene import Scene
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within, timed
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
 from solver.verification.truth import JUDGED, Truth, cases, known
 
 MESHES: dict[
@@ -48,18 +48,18 @@ class Speed:
         return max((self.errors[name][0] for name in JUDGED if name in self.errors), default=None)
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Speed | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Speed | LeftOut]:
     """Yield a row for each kinematics and mesh, coarse meshes before fine ones."""
     pairs: list[tuple[float, Kinematics]] = [
-        (fineness, kind) for kind, all_of in (QUICK if asked.quick else MESHES).items() for fineness in all_of
+        (fineness, kind) for kind, all_of in (QUICK if request.quick else MESHES).items() for fineness in all_of
     ]
-    if not all(known(found, kind) for kind in MESHED):
+    if not all(known(measurements, kind) for kind in MESHED):
         yield LeftOut("Speeds need the truth of both kinematics, which is not known.")
         return
-    patience = LITTLE if asked.quick else 1.0
+    patience = LITTLE if request.quick else 1.0
     yield from rows_within(
-        asked, sorted(pairs), "meshes whose speed is measured",
-        lambda pair: [_row(pair[1], pair[0], known(found, pair[1]), patience)],
+        request, sorted(pairs), "meshes whose speed is measured",
+        lambda pair: [_row(pair[1], pair[0], known(measurements, pair[1]), patience)],
     )  # fmt: skip
 
 
@@ -67,7 +67,7 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
     """Return the row of one mesh; `patience` is how long its times are repeated, by that of a full run."""
     chosen = [scene for scene in cases(kind) if scene.title in truths]
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    prepared, setup, beside = _made(kind, deepest, fineness, 0.3 * patience)
+    prepared, setup, floors_before = _prepare(kind, deepest, fineness, 0.3 * patience)
     mesh = MESHED[kind](deepest, fineness, False)
     first: list[float] = []
     solved: list[Scene] = []
@@ -86,7 +86,7 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
         first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
     together = timed(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
     onward, between = _onward(mesh, solved, patience)
-    floors = beside if prepared else between  # of the same moments as most of the work
+    floors = floors_before if prepared else between  # of the same moments as most of the work
     next_s = median(onward) if onward else None
     return Speed(
         kind, fineness, mesh.dofs, setup, prepared, median(floors),
@@ -94,7 +94,7 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
     )  # fmt: skip
 
 
-def _made(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
+def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> tuple[float, float, list[float]]:
     """Return medians of what a mesh's assembly and factorisation, and what the rest took; and floors in turn with them.
 
     One is forgotten before the next is made, as in a process that solves again and again, which is given memory once.

@@ -18,8 +18,8 @@ from solver.verification import (
     truth,
     warm,
 )
-from solver.verification.asked import Asked, Found
 from solver.verification.published import problems
+from solver.verification.request import Measurements, Request
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -33,7 +33,7 @@ class Subject:
     doing: str  # as shown while it runs
     share: float  # of the time; what a subject does not use is left to the later ones
     quick_share: float
-    measure: "Callable[[Asked, Found], Iterator[DataclassInstance]]"
+    measure: "Callable[[Request, Measurements], Iterator[DataclassInstance]]"
 
 
 SUBJECTS = (

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from statistics import median
 
 from solver.prediction import percent
-from solver.verification.asked import Asked, Found
 from solver.verification.estimates import Guaranteed
 from solver.verification.growth import Growth, between, exponent
 from solver.verification.histories import Marched
 from solver.verification.methods import Kinematics
 from solver.verification.processes import Cold, Memory
+from solver.verification.request import Measurements, Request
 from solver.verification.speed import MESHES, QUICK, Speed
 from solver.verification.truth import JUDGED, cases
 from solver.verification.warm import SURFACES, Warm
@@ -52,9 +52,9 @@ class Target:
         return f"reach met{where}" if self.measured <= self.reach else "missed"
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Target]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
     """Yield every row from what the other subjects found."""
-    meshes = QUICK if asked.quick else MESHES
+    meshes = QUICK if request.quick else MESHES
     further = "finite strain, each further surface"
     at_errors: tuple[tuple[str, Kinematics, float, float, float, Callable[[Speed], float | None]], ...] = (
         ("small strain, all ten surfaces, from scratch", "small", 0.01, 5.0, 2.0, lambda s: s.all_s),
@@ -65,19 +65,19 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
         ("finite strain, one surface", "finite", 0.0006, 400.0, 100.0, lambda s: s.first_s),
     )
     for row in at_errors:
-        yield _at_error(found, meshes, *row)
-    yield _warm(found, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
-    yield _warm(found, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
-    yield _marched(found)
-    yield _cold(found)
-    yield from map(_guaranteed, found.of(Guaranteed))
-    for row in found.of(Memory):
+        yield _at_error(measurements, meshes, *row)
+    yield _warm(measurements, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
+    yield _warm(measurements, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
+    yield _marched(measurements)
+    yield _cold(measurements)
+    yield from map(_guaranteed, measurements.of(Guaranteed))
+    for row in measurements.of(Memory):
         yield Target(
             f"memory of a solve, {row.kinematics} strain, above idle", percent(row.tolerance), "MB", 100.0, None,
             row.solve_mb, None, f"{row.dofs} unknowns, estimate {percent(row.error_estimate)}",
         )  # fmt: skip
     for kinematics in ("small", "finite"):
-        rows = [row for row in found.of(Growth) if row.kinematics == kinematics]
+        rows = [row for row in measurements.of(Growth) if row.kinematics == kinematics]
         power = exponent(rows)
         how = "" if power is None else f"up to {max(r.dofs for r in rows):,} unknowns; {_between(rows)}"
         yield Target(
@@ -86,7 +86,7 @@ def measure(asked: Asked, found: Found) -> Iterator[Target]:
 
 
 def _at_error(
-    found: Found,
+    measurements: Measurements,
     meshes: dict[Kinematics, tuple[float, ...]],
     work: str,
     kinematics: Kinematics,
@@ -95,7 +95,7 @@ def _at_error(
     aim: float,
     time: Callable[[Speed], float | None],
 ) -> Target:
-    rows = [row for row in found.of(Speed) if row.kinematics == kinematics]
+    rows = [row for row in measurements.of(Speed) if row.kinematics == kinematics]
     known = [(r.judged_error, took, r) for r in rows if r.judged_error is not None and (took := time(r)) is not None]
     good = [(took, r) for off, took, r in known if off <= error]
     if not good:
@@ -109,8 +109,8 @@ def _at_error(
     return Target(work, percent(error), "ms", reach, aim, 1e3 * took, took / best.floor_s, how, part=part)
 
 
-def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) -> Target:
-    rows = [row for row in found.of(Warm) if row.kinematics == kinematics]
+def _warm(measurements: Measurements, work: str, kinematics: str, reach: float, aim: float) -> Target:
+    rows = [row for row in measurements.of(Warm) if row.kinematics == kinematics]
     at = f"{percent(PEAK)} of peak"
     if not rows:
         return Target(work, at, "ms", reach, aim, None, None, "")
@@ -121,8 +121,8 @@ def _warm(found: Found, work: str, kinematics: str, reach: float, aim: float) ->
     return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
 
 
-def _marched(found: Found) -> Target:
-    work, rows = "a course of 200 substeps, by the direct solve", found.of(Marched)
+def _marched(measurements: Measurements) -> Target:
+    work, rows = "a course of 200 substeps, by the direct solve", measurements.of(Marched)
     if not rows:
         return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
     off = max(abs(row.difference) for row in rows)
@@ -133,9 +133,9 @@ def _marched(found: Found) -> Target:
     return Target(work, "1e-10", "times", 60.0, 30.0, times if off <= AGREED else None, None, how, part=part)
 
 
-def _cold(found: Found) -> Target:
+def _cold(measurements: Measurements) -> Target:
     work = "`daq-app solve` as a cold process, compiled code cached"
-    rows = [row for row in found.of(Cold) if row.what.startswith("daq-app")]
+    rows = [row for row in measurements.of(Cold) if row.what.startswith("daq-app")]
     if not rows:
         return Target(work, "", "ms", 1000.0, 400.0, None, None, "")
     how = ", ".join(f"{row.what.removeprefix('daq-app solve, ')} {1e3 * row.took_s:.0f} ms" for row in rows)
@@ -154,5 +154,5 @@ def _between(rows: list[Growth]) -> str:
     return f"from mesh to mesh {min(powers):.2f} to {max(powers):.2f}"
 
 
-def _part(measured: int, asked: int, what: str) -> str:
-    return f"{measured} of {asked} {what}" if measured < asked else ""
+def _part(measured: int, wanted: int, what: str) -> str:
+    return f"{measured} of {wanted} {what}" if measured < wanted else ""

@@ -16,8 +16,8 @@ from solver.response.solution import solve_many
 from solver.scene.published import scenes
 from solver.scene.scene import Scene
 from solver.scene.tables import Solve
-from solver.verification.asked import Asked, Found, LeftOut, clock
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
+from solver.verification.request import LeftOut, Measurements, Request, clock
 
 KINEMATICS = tuple(MESHED)
 NUMBERS = ("SED of the ending", "normal force", "drag")
@@ -52,12 +52,12 @@ def cases(kinematics: Kinematics) -> list[Scene]:
     return [replace(scene, solve=Solve(kinematics)) for scene in scenes()]
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Truth | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Truth | LeftOut]:
     """Yield the truth of every case; a quick run takes coarser overkill and only the cases speeds are asked at."""
-    del found
+    del measurements
     for kinematics in KINEMATICS:
-        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not asked.quick]
-        yield from _truths(asked, kinematics, chosen)
+        chosen = [s for s in cases(kinematics) if s.title in JUDGED or not request.quick]
+        yield from _truths(request, kinematics, chosen)
 
 
 def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -66,15 +66,15 @@ def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 
 
-def _truths(asked: Asked, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
+def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
     refused, todo = _sorted_out(kinematics, chosen)
     yield from refused
     begun = clock()
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
-    meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if asked.quick else SHIFTED)[kinematics]]
+    meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
     shared = (clock() - begun) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
-        if asked.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
+        if request.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
             yield LeftOut(
                 f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
             )
@@ -110,6 +110,6 @@ def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth
     return refused, todo
 
 
-def known(found: Found, kinematics: Kinematics) -> dict[str, Truth]:
+def known(measurements: Measurements, kinematics: Kinematics) -> dict[str, Truth]:
     """Return the cases whose truth is known, by name."""
-    return {t.case: t for t in found.of(Truth) if t.kinematics == kinematics and t.numbers}
+    return {t.case: t for t in measurements.of(Truth) if t.kinematics == kinematics and t.numbers}

@@ -17,8 +17,8 @@ from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.response.stepper import Stepper, stepper
 from solver.scene.scene import Scene
 from solver.scene.tables import Friction
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.methods import MESHED, Kinematics
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
 PASSES, QUICK_PASSES = 5, 3
@@ -44,13 +44,13 @@ class Warm:
     setup_s: float
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Warm | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Warm | LeftOut]:
     """Return an iterator over a row a surface and kinematics."""
-    del found
-    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if asked.quick else SURFACES)]
+    del measurements
+    scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in (QUICK[kind] if request.quick else SURFACES)]
     unbounded = [replace(scene, friction=Friction(scene.friction.mu)) for scene in scenes]
-    passes = QUICK_PASSES if asked.quick else PASSES
-    return rows_within(asked, unbounded, "surfaces followed reading by reading", lambda scene: [_row(scene, passes)])
+    passes = QUICK_PASSES if request.quick else PASSES
+    return rows_within(request, unbounded, "surfaces followed reading by reading", lambda scene: [_row(scene, passes)])
 
 
 def _row(scene: Scene, passes: int) -> Warm:
@@ -59,26 +59,26 @@ def _row(scene: Scene, passes: int) -> Warm:
     begun = clock()
     follows = stepper(scene)
     setup = clock() - begun
-    spans, found = timed_passes(follows, readings, passes)
+    spans, seds = timed_passes(follows, readings, passes)
     truth = np.array([sed for _, _, sed in readings])
     each = np.median(spans, axis=0)
     return Warm(
         kinematics, scene.title, len(readings), float(np.median(each)), float(np.percentile(each, 99)),
-        float(np.percentile(spans[-1], 99)), float(np.abs(found - truth).max() / truth.max()), setup,
+        float(np.percentile(spans[-1], 99)), float(np.abs(seds - truth).max() / truth.max()), setup,
     )  # fmt: skip
 
 
 def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES) -> tuple[np.ndarray, np.ndarray]:
     """Return what each reading took in each pass (passes, n) [s], and the SED found in the last (n,)."""
     spans = np.zeros((passes, len(readings)))
-    found = np.zeros(len(readings))
+    seds = np.zeros(len(readings))
     for number in range(passes):
         follows.forget()
         for n, (normal, tangential, _) in enumerate(readings):
             begun = clock()
-            found[n] = follows.step(normal, tangential)
+            seds[n] = follows.step(normal, tangential)
             spans[number, n] = clock() - begun
-    return spans, found
+    return spans, seds
 
 
 def _readings(scene: Scene) -> Iterator[Reading]:

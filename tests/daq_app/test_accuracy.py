@@ -14,7 +14,6 @@ from daq_app.child_process import interpreter
 from solver import solve
 from solver.response.solution import DEFAULT
 from solver.verification import estimates, targets
-from solver.verification.asked import Asked, Found, Host, LeftOut, rows_within, timed
 from solver.verification.costs import Cost, shares
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import Growth, exponent
@@ -25,14 +24,15 @@ from solver.verification.methods import FiniteMeshed
 from solver.verification.orders import Order
 from solver.verification.published.problems import Problem
 from solver.verification.random_scenes import random_scene
+from solver.verification.request import Host, LeftOut, Measurements, Request, rows_within, timed
 from solver.verification.speed import Speed
 from solver.verification.subjects import Subject
 from solver.verification.truth import JUDGED, Truth, cases
 from solver.verification.warm import Warm
 
 HOST = Host({}, tuple(interpreter()))
-FOREVER = Asked(quick=True, until=perf_counter() + 1e6, host=HOST)
-OVER = Asked(quick=True, until=perf_counter() - 1.0, host=HOST)
+FOREVER = Request(quick=True, until=perf_counter() + 1e6, host=HOST)
+OVER = Request(quick=True, until=perf_counter() - 1.0, host=HOST)
 
 
 def speed(kinematics, dofs, error, first, floor=1e-3, failed=()):
@@ -78,7 +78,7 @@ ROWS = {
 
 @pytest.fixture(scope="module")
 def example():
-    found = Found([row for rows in ROWS.values() for row in rows])
+    found = Measurements([row for rows in ROWS.values() for row in rows])
     rows = {**ROWS, "targets": tuple(targets.measure(FOREVER, found))}
     took = dict.fromkeys(rows, 1.0)
     return Measured("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
@@ -134,7 +134,7 @@ def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
 
 
 def test_an_aim_met_by_a_part_of_what_was_asked_says_by_which_part(example):
-    small = [r for r in targets.measure(FOREVER, Found([speed("small", 900, 0.005, 3e-4)])) if r.reach == 5.0]
+    small = [r for r in targets.measure(FOREVER, Measurements([speed("small", 900, 0.005, 3e-4)])) if r.reach == 5.0]
     assert [row.verdict for row in small] == ["aim met by 6 of them"]
     assert verdict(example, "warm stepper, finite strain, p99 of a reading").verdict == "aim met by 1 of 4 surfaces"
 
@@ -167,7 +167,7 @@ def test_an_error_that_no_mesh_met_is_missed_and_the_best_is_told(example):
 
 
 def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over_before_them():
-    coarse = Found([speed("finite", 900, 0.02, 4e-3)])
+    coarse = Measurements([speed("finite", 900, 0.02, 4e-3)])
     rows = [row for row in targets.measure(FOREVER, coarse) if row.work.startswith("finite strain, one")]
     assert {row.verdict for row in rows} == {"not measured"}
     assert all("2 %" in row.how for row in rows)
@@ -176,12 +176,12 @@ def test_an_error_that_finer_meshes_might_meet_is_not_missed_where_time_was_over
 def test_a_mesh_that_gives_no_answer_for_one_of_the_surfaces_meets_nothing():
     lame = speed("finite", 900, 1e-6, 1e-3, failed=("slipperiness 55",))
     assert lame.judged_error is None
-    rows = {r.work: r for r in targets.measure(FOREVER, Found([lame]))}
+    rows = {r.work: r for r in targets.measure(FOREVER, Measurements([lame]))}
     assert rows["finite strain, one surface from undeformed"].measured is None
 
 
 def test_what_was_not_measured_is_said_to_be_so_and_not_missed():
-    rows = list(targets.measure(FOREVER, Found()))
+    rows = list(targets.measure(FOREVER, Measurements()))
     assert {row.verdict for row in rows} == {"not measured"}
 
 

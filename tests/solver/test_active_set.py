@@ -13,7 +13,7 @@ from solver.contact import FrictionLaw
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import Aim, Way
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton, lowered
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain
@@ -79,7 +79,7 @@ def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, ta
         normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
         course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))
         before = course.step(lowered_plain(course.law, before), 0.0, 0.0)
-        state = balanced(newton, lowered(newton.condensed, state), Given(normal, drag))
+        state = balanced(newton, lowered(newton.condensed, state), ForceLoad(normal, drag))
         agree(state, before)
         np.testing.assert_allclose([-state.load.depth, -state.load.travel], before.motion, atol=1e-10)
     assert (state.state == SHEAR_LIMITED).any() == (tau < np.inf)

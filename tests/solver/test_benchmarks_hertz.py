@@ -31,10 +31,10 @@ def test_half_width_and_pressure_are_those_of_hertz(case):
 
 
 def test_a_round_body_touches_and_presses_as_hertz_says(light):
-    pressure = light.found.normal / light.length
-    assert 2 * np.sqrt(light.found.normal @ light.x**2 / light.load) == pytest.approx(1.0, rel=1e-3)
+    pressure = light.press.normal / light.length
+    assert 2 * np.sqrt(light.press.normal @ light.x**2 / light.load) == pytest.approx(1.0, rel=1e-3)
     assert pressure[len(light.x) // 2] == pytest.approx(light.peak, rel=1e-3)
-    assert np.ptp(light.x[light.found.touching]) / 2 == pytest.approx(1.0, abs=0.01)
+    assert np.ptp(light.x[light.press.touching]) / 2 == pytest.approx(1.0, abs=0.01)
 
 
 def test_a_whole_cylinder_between_two_plates_approaches_them_as_in_johnson_5_57():
@@ -59,12 +59,12 @@ AXIS = np.array([0.25, 0.5, 0.786, 1.0, 1.5])
 
 def test_on_the_axis_the_stresses_are_those_of_hertz_and_the_largest_shear_is_below_the_surface():
     light = contacts.light(wide=300.0)
-    found = light.stress(light.found, np.stack([0 * AXIS, AXIS], axis=1))
+    found = light.stress(light.press, np.stack([0 * AXIS, AXIS], axis=1))
     root = np.sqrt(1 + AXIS**2)
     assert np.abs(found[:, 0, 0] + (1 + 2 * AXIS**2) / root - 2 * AXIS).max() < 0.005
     assert np.abs(found[:, 1, 1] + 1 / root).max() < 0.005
     depths = np.linspace(0.6, 1.0, 41)
-    found = light.stress(light.found, np.stack([0 * depths, depths], axis=1))
+    found = light.stress(light.press, np.stack([0 * depths, depths], axis=1))
     shear = (found[:, 0, 0] - found[:, 1, 1]) / 2
     assert shear.max() == pytest.approx(0.300, rel=0.01)
     assert np.interp(0.786, depths, shear) == pytest.approx(0.300, rel=0.01)

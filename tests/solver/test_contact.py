@@ -11,7 +11,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.mesh.mesh import block
 
 RADIUS = 5.0
@@ -113,7 +113,7 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
     travel = 0.0
     while -now.force[0] < part * mu * load:
         travel -= 2e-6
-        now = balanced(newton, now, Given(load, None, travel))
+        now = balanced(newton, now, ForceLoad(load, None, travel))
     reached = -now.tangential.sum() / (mu * load)
     x = body.mesh.nodes[body.mesh.skin, 0]
     assert np.ptp(x[now.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - reached), abs=0.02)

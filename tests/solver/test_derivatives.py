@@ -189,7 +189,7 @@ def slip(finger, scene, start=None):
     shape = sliding.settled(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
         return shape
-    return load_stepping.balanced(finger.newton, shape, load_stepping.Given(scene.normal_force, None), 1e-12)
+    return load_stepping.balanced(finger.newton, shape, load_stepping.ForceLoad(scene.normal_force, None), 1e-12)
 
 
 def finite_numbers(finger, scene, here):

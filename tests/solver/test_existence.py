@@ -102,7 +102,7 @@ def test_beyond_the_fold_every_mesh_refuses_also_where_it_has_a_creased_state(mu
 @SLOW
 def test_every_mesh_has_the_state_below_the_fold_on_the_same_branch():
     found = [refined(drawn(0.71), 1.8, fineness) for fineness in (7.0, 10.0, 14.0, 20.0)]
-    np.testing.assert_allclose([top.finger.sed_ending(top.shape.u) for top in found], 0.00286, rtol=0.01)
+    np.testing.assert_allclose([top.finger.sed_ending(top.state.u) for top in found], 0.00286, rtol=0.01)
 
 
 @SLOW
@@ -142,7 +142,7 @@ def test_a_fold_that_lies_where_meshes_are_coarse_is_seen_by_all_of_them(finenes
             solve=Solve("finite"),
         )
 
-    assert refined(at(0.84), 1.0997, fineness).shape.touching.any()
+    assert refined(at(0.84), 1.0997, fineness).state.touching.any()
     with pytest.raises(NoSteadyState) as refused:
         refined(at(0.91), 1.0997, fineness)
     assert refused.value.limit_mu == pytest.approx(0.88, rel=0.03)

@@ -113,9 +113,9 @@ def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeforme
     alone, after_one = Meshes(), Meshes()
     coarse_solution(one, 1.5, 4.0, lambda: False, after_one)
     lows = [coarse_solution(other, 1.5, 4.0, lambda: False, meshes) for meshes in (after_one, alone)]
-    assert lows[0].shape.iterations < lows[1].shape.iterations
+    assert lows[0].state.iterations < lows[1].state.iterations
     tops = [
-        refine(other, 6.0, low, lambda: False, meshes).top.shape
+        refine(other, 6.0, low, lambda: False, meshes).top.state
         for low, meshes in zip(lows, (after_one, alone), strict=True)
     ]
     np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)

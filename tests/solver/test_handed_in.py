@@ -11,7 +11,7 @@ from solver.constitutive.linear import Hooke, Prony
 from solver.contact import FrictionLaw
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import loaded, march
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh.mesh import Mesh, MeshError, block
 
@@ -107,7 +107,7 @@ def as_handed_in(mesh, whole, lengths):
         ),
         (lambda: loaded(FiniteBody.of(MESH, SKIN), load=LoadState(0.0, -0.3)), "mu = -0.3"),
         (lambda: EquilibriumState.undeformed(FiniteBody.of(MESH, SKIN).condensed, LoadState(0.0, -0.3)), "mu = -0.3"),
-        (lambda: Given(0.1, np.nan).checked(), "tangential = nan"),
+        (lambda: ForceLoad(0.1, np.nan).checked(), "tangential = nan"),
         (
             lambda: settled(Newton(LinearBody.of(MESH, TISSUE).condensed), LoadState(np.nan, 0.3, sense=1)),
             "depth = nan",
@@ -148,7 +148,7 @@ def test_pulls_and_forces_of_whole_numbers_reach_the_loops_as_the_floats_they_ar
     assert [type(number) for number in LoadState(1, 0, 2, np.int64(-1), np.float32(3.0)).checked()] == [
         *(float, float, float, int, float)
     ]
-    assert Given(1, None, 2).checked() == (1.0, None, 2.0)
+    assert ForceLoad(1, None, 2).checked() == (1.0, None, 2.0)
     assert type(FrictionLaw(1, 2).mu) is float
     loads = np.zeros(MESH.nodes.shape, np.int32)
     loads[MESH.skin[2], 1] = 1  # on the middle of the foot

@@ -13,7 +13,7 @@ from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.linear import Hooke
 from solver.equilibrium.full_slip import settled, slide_under
 from solver.equilibrium.load_stepping import march
-from solver.equilibrium.newton import Given, LoadState, Newton
+from solver.equilibrium.newton import ForceLoad, LoadState, Newton
 from solver.mesh.mesh import HalvedMesh, block, quality
 
 SLIDES = LoadState(0.15, 0.3, sense=-1)
@@ -95,7 +95,7 @@ def test_under_a_given_force_the_depth_has_an_error():
     def depth(_, state):
         return np.array([state.load.depth])
 
-    found = estimated(depth, newton, states[0], (nested, states[1]), Given(0.02, None))
+    found = estimated(depth, newton, states[0], (nested, states[1]), ForceLoad(0.02, None))
     assert abs(found.value - states[2].load.depth) <= found.error
     assert found.error < 0.02 * found.value
 

@@ -11,7 +11,7 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve, stepper
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import march, press_and_slide
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.stepper import FiniteStepper, SmallStepper
@@ -163,9 +163,9 @@ def test_a_finger_that_lifts_quickly_is_told_of_as_it_is(readings_of_lift):
     follows = made("finite", mu)
     part = np.linspace(0.0, 1.0, readings_of_lift + 1)[1:-1]
     lift = 1.0 - part**2 * (3.0 - 2.0 * part)
-    course = [Given(0.1 * p, 0.0) for p in np.linspace(0.05, 1.0, 30)]
-    course += [Given(0.1, -0.0399 * p) for p in np.linspace(0.05, 1.0, 30)]
-    course += [Given(0.1 * p, -0.0399 * p) for p in lift.tolist()]
+    course = [ForceLoad(0.1 * p, 0.0) for p in np.linspace(0.05, 1.0, 30)]
+    course += [ForceLoad(0.1, -0.0399 * p) for p in np.linspace(0.05, 1.0, 30)]
+    course += [ForceLoad(0.1 * p, -0.0399 * p) for p in lift.tolist()]
     balanced = march(finger.newton, course, EquilibriumState.undeformed(finger.newton.condensed, LoadState(0.0, mu)))
     truth = np.array([finger.sed_ending(shape.u) for shape in balanced])
     told = np.array([follows.step(given.normal, given.tangential) for given in course])

@@ -40,7 +40,7 @@ def cells(*rows):
 def test_an_estimate_below_the_true_error_is_counted_and_named_and_one_in_doubt_is_not():
     rows = [estimate(0.02, 0.01), estimate(0.001, 0.004), estimate(0.001, 0.004, doubt=0.002)]
     assert cells(*rows)["SED above"] == "50 %"
-    assert list(misses(rows)) == ["axis 7, small strain, 1 %: SED of the ending 0.004 told 0.001"]
+    assert list(misses(rows)) == ["axis 7, small strain, 1 %: error of the SED of the ending 0.004, estimate 0.001"]
 
 
 def test_a_tolerance_that_is_said_to_be_met_and_is_not_counts_as_missed_unsaid():

@@ -58,8 +58,8 @@ def _measured(options: argparse.Namespace, console: Console) -> "Measured":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
     from sessions.file_access import read_limited
     from sessions.recording.provenance import software_versions
-    from solver.verification.asked import Host
     from solver.verification.measuring import measured, restored
+    from solver.verification.request import Host
 
     if options.data is None:
         return measured(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))

@@ -153,11 +153,11 @@ def distorted_finger(bodies: Bodies) -> Outcome:
 def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
     """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
     whole, alone = two_parts()
-    found = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
-    force, rigid = float(found.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
-    drag, off = -float(found.force[0]) / force, abs(force / rigid - 1)
+    slide = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
+    force, rigid = float(slide.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
+    drag, off = -float(slide.force[0]) / force, abs(force / rigid - 1)
     good = off < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
-    summary = f"N {force:.5g}, {percent(off)} from the rigid part's; {found.iterations} systems"
+    summary = f"N {force:.5g}, {percent(off)} from the rigid part's; {slide.iterations} systems"
     return Outcome(True, (force, drag, rigid), "" if good else f"off by {off:.1g}", summary)
 
 
@@ -165,12 +165,12 @@ def one_node(bodies: Bodies) -> Outcome:
     """Press so lightly that one node touches: its force is its depth by its compliance at small strain."""
     mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
     depth, mu = 1e-5, 0.3
-    found = settled(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
+    slide = settled(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
     compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
     up = 2 * (len(mesh.skin) // 2) + 1  # the unknown of the node in the middle
-    force, exact = float(found.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])
+    force, exact = float(slide.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])
     off = abs(force / exact - 1)
-    flaw = "" if found.touching.sum() == 1 and off < bodies.node_agreement else "not what one node bears"
+    flaw = "" if slide.touching.sum() == 1 and off < bodies.node_agreement else "not what one node bears"
     apart = "equal to" if off < 1e-12 else f"{percent(off)} from"
     return Outcome(True, (force, exact), flaw, f"N {force:.4g}, {apart} the depth by the node's compliance")
 

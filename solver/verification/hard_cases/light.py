@@ -23,17 +23,17 @@ class Touch:
     width: float  # of the contact [mm]
 
 
-def of_light_touch(asked: Scene) -> Outcome:
+def of_light_touch(scene: Scene) -> Outcome:
     """Solve a scene of a light touch; SED, normal force and width must be Hertz's within their estimates."""
-    (found,) = solve_many([asked])
-    outcome = of_answer(found)
-    if not isinstance(found, Prediction):
+    (answer,) = solve_many([scene])
+    outcome = of_answer(answer)
+    if not isinstance(answer, Prediction):
         return outcome
-    true = hertz(asked)
+    true = hertz(scene)
     pairs = (
-        ("SED", found.sed_ending, true.sed, found.error_estimate),
-        ("N", found.normal_force, true.force, found.normal_force_error or 0.0),
-        ("width", found.contact_width, true.width, found.contact_width_error or 0.0),
+        ("SED", answer.sed_ending, true.sed, answer.error_estimate),
+        ("N", answer.normal_force, true.force, answer.normal_force_error or 0.0),
+        ("width", answer.contact_width, true.width, answer.contact_width_error or 0.0),
     )
     far = [
         f"{name} {abs(number / exact - 1.0):.1%} from Hertz's"
@@ -42,12 +42,12 @@ def of_light_touch(asked: Scene) -> Outcome:
     ]
     flaws = ", ".join(filter(None, [outcome.flaw, *far]))
     summary = (
-        f"{outcome.summary}; SED by Hertz {true.sed:.4g}, width {found.contact_width:.3g} by Hertz {true.width:.3g}"
+        f"{outcome.summary}; SED by Hertz {true.sed:.4g}, width {answer.contact_width:.3g} by Hertz {true.width:.3g}"
     )
     return replace(outcome, flaw=flaws, summary=summary)
 
 
-def hertz(asked: Scene) -> Touch:
+def hertz(scene: Scene) -> Touch:
     """Return Hertz's touch at the depth of a scene (Johnson 1985, eqs 4.43 to 4.45 and 5.56).
 
     Half the contact is sqrt(4 N R / (pi E*)), and d / N grows by ln(1 / N) / (pi E*) as the force N on a mm of width
@@ -56,24 +56,24 @@ def hertz(asked: Scene) -> Touch:
     """
     from scipy.optimize import brentq  # slow to load, and light touches alone have need of it
 
-    skin = asked.materials.of("epidermis")
+    skin = scene.materials.of("epidermis")
     modulus = skin.E / (1.0 - skin.nu**2)
-    yields, response = _finger(replace(asked, loading=replace(asked.loading, indentation=KNOWN)))
+    yields, response = _finger(replace(scene, loading=replace(scene.loading, indentation=KNOWN)))
     rest = yields[0] / yields[1] + log(yields[1]) / (pi * modulus)
 
     def too_deep(power: float) -> float:
         force = 10.0**power
-        return force * (rest - log(force) / (pi * modulus)) - asked.loading.depth
+        return force * (rest - log(force) / (pi * modulus)) - scene.loading.depth
 
     force = 10.0 ** float(brentq(too_deep, -20.0, 0.0))
-    return Touch(force, response * force**2, 2.0 * sqrt(4.0 * force * asked.finger.tip_radius / (pi * modulus)))
+    return Touch(force, response * force**2, 2.0 * sqrt(4.0 * force * scene.finger.tip_radius / (pi * modulus)))
 
 
 @cache
 def _finger(deeper: Scene) -> tuple[tuple[float, float], float]:
     """Return the depth [mm] and force [N/mm] of a touch, and its SED by the force squared [mm^2/(N^2) MPa]."""
-    (found,) = solve_many([deeper])
-    if isinstance(found, SolveFailure):
-        raise found
-    force = found.normal_force
-    return (deeper.loading.depth, force), found.sed_ending / force**2
+    (answer,) = solve_many([deeper])
+    if isinstance(answer, SolveFailure):
+        raise answer
+    force = answer.normal_force
+    return (deeper.loading.depth, force), answer.sed_ending / force**2

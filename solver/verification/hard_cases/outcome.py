@@ -27,14 +27,14 @@ class Outcome:
     summary: str  # for people: the answer with its error, or the reason why there is none
 
 
-def of_scene(asked: Scene) -> Outcome:
+def of_scene(scene: Scene) -> Outcome:
     """Solve a scene of the finger through the solver's front door."""
-    return of_answer(solve_many([asked])[0])
+    return of_answer(solve_many([scene])[0])
 
 
-def of_answer(found: Prediction | SolveFailure) -> Outcome:
+def of_answer(answer: Prediction | SolveFailure) -> Outcome:
     """Return how a solve ended."""
-    return _refused(found) if isinstance(found, SolveFailure) else _answered(found)
+    return _refused(answer) if isinstance(answer, SolveFailure) else _answered(answer)
 
 
 def _refused(failure: SolveFailure) -> Outcome:
@@ -43,21 +43,21 @@ def _refused(failure: SolveFailure) -> Outcome:
     return Outcome(False, (), flaw, summary)
 
 
-def _answered(found: Prediction) -> Outcome:
-    checks = found.audits
+def _answered(answer: Prediction) -> Outcome:
+    checks = answer.audits
     flaws = [name for name in BALANCE if name in checks and not checks[name] < UNBALANCED]
     flaws += [name for name in LIMITS if not checks[name] < EXCEEDED]
-    if found.scene.solve.kinematics == "finite" and not checks["smallest_det_F"] > 0.0:
+    if answer.scene.solve.kinematics == "finite" and not checks["smallest_det_F"] > 0.0:
         flaws.append("smallest_det_F")
-    if not found.sed_ending > 0.0:
+    if not answer.sed_ending > 0.0:
         flaws.append("sed_ending")
-    if not 0.0 < found.error_estimate < NOTHING and UNKNOWN not in found.warnings:
+    if not 0.0 < answer.error_estimate < NOTHING and UNKNOWN not in answer.warnings:
         flaws.append("error_estimate")
-    numbers = (found.sed_ending, found.sed_point, found.normal_force, found.tangential_force, found.error_estimate)
+    numbers = (answer.sed_ending, answer.sed_point, answer.normal_force, answer.tangential_force, answer.error_estimate)
     balance = max(checks[name] for name in BALANCE if name in checks)
     summary = (
-        f"SED {found.sed_ending:.4g} ± {percent(found.error_estimate)}, N {found.normal_force:.4g}, "
-        f"T {found.tangential_force + 0.0:.4g}; {found.newton_iterations} systems; balance {power(balance)}"
+        f"SED {answer.sed_ending:.4g} ± {percent(answer.error_estimate)}, N {answer.normal_force:.4g}, "
+        f"T {answer.tangential_force + 0.0:.4g}; {answer.newton_iterations} systems; balance {power(balance)}"
     )
     return Outcome(True, numbers, ", ".join(flaws), summary)
 

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.hard_cases import bodies
 from solver.verification.hard_cases.outcome import Outcome
 from solver.verification.hard_cases.scenes import ANSWER, Case, hard_scenes
 from solver.verification.methods import Kinematics
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 
 TELLING = {  # what a quick run shows, and `make test` of finite strain
     "nu 0.0", "nu 0.4999999", "bone 1e10 times stiffer than fat", "mu 0", "tau_max 0 MPa", "tau_max 1e+09 MPa",
@@ -36,7 +36,7 @@ class HardCase:
     must: str
     answered: bool
     flaw: str  # "" where what must happen happened
-    told: str  # the outcome's summary
+    summary: str  # the outcome's summary
     took_s: float
 
 
@@ -55,26 +55,26 @@ def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
 
 
 def _judged(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
-    begun, found = clock(), case.run()
-    flaws = [found.flaw] if found.flaw else []
-    if not found.answered and case.must == ANSWER:
+    begun, outcome = clock(), case.run()
+    flaws = [outcome.flaw] if outcome.flaw else []
+    if not outcome.answered and case.must == ANSWER:
         flaws.append("no answer")
-    if not all(abs(number) < float("inf") for number in found.numbers):
+    if not all(abs(number) < float("inf") for number in outcome.numbers):
         flaws.append("a number is not finite")
-    if neighbour is not None and neighbour.numbers and found.numbers:
-        off = abs(found.numbers[0] / neighbour.numbers[0] - 1.0)
+    if neighbour is not None and neighbour.numbers and outcome.numbers:
+        off = abs(outcome.numbers[0] / neighbour.numbers[0] - 1.0)
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
     whole = "; ".join(flaws)
-    row = HardCase(case.kinematics, case.name, case.must, found.answered, whole, found.summary, clock() - begun)
-    return row, found
+    row = HardCase(case.kinematics, case.name, case.must, outcome.answered, whole, outcome.summary, clock() - begun)
+    return row, outcome
 
 
-def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[HardCase | LeftOut]:
     """Yield a row for every case, or for those that tell most."""
-    del found
+    del measurements
     suite = [case for kinematics in bodies.BODIES for case in cases(kinematics)]
-    todo = [case for case in suite if not asked.quick or case.name in TELLING]
+    todo = [case for case in suite if not request.quick or case.name in TELLING]
     if len(todo) < len(suite):
         yield LeftOut(f"{len(suite) - len(todo)} hard cases are left to a full run.")
     kept: dict[tuple[Kinematics, str], Outcome] = {}
@@ -83,4 +83,4 @@ def measure(asked: Asked, found: Found) -> Iterator[HardCase | LeftOut]:
         row, kept[case.kinematics, case.name] = _judged(case, kept.get((case.kinematics, case.same_as)))
         yield row
 
-    yield from rows_within(asked, todo, "hard cases", rows)
+    yield from rows_within(request, todo, "hard cases", rows)

@@ -47,8 +47,8 @@ def joined(grids: Sequence[Array]) -> Mesh:
 
 def chain(on: NDArray[np.bool_], along: Array) -> Indices:
     """Return the nodes where `on` is true, in the order of `along`."""
-    found = np.flatnonzero(on)
-    return found[np.argsort(along[found])]
+    nodes = np.flatnonzero(on)
+    return nodes[np.argsort(along[nodes])]
 
 
 def ring(inner: float, outer: float, radial: int, around: int) -> tuple[Mesh, Indices]:
@@ -95,7 +95,7 @@ def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
 def disc(radius: float, finest: float, zone: float) -> Mesh:
     """Return a whole cylinder standing on the surface, fine below and above; its skin is the lower quarter."""
     fine = mirrored(graded(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
-    beside = np.linspace(-np.pi / 4, np.pi / 4, 13)
+    coarse = np.linspace(-np.pi / 4, np.pi / 4, 13)
     out = 1 - graded(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
     half = 0.4 * radius
 
@@ -108,9 +108,9 @@ def disc(radius: float, finest: float, zone: float) -> Mesh:
         c, s = np.cos(turn), np.sin(turn)
         return points[::-1] @ np.array([[c, s], [-s, c]])
 
-    x, y = half * np.tan(with_middles(fine)), half * np.tan(with_middles(beside))
+    x, y = half * np.tan(with_middles(fine)), half * np.tan(with_middles(coarse))
     core = np.stack(np.meshgrid(x, y[::-1], indexing="ij"), axis=-1)
-    quarters = [quarter(fine if n % 2 == 0 else beside, n * np.pi / 2) for n in range(4)]
+    quarters = [quarter(fine if n % 2 == 0 else coarse, n * np.pi / 2) for n in range(4)]
     mesh = joined([core, *quarters])
     nodes = mesh.nodes + np.array([0.0, radius])
     on = np.isclose(np.hypot(*mesh.nodes.T), radius)

@@ -15,7 +15,7 @@ from solver.constitutive.linear import Hooke
 from solver.contact import OPEN, STICK, FrictionLaw
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, Given, LoadState, Newton
+from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.verification.published.bodies import chain, disc, graded, mirrored, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 
@@ -59,13 +59,13 @@ def hertz(young: float, nu: float, radius: float, load: float, half_width: float
     body = half_plane(half_width, np.inf, Hooke(young, nu))
     x = body.mesh.nodes[body.mesh.skin, 0]
     body.condensed.rest[:, 1] = x**2 / (2 * radius)
-    found = pressed(Newton(body.condensed), load, half_width)
-    pressure = found.normal / body.condensed.fixed_length
+    slide = pressed(Newton(body.condensed), load, half_width)
+    pressure = slide.normal / body.condensed.fixed_length
     inside = np.abs(x) < 0.9 * half_width
     ellipse = peak * np.sqrt(1 - (x[inside] / half_width) ** 2)
     return Hertz(
-        float(found.normal.sum()), 2 * float(np.sqrt(found.normal @ x**2 / load)),
-        float(np.ptp(x[found.touching])) / 2, float(pressure[len(x) // 2]),
+        float(slide.normal.sum()), 2 * float(np.sqrt(slide.normal @ x**2 / load)),
+        float(np.ptp(x[slide.touching])) / 2, float(pressure[len(x) // 2]),
         float(np.abs(pressure[inside] - ellipse).max()) / peak,
     )  # fmt: skip
 
@@ -90,13 +90,13 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     loads = edge_load(mesh, top, traction)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
     newton = Newton(body.condensed)
-    found = slide_beside(newton, NONE, touching_within(newton, 0.9 * half_width))
-    moved = body.displacement(found.u)
+    slide = slide_beside(newton, NONE, touching_within(newton, 0.9 * half_width))
+    moved = body.displacement(slide.u)
     centre = int(np.argmin(np.hypot(x, y)))
     at = mesh.nodes[mesh.skin, 0]
     return Cylinder(
-        -float(moved[centre, 1]), float(found.normal.sum()), 2 * float(np.sqrt(found.normal @ at**2 / load)),
-        float((found.normal / body.condensed.fixed_length).max()),
+        -float(moved[centre, 1]), float(slide.normal.sum()), 2 * float(np.sqrt(slide.normal @ at**2 / load)),
+        float((slide.normal / body.condensed.fixed_length).max()),
     )  # fmt: skip
 
 
@@ -110,7 +110,7 @@ class Light:
     x: Array  # (k,) of the skin's nodes
     length: Array  # (k,)
     newton: Newton
-    found: EquilibriumState
+    press: EquilibriumState
 
     def stress(self, state: EquilibriumState, points: Array) -> Array:
         """Return the stress (p, 2, 2) at `points` (p, 2), by the peak pressure."""
@@ -118,14 +118,14 @@ class Light:
 
     def sheared(self, law: FrictionLaw, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
-        stuck = np.where(self.found.touching, STICK, OPEN).astype(np.int32)
-        before = replace(self.found, state=stuck, load=LoadState(self.found.load.depth, law.mu, law.tau_max))
-        return balanced(self.newton, before, Given(self.load, -part * law.mu * self.load))
+        stuck = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
+        before = replace(self.press, state=stuck, load=LoadState(self.press.load.depth, law.mu, law.tau_max))
+        return balanced(self.newton, before, ForceLoad(self.load, -part * law.mu * self.load))
 
     def slip(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
         """Return the state of full slip; the body moves along `direction` x."""
         load = LoadState(0.0, law.mu, law.tau_max, -direction)
-        return slide_beside(self.newton, load, self.found.state, self.load)
+        return slide_beside(self.newton, load, self.press.state, self.load)
 
 
 @cache

@@ -44,22 +44,22 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     mesh = distorted(mesh, 0.2, 5)
     loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
     body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
-    found = _free(body)
+    displacement = _free(body)
     x, y = mesh.nodes.T
     r2 = x * x + y * y
     exact = ((1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE + _SHARE * OUTER**2 / r2))[:, None] * mesh.nodes
-    off = (found - exact).ravel()
+    off = (displacement - exact).ravel()
     one, zero = np.ones_like(x), np.zeros_like(x)
     rigid = np.stack([np.stack(m, axis=1).ravel() for m in ((one, zero), (zero, one), (-y, x))], axis=1)
     moved = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
     off = np.asarray(off - rigid @ moved, np.float64)
     element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
     probes = Probes.at(mesh, body.elastic, element, np.tile(_POINTS, (len(mesh.elements), 1)))
-    gradient = probes.displacement_gradient(mesh, found)
+    gradient = probes.displacement_gradient(mesh, displacement)
     shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.shear[element]
     at = _placed(mesh, element)
     closed = -2 * _SHARE * OUTER**2 * at[:, 0] * at[:, 1] / np.sum(at * at, axis=1) ** 2
-    energy = 0.5 * float(np.sum(loads * found))
+    energy = 0.5 * float(np.sum(loads * displacement))
     true = 0.5 * 2 * np.pi * INNER * widening(nu)
     return (
         float(np.sqrt(np.mean(off**2))),

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.contact import FrictionLaw
-from solver.verification.asked import Asked, Found, LeftOut, clock, rows_within
 from solver.verification.published import contacts, finite_contacts, locking
+from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +68,11 @@ FINITE_PARTS = (0.25, 0.5, 0.75)  # at finite strain, on elements three times as
 PARTS = (0.1, 0.25, 0.5, 0.75, 0.9, 0.99)  # Q/(mu P) of partial slip
 
 
-def measure(asked: Asked, found: Found) -> Iterator[Problem | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Problem | LeftOut]:
     """Return an iterator over every number, until time is over."""
-    del found
+    del measurements
     works = [thick_cylinders, membranes, hertz, partial_slip, capped, cylinder, below, at_finite_strain]
-    return rows_within(asked, works, "groups of published problems", lambda work: work())
+    return rows_within(request, works, "groups of published problems", lambda work: work())
 
 
 def _row(
@@ -86,43 +86,49 @@ def thick_cylinders() -> Iterator[Problem]:
     """Yield the widening of a thick cylinder, five elements across its wall."""
     for nu in (0.3, 0.48, 0.49, 0.499, 0.4999, 0.49999, 0.4999999):
         begun = clock()
-        found = locking.widened(nu, 5, 20)
+        numbers = locking.widened(nu, 5, 20)
         source = "MacNeal and Harder 1985"
-        yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), found, 2e-4, begun)
+        yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), numbers, 2e-4, begun)
 
 
 def membranes() -> Iterator[Problem]:
     """Yield the rise of Cook's membrane, 32 elements along each side."""
     for problem, source, young, nu, force, middle, corner in COOK:
         begun = clock()
-        found = locking.cook(young, nu, force, 32)
-        yield _row(problem, source, "u_y at (48, 52)", middle, found[0], 0.002, begun)
+        numbers = locking.cook(young, nu, force, 32)
+        yield _row(problem, source, "u_y at (48, 52)", middle, numbers[0], 0.002, begun)
         if corner is not None:
-            yield _row(problem, source, "u_y at (48, 60)", corner, found[1], 0.002, begun)
+            yield _row(problem, source, "u_y at (48, 60)", corner, numbers[1], 0.002, begun)
 
 
 def hertz() -> Iterator[Problem]:
     """Yield half-width and peak pressure under the gap of a parabola."""
     for problem, young, nu, radius, load, half_width, peak in HERTZ:
         begun = clock()
-        found = contacts.hertz(young, nu, radius, load, half_width, peak)
+        numbers = contacts.hertz(young, nu, radius, load, half_width, peak)
         source = KONTER if radius == 50.0 else JOHNSON
         yield _row(
-            problem, source, "half-width a, from <x^2> of the pressure [mm]", half_width, found.half_width, 0.01, begun
+            problem,
+            source,
+            "half-width a, from <x^2> of the pressure [mm]",
+            half_width,
+            numbers.half_width,
+            0.01,
+            begun,
         )
-        yield _row(problem, source, "peak p0 [MPa]", peak, found.peak, 0.01, begun)
+        yield _row(problem, source, "peak p0 [MPa]", peak, numbers.peak, 0.01, begun)
 
 
 def cylinder() -> Iterator[Problem]:
     """Yield what a whole cylinder between plates shows; a/R = 0.16, whose square is what the theory neglects."""
     begun = clock()
-    found = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
+    numbers = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
     problem, source = "whole cylinder between plates", "Johnson 1985, eq. 5.57"
-    yield _row(problem, source, "approach [mm]", 0.167860, found.approach, 0.005, begun)
+    yield _row(problem, source, "approach [mm]", 0.167860, numbers.approach, 0.005, begun)
     yield _row(
-        problem, source, "half-width a, from <x^2> of the pressure [mm]", 0.782578, found.half_width, 0.01, begun
+        problem, source, "half-width a, from <x^2> of the pressure [mm]", 0.782578, numbers.half_width, 0.01, begun
     )
-    yield _row(problem, source, "peak p0 [MPa]", 0.008135, found.peak, 0.01, begun)
+    yield _row(problem, source, "peak p0 [MPa]", 0.008135, numbers.peak, 0.01, begun)
 
 
 def below() -> Iterator[Problem]:
@@ -145,11 +151,11 @@ def partial_slip() -> Iterator[Problem]:
     light, law = contacts.light(), FrictionLaw(0.3, math.inf)
     for part in PARTS:
         begun = clock()
-        found = light.sheared(law, part)
+        numbers = light.sheared(law, part)
         half = math.sqrt(1 - part)
         problem, source = f"partial slip, Q/(mu P) {part:g}", "Cattaneo 1938, Mindlin 1949"
-        width = contacts.stick_width(light, found, law.mu)
-        traction = -float(found.tangential[len(light.x) // 2] / light.length[len(light.x) // 2])
+        width = contacts.stick_width(light, numbers, law.mu)
+        traction = -float(numbers.tangential[len(light.x) // 2] / light.length[len(light.x) // 2])
         yield _row(problem, source, "half stick c/a", half, width, 0.02, begun)
         yield _row(problem, source, "q(0)/(mu p0)", 1 - half, traction / (law.mu * light.peak), 0.02, begun)
 
@@ -160,8 +166,8 @@ def capped() -> Iterator[Problem]:
     for k, force in CAPPED:
         begun = clock()
         law = FrictionLaw(mu, k * mu * light.peak)
-        found = light.slip(law)
-        drag, width = -float(found.tangential.sum()) / (mu * light.load), contacts.capped_width(light, found, law)
+        numbers = light.slip(law)
+        drag, width = -float(numbers.tangential.sum()) / (mu * light.load), contacts.capped_width(light, numbers, law)
         yield from _bounded(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, begun)
 
 

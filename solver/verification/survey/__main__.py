@@ -60,8 +60,8 @@ def main() -> None:
     if options.page is not None:
         every = sorted(stored(options.keep), key=lambda row: (row.kinematics != "small", row.family, row.number))
         ends = {"first": min(row.number for row in every), "last": max(row.number for row in every)}
-        made = "\n".join([CAPTION.format(**ends), "", *table(every)])
-        options.page.write_text(filled(options.page.read_text("utf-8"), "judged", made), "utf-8")
+        judgements = "\n".join([CAPTION.format(**ends), "", *table(every)])
+        options.page.write_text(filled(options.page.read_text("utf-8"), "judged", judgements), "utf-8")
 
 
 if __name__ == "__main__":

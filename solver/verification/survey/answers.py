@@ -15,7 +15,7 @@ from solver.verification.estimates import Estimate, compared
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import random_scene, surface_set
-from solver.verification.survey.statistics import ASKED, HEADER, judgement, misses
+from solver.verification.survey.statistics import HEADER, TOLERANCES, judgement, misses
 from solver.verification.truth import NUMBERS, judged
 
 SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are judged by their range
@@ -43,10 +43,10 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
         truth = fine_numbers(scenes)
     except SolveFailure as failure:
         return Row(family, number, kinematics, refusals=(f"no truth: {failure}",))
-    for tolerance in ASKED:
-        found = solve_many([_asked(scene, tolerance, together=together) for scene in scenes])
-        refusals += [str(answer) for answer in found if isinstance(answer, SolveFailure)]
-        good = [answer for answer in found if isinstance(answer, Prediction)]
+    for tolerance in TOLERANCES:
+        answers = solve_many([_with_tolerance(scene, tolerance, together=together) for scene in scenes])
+        refusals += [str(answer) for answer in answers if isinstance(answer, SolveFailure)]
+        good = [answer for answer in answers if isinstance(answer, Prediction)]
         if together and len(good) == len(scenes):
             estimates.append(_difference(good, BY_TOLERANCE * (tolerance or 0.0), truth))
         elif good:
@@ -54,7 +54,7 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
     return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
 
 
-def _asked(scene: Scene, tolerance: float | None, *, together: bool) -> Scene:
+def _with_tolerance(scene: Scene, tolerance: float | None, *, together: bool) -> Scene:
     solve = replace(scene.solve, evidence="estimated")
     if together:
         return replace(scene, solve=replace(solve, contrast_tolerance=tolerance and BY_TOLERANCE * tolerance))

@@ -8,7 +8,7 @@ import numpy as np
 from solver.verification.estimates import Estimate
 from solver.verification.truth import NUMBERS
 
-ASKED = (None, 0.01, 0.003)  # tolerances of answers
+TOLERANCES = (None, 0.01, 0.003)  # tolerances of answers
 EXACT = 1e-12  # error below which a number follows from what is given alone, and nothing is judged [-]
 HEADER = (
     "set", "strain", "answers", "SED above", "force above", "drag above", "near", "missed unsaid", "ratio", "rank",
@@ -56,5 +56,5 @@ def misses(rows: Iterable[Estimate]) -> Iterator[str]:
     """Yield a line for every number whose error lies above its estimate."""
     for row in rows:
         if row.above is False and row.error > EXACT:
-            told = f"{row.number} {row.error:.2g} told {row.estimate:.2g}"
-            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {told}"
+            words = f"error of the {row.number} {row.error:.2g}, estimate {row.estimate:.2g}"
+            yield f"{row.case}, {row.kinematics} strain, {100 * row.tolerance:g} %: {words}"

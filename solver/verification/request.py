@@ -35,7 +35,7 @@ class Host:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Request:
     """How much may be measured. `until` is an instant of the clock `now` after which nothing new is begun."""
 
     quick: bool
@@ -54,7 +54,7 @@ class Asked:
 
 
 @dataclass(slots=True)
-class Found:
+class Measurements:
     """All rows so far, of every subject."""
 
     rows: list[DataclassInstance] = field(default_factory=list["DataclassInstance"])
@@ -78,12 +78,12 @@ def timed(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> 
 
 
 def rows_within(
-    asked: Asked, work: Iterable[Kind], what: str, rows: Callable[[Kind], Iterable[Row]]
+    request: Request, work: Iterable[Kind], what: str, rows: Callable[[Kind], Iterable[Row]]
 ) -> Iterator[Row | LeftOut]:
     """Yield the `rows` of each item of `work`, of one at least, until time is over; then that the rest is left out."""
     items = list(work)
     for number, item in enumerate(items):
-        if number and asked.left <= 0.0:
+        if number and request.left <= 0.0:
             yield LeftOut(f"Time was over after {number} of {len(items)} {what}.")
             return
         yield from rows(item)
