@@ -106,7 +106,7 @@ class SessionState:
     end: SessionEnd | None = None
     resumable: bool = False
     broken: str | None = None  # why nothing is recorded any more, where no end was written
-    sealing: Literal["no", "running", "sealed"] = "no"
+    sealing: Literal["no", "running", "cut short", "sealed"] = "no"
 
     @property
     def over(self) -> bool:
@@ -179,6 +179,8 @@ def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | 
             return replace(session, phase="resuming", asked=None)
         case m.Failed(kind=""):
             return session  # a request that has to wait for the end of this session
+        case m.Gone() | m.Failed("StartSession" | "ResumeSession") if session.sealing == "running":
+            return replace(session, sealing="cut short")
         case m.Failed(request, sentence) if request in ("StartSession", "ResumeSession") and not session.over:
             return replace(_over(session), broken=sentence)
         case _:

@@ -91,7 +91,12 @@ def _lamp(state: AppState) -> Lamp:
 
 
 def _ended_words(session: SessionState) -> str:
-    words = {"no": tr("ended"), "running": tr("ended, being sealed"), "sealed": tr("ended and sealed")}
+    words = {
+        "no": tr("ended"),
+        "running": tr("ended, being sealed"),
+        "cut short": tr("ended, not sealed"),
+        "sealed": tr("ended and sealed"),
+    }
     return words[session.sealing]
 
 
@@ -102,6 +107,13 @@ def _banner(state: AppState) -> Banner | None:
     if session is not None and (words := _cut_short(state, session)):
         again = m.ResumeSession(session.folder) if session.resumable else None
         return Banner("wrong", words, tr("Resume session") if again else "", again)
+    if state.gone is not None and session is not None and session.sealing == "cut short":
+        words = tr(
+            "The recorder has ended while it sealed the session. Everything is kept: 'daq-app resume --end {folder}' "
+            "seals it.",
+            folder=session.folder,
+        )
+        return Banner("wrong", words)
     if state.gone is not None:
         return Banner("wrong", sentence(state.gone))
     if bench.link == "lost":

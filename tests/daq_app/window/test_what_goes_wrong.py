@@ -52,6 +52,16 @@ def test_nothing_that_is_done_after_the_recorder_has_ended_takes_the_way_to_resu
     assert view.banner.sends == RESUME
 
 
+@pytest.mark.parametrize("cut", [GONE, m.Failed("StartSession", "no room: free some", "RecordingError")])
+def test_a_session_whose_sealing_was_cut_short_is_not_said_to_be_being_sealed(cut):
+    sealing = after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"))
+    assert derive_view(sealing).lamp.words == "ended, being sealed"
+    view = derive_view(after(*CLOSING, m.SessionEnded("recordings/P07", END, False), m.Sealing("recordings/P07"), cut))
+    assert view.lamp.words == "ended, not sealed"
+    assert ("daq-app resume --end recordings/P07" if cut is GONE else "No room: free some") in view.banner.sentence
+    assert view.banner.sends != RESUME
+
+
 def test_the_subject_is_asked_for_nothing_while_no_recorder_takes_the_answer():
     assert derive_view(after(*SCORE)).subject.asks
     subject = derive_view(after(*SCORE, GONE)).subject
