@@ -26,7 +26,7 @@ from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Wrapped, button, choice, label, panel
+from daq_app.qt.parts import Wrapped, bare, button, choice, label, panel
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens
@@ -95,9 +95,7 @@ class AnalystWindow(QMainWindow):
         self._pages = QTabWidget()
         self._pages.setAccessibleName(tr("trials, stroke or model"))
         self._beside = QWidget()
-        self._row = QHBoxLayout(self._beside)
-        self._row.setContentsMargins(0, 0, 0, 0)
-        self._row.setSpacing(GRID)
+        self._row = bare(QHBoxLayout(self._beside), GRID)
         self._narrow: bool | None = None
         self.setCentralWidget(self._placed())
         self._place_columns()

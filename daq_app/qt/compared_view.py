@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from daq_app.analyst.compared import NAMES, ComparedRow
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import bare, button, label, say
 from daq_app.qt.picture_view import PictureView, Save
 from daq_app.qt.text_table import TextTable
 from daq_app.wording import tr
@@ -28,8 +28,7 @@ class ComparedView(QWidget):
         top = QHBoxLayout()
         top.addWidget(self.words, 1)
         top.addWidget(self.choose)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addLayout(top)
         layout.addWidget(self.table, 1)
         layout.addWidget(self.picture, 2)

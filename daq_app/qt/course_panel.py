@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt.mirror import Mirror
-from daq_app.qt.parts import EntryLine, button, label, say
+from daq_app.qt.parts import EntryLine, bare, button, label, say
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
@@ -145,9 +145,7 @@ class CoursePanel(QFrame):
 
     def _actions(self, columns: int) -> QWidget:
         page = QWidget()
-        grid = QGridLayout(page)
-        grid.setContentsMargins(0, 0, 0, 0)
-        grid.setSpacing(GRID)
+        grid = bare(QGridLayout(page), GRID)
         for at, made in enumerate(self._all):
             grid.addWidget(made, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
@@ -155,9 +153,7 @@ class CoursePanel(QFrame):
 
     def _asked(self, scale: float) -> QWidget:
         page = QWidget()
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = bare(QVBoxLayout(page), GRID)
         layout.addStretch(1)
         layout.addWidget(self._question)
         layout.addWidget(self.line)

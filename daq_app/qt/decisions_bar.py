@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.qt.decision_stack import DecisionStack
-from daq_app.qt.parts import Wrapped, button, label
+from daq_app.qt.parts import Wrapped, bare, button, label
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID, TEXT, font
 from daq_app.wording import tr
@@ -48,9 +48,7 @@ class DecisionsBar(QWidget):
         line.addWidget(self.why, 1)
         line.addWidget(self.undo)
         line.addWidget(self.redo)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addLayout(line)
         layout.addWidget(self.told)
 

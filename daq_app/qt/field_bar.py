@@ -4,7 +4,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
 
 from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice, Range
-from daq_app.qt.parts import choice
+from daq_app.qt.parts import bare, choice
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
@@ -26,9 +26,7 @@ class FieldBar(QWidget):
         self.ranges = choice(tr("range of the colours"))
         self.ranges.addItems([tr("All trials"), tr("Own scale"), tr("Fixed")])
         self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QHBoxLayout(self), GRID // 2)
         layout.addWidget(self.which, 3)
         layout.addWidget(self.ranges, 2)
         for number in (self.low, self.high):

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from daq_app.analyst.field_list import FieldChoice
 from daq_app.analyst.frame import Finger
 from daq_app.analyst.probe import Line, along_line, along_skin, read_out
-from daq_app.qt.parts import button, choice
+from daq_app.qt.parts import bare, button, choice
 from daq_app.qt.tokens import GRID, MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr, tr_noop
@@ -62,9 +62,7 @@ class FieldPlot(QWidget):
         top.setSpacing(GRID // 2)
         top.addWidget(self.source, 1)
         top.addWidget(self.draw)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addLayout(top)
         layout.addWidget(self.plot, 1)
         self.source.currentIndexChanged.connect(lambda: self.changed.emit())

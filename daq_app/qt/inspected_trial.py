@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWi
 from daq_app.qt.curve import Curve
 from daq_app.qt.live_bar import short_name, spoken
 from daq_app.qt.live_plot import LivePlot
-from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.parts import bare, button, label, regrade, say
 from daq_app.qt.tokens import GRID, MU, N, T, Tokens
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import Columns
@@ -40,9 +40,7 @@ class InspectedTrial(QWidget):
         head = QHBoxLayout()
         head.addWidget(self.heading, 1)
         head.addWidget(button(tr("Back  I"), tr("back to the signals of this moment"), back))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addLayout(head)
         layout.addWidget(self.verdict)
         layout.addWidget(self.details)

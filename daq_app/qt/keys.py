@@ -6,7 +6,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QVBoxLayout, QWidget
 
-from daq_app.qt.parts import button, label, panel, scrolled
+from daq_app.qt.parts import bare, button, label, panel, scrolled
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 
@@ -160,8 +160,7 @@ class KeysPage(QWidget):
         area = scrolled(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         inside.addWidget(area, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(frame)
         self.hide()
 

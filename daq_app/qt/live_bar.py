@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
-from daq_app.qt.parts import button, choice, label, say
+from daq_app.qt.parts import bare, button, choice, label, say
 from daq_app.qt.tokens import GRID, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.live_trace import CHANNELS
 from daq_app.wording import tr, tr_noop
@@ -54,9 +54,7 @@ class LiveBar(QWidget):
             self.length.addItem(f"{seconds} s", seconds)
         self.length.activated.connect(self._chosen)
         self.length.setFixedWidth(round(84 * scale))
-        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._rows.setContentsMargins(0, 0, 0, 0)
-        self._rows.setSpacing(GRID // 2)
+        self._rows = bare(QBoxLayout(QBoxLayout.Direction.LeftToRight, self), GRID // 2)
         numbers, acts = QHBoxLayout(), QHBoxLayout()
         for row in (numbers, acts):
             row.setSpacing(GRID)

@@ -12,7 +12,7 @@ from daq_app.qt.drawer import Drawer
 from daq_app.qt.finger_view import FingerView
 from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import LivePlot
-from daq_app.qt.parts import button
+from daq_app.qt.parts import bare, button
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
 from daq_app.window.course_state import Mark, picture_end
@@ -83,9 +83,7 @@ class LivePanel(QFrame):
         self.tab.setFixedWidth(round(TAB * scale))
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self._pictures = QWidget()
-        pictures = QHBoxLayout(self._pictures)
-        pictures.setContentsMargins(0, 0, 0, 0)
-        pictures.setSpacing(2)
+        pictures = bare(QHBoxLayout(self._pictures), 2)
         pictures.addWidget(self.drawer, 1)
         pictures.addWidget(self.tab)
         layout.addWidget(self._pictures, 1)

@@ -25,7 +25,7 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.menus import Menus
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import scrolled
+from daq_app.qt.parts import bare, scrolled
 from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
@@ -359,18 +359,14 @@ class MainWindow(QMainWindow):
         window = QWidget()
         window.setObjectName("window")
         panels = QWidget()
-        body = _Panels(panels)
-        body.setContentsMargins(0, 0, 0, 0)
-        body.setSpacing(GRID)
+        body = bare(_Panels(panels), GRID)
         body.addWidget(self._left, 4)
         body.addWidget(self.middle, 3)
         for part in (self.bench, self.strip):
             part.hide()  # until it is known how much room there is
             body.addWidget(part)
         here = QWidget()
-        layout = QVBoxLayout(here)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = bare(QVBoxLayout(here), GRID)
         layout.addWidget(self.notice)
         layout.addWidget(self.to_do)
         layout.addWidget(scrolled(panels), 1)

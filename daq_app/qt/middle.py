@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import Wrapped, button, panel, regrade, scrolled
+from daq_app.qt.parts import Wrapped, bare, button, panel, regrade, scrolled
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
@@ -43,9 +43,7 @@ class Middle(QWidget):
         row.addWidget(self.stroke, 1)
         row.addWidget(self.undo)
         row.addWidget(self.redo)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = bare(QVBoxLayout(self), GRID)
         layout.addWidget(self.strip)
         layout.addWidget(self._pages, 1)
         layout.addLayout(row)

@@ -4,7 +4,7 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.openness import Openness
-from daq_app.qt.parts import button
+from daq_app.qt.parts import bare, button
 from daq_app.qt.subject_picture import SubjectPicture
 from daq_app.qt.tokens import Tokens
 from daq_app.window.view_subject import SubjectView
@@ -30,9 +30,7 @@ class Mirror(QWidget):
         self.picture: SubjectPicture | None = None  # made when it is first seen
         self.tab = button("", tr("the subject's page"), self.open.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
+        layout = bare(QVBoxLayout(self), 4)
         layout.addWidget(self.tab)
         self._place()
 

@@ -27,7 +27,7 @@ from daq_app.qt.field_plot import LINE, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
-from daq_app.qt.parts import Wrapped, button, choice
+from daq_app.qt.parts import Wrapped, bare, button, choice
 from daq_app.qt.picture_view import PictureView, SaveButtons
 from daq_app.qt.text_table import TextTable
 from daq_app.qt.tokens import Tokens
@@ -98,14 +98,12 @@ class ModelColumn(QWidget):
         ):
             self.tabs.addTab(page, name)
         self.tabs.currentChanged.connect(lambda: self._show_session())
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(self.tabs)
 
     def _session_page(self) -> QWidget:
         page = QWidget()
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(page))
         layout.addWidget(self.which)
         layout.addWidget(self.session_errors)
         layout.addWidget(self.picture, 1)
@@ -309,8 +307,7 @@ class ModelColumn(QWidget):
         course = QHBoxLayout()
         course.addWidget(self.player, 1)
         course.addWidget(self.film)
-        layout = QVBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(page))
         layout.addWidget(self.fields)
         fingers = QHBoxLayout()
         fingers.addWidget(self.finger, 1)

@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.card import CardFrame
 from daq_app.qt.cut_short import CutShort
-from daq_app.qt.parts import button, choice, entry, field, label, say, scrolled, tick
+from daq_app.qt.parts import bare, button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET, Tokens
@@ -364,13 +364,11 @@ class NewSessionPage(QFrame):
         layout.addWidget(self.transducer)
         layout.addWidget(self.with_forces)
         layout.addWidget(self.scores_only)
-        of_height = QVBoxLayout(self._height)
-        of_height.setContentsMargins(0, 0, 0, 0)
+        of_height = bare(QVBoxLayout(self._height))
         field(of_height, tr("Height of the face above the transducer's origin [mm]"), self.height_above)
         field(of_height, tr("Axis along which pressing is positive"), self.normal)
         layout.addWidget(self._height)
-        of_area = QVBoxLayout(self._area)
-        of_area.setContentsMargins(0, 0, 0, 0)
+        of_area = bare(QVBoxLayout(self._area))
         field(of_area, tr("Contact area, for tau_max [mm²]"), self.area)
         layout.addWidget(self._area)
 

@@ -1,6 +1,7 @@
 """How labels, buttons and panels of the window are made, so that all of them look and are named alike."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
@@ -11,6 +12,7 @@ from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QLineEdit,
     QPlainTextEdit,
     QPushButton,
@@ -23,6 +25,8 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
+
+L = TypeVar("L", bound=QLayout)
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
@@ -153,6 +157,14 @@ def is_text_field(widget: QWidget | None) -> bool:
     if isinstance(widget, QComboBox):
         return widget.isEditable()
     return isinstance(widget, QLineEdit | QAbstractSpinBox | QTextEdit | QPlainTextEdit) and not widget.isReadOnly()
+
+
+def bare(layout: L, spacing: int | None = None) -> L:
+    """Return a layout without margins."""
+    layout.setContentsMargins(0, 0, 0, 0)
+    if spacing is not None:
+        layout.setSpacing(spacing)
+    return layout
 
 
 def scrolled(inside: QWidget) -> QScrollArea:

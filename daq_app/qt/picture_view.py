@@ -6,7 +6,7 @@ from PySide6.QtCore import QRectF
 from PySide6.QtGui import QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
-from daq_app.qt.parts import button
+from daq_app.qt.parts import bare, button
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr
 
@@ -21,9 +21,7 @@ class SaveButtons(QWidget):
         """Offer to save `what`; nothing is shown yet."""
         super().__init__()
         self._name, self._save = "", save
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QHBoxLayout(self), GRID // 2)
         layout.addStretch(1)
         self.buttons = [
             button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
@@ -55,8 +53,7 @@ class PictureView(QWidget):
         super().__init__()
         self._canvas = _Canvas()
         self.save = SaveButtons(what, save)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(self._canvas, 1)
         layout.addWidget(self.save)
 

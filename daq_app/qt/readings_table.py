@@ -7,7 +7,7 @@ from PySide6.QtGui import QFont, QShowEvent
 from PySide6.QtWidgets import QHeaderView, QTableView, QVBoxLayout, QWidget
 
 from daq_app.analyst.raw import RawReadings
-from daq_app.qt.parts import Wrapped
+from daq_app.qt.parts import Wrapped, bare
 from daq_app.qt.text_table import CopiedTable
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
@@ -35,8 +35,7 @@ class ReadingsTable(QWidget):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
         self.table.setModel(self._model)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(self.place)
         layout.addWidget(self.table, 1)
 

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QListWidget, QListWidgetItem, QVBoxLayout, QWidget
 
 from daq_app.qt.analyst_window import AnalystWindow
-from daq_app.qt.parts import button, label
+from daq_app.qt.parts import bare, button, label
 from daq_app.qt.remembered import recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.wording import tr
@@ -34,9 +34,7 @@ class ReviewRoom(QWidget):
         column.addWidget(label(tr("Recent sessions"), "section"))
         column.addWidget(self.recent, 1)
         column.addWidget(button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose))
-        self._row = QHBoxLayout(self)
-        self._row.setContentsMargins(0, 0, 0, 0)
-        self._row.setSpacing(GRID)
+        self._row = bare(QHBoxLayout(self), GRID)
         self._row.addWidget(side)
         self._row.addWidget(self._none, 1)
 

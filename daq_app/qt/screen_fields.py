@@ -7,7 +7,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.languages import missing_glyphs, name_of, translator
-from daq_app.qt.parts import button, choice, field
+from daq_app.qt.parts import bare, button, choice, field
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.thumbnail import Thumbnail
@@ -38,9 +38,7 @@ class ScreenFields(QWidget):
         self.camera.hide()
         self._new_code = button(tr("New code"), tr("let another tablet in, by a new code"), lambda: act("tablet"))
         self._new_code.hide()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(4)
+        layout = bare(QVBoxLayout(self), 4)
         field(layout, tr("Language that the subject reads"), self.language)
         for part in (self.thumbnail, self._ruler, self.camera, self._new_code):
             layout.addWidget(part)

@@ -8,7 +8,7 @@ from daq_app.analyst.messages import Edge
 from daq_app.analyst.shown import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.decisions_bar import DecisionsBar
-from daq_app.qt.parts import label
+from daq_app.qt.parts import bare, label
 from daq_app.qt.picture_view import SaveButtons
 from daq_app.qt.readings_table import ReadingsTable
 from daq_app.qt.stroke_view import StrokeView
@@ -54,9 +54,7 @@ class StrokeColumn(QWidget):
         self.friction.told.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addWidget(self.stroke, 4)
         bar = QHBoxLayout()
         bar.addWidget(self.player, 1)

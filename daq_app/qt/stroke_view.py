@@ -13,6 +13,7 @@ from daq_app.analyst.messages import EDGES, Edge
 from daq_app.analyst.probe import read_out
 from daq_app.analyst.raw import RawReadings
 from daq_app.qt.edge_handle import EdgeHandle
+from daq_app.qt.parts import bare
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
 from daq_app.qt.zoomed_plot import ZoomedPlot
@@ -36,9 +37,7 @@ class StrokeView(QWidget):
         self._time = np.empty(0)
         self._columns = [np.empty(0)] * 3
         self._raw: RawReadings | None = None
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         self._plots = [_plot(tokens, name) for name in (tr("N and T [N]"), "µ = T/N [-]")]
         for plot in self._plots:
             layout.addWidget(plot, 1)

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget,
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
 from daq_app.qt.languages import direction, translator
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import bare, button, label, say
 from daq_app.qt.press_bar import PressBar
 from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
@@ -65,8 +65,7 @@ class SubjectWindow(QWidget):
         self._pages.addWidget(self._message_page())
         self._pages.addWidget(self._scale_page())
         self._pages.addWidget(self.ruler)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(self._pages)
         for way in (self.line, self.number, self.choice):
             way.changed.connect(self._answer_changed)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import bare, button, label, say
 from daq_app.qt.tokens import GRID
 from daq_app.window.view_bench import BenchView, bench_summary
 from daq_app.wording import tr
@@ -22,9 +22,7 @@ class TransducerRow(QWidget):
         buttons = QHBoxLayout()
         buttons.addWidget(self.connect_button, 1)
         buttons.addWidget(self.zero, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID // 2)
+        layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addLayout(buttons)
         layout.addWidget(self.words)
 

@@ -9,7 +9,7 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSlider, QWidget
 
 from daq_app.analyst.transport import SPEEDS, Transport
-from daq_app.qt.parts import button, choice, label, say
+from daq_app.qt.parts import bare, button, choice, label, say
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
@@ -46,9 +46,7 @@ class TransportBar(QWidget):
         self.speed.activated.connect(self._at_speed)
         self.place = label("", "quiet")
         self.place.setVisible(tells_time)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(GRID)
+        layout = bare(QHBoxLayout(self), GRID)
         for part in (self.play, self.back, self.forward):
             layout.addWidget(part)
         layout.addWidget(self.slider, 1)

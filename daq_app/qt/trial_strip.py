@@ -5,7 +5,7 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QScrollArea, QWidget
 
-from daq_app.qt.parts import button, regrade
+from daq_app.qt.parts import bare, button, regrade
 from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.view_trials import MARKS, Tile
 from daq_app.wording import tr
@@ -26,9 +26,7 @@ class TrialStrip(QScrollArea):
         self.tiles: list[QPushButton] = []
         inside = QWidget()
         inside.setObjectName("inside")
-        self._row = QHBoxLayout(inside)
-        self._row.setContentsMargins(0, 0, 0, 0)
-        self._row.setSpacing(GRID // 2)
+        self._row = bare(QHBoxLayout(inside), GRID // 2)
         self._row.addStretch(1)
         self.setWidget(inside)
         self.setWidgetResizable(True)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
 from daq_app.analyst import messages as m
 from daq_app.analyst.shown import greatest_errors, marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
-from daq_app.qt.parts import Wrapped, choice, label
+from daq_app.qt.parts import Wrapped, bare, choice, label
 from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
@@ -40,8 +40,7 @@ class TrialsColumn(QWidget):
         self.responses.activated.connect(self._respond)
         self.errors = Wrapped("quiet")
         self.relation, self.points = self._relation()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = bare(QVBoxLayout(self))
         layout.addWidget(label(tr("Trials"), "section"))
         layout.addWidget(self.list, 3)
         layout.addWidget(label(tr("At the plan's depth, against the score"), "section"))
