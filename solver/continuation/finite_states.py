@@ -15,13 +15,13 @@ from solver.continuation.existence import APART, Reach, all_at_the_bound, of_dep
 from solver.equilibrium import full_slip as sliding
 from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import balanced, sliding_load
 from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton
-from solver.failures import NoSteadyState, NotConverged, SolveFailure, beyond_friction
+from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
 from solver.scene.scene import Scene
-from solver.tolerances import ALL_SLIPS, FORCE_MET
+from solver.tolerances import FORCE_MET
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +51,10 @@ def settled(
     Where it depends on its way, that has so many `times` the usual load steps, and a load state without sense. Raises
     NoSteadyState, NotConverged, Cancelled.
     """
-    if scene.normal_force is not None:
-        return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return march(scene, finger, times, stop=stop).last
+    if scene.normal_force is not None:
+        return _settled_under(finger, scene, scene.normal_force, stop, start, times)
     return steady(finger, sliding_load(scene), start=start, stop=stop)
 
 
@@ -109,33 +109,22 @@ def _settled_under(
     times: float,
 ) -> EquilibriumState:
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
-    direction, drag = scene.loading.direction, scene.tangential_force
-    if direction == 0 and scene.friction.mu > 0.0:
+
+    def hold() -> EquilibriumState:
         return march(scene, finger, times, stop=stop).last
+
     if start is not None and start.load.sense == 0:  # the end of a course, and no slide to start from
         start = None
-        try:
-            return march(scene, finger, times, stop=stop).last
-        except NotConverged:
-            pass
+        with suppress(NotConverged):
+            return hold()
     try:
-        slides = _sliding_under(finger, scene, force, stop, start)
-    except SolveFailure as failure:
-        if drag is None:
-            raise _under_force(scene, force, failure) from failure
-        return march(scene, finger, times, stop=stop).last  # the drag may be met before sliding would fold the skin
-    most = abs(float(slides.force[0]))
-    if drag is None or most * (1.0 - ALL_SLIPS) <= drag <= most * (1.0 + ALL_SLIPS):
-        return slides
-    if drag > most:
-        raise beyond_friction(drag, most, force)
-    return march(scene, finger, times, stop=stop).last
+        return slide_or_hold(scene, lambda: _sliding_under(finger, scene, force, stop, start), hold)
+    except NoSteadyState as failure:
+        raise failure if scene.loading.dragged else _under_force(scene, force, failure) from failure
 
 
-def _under_force(scene: Scene, force: float, failure: SolveFailure) -> SolveFailure:
+def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteadyState:
     """Return why there is no slide under a normal force, found by searching depths: no limit of friction is known."""
-    if not isinstance(failure, NoSteadyState):
-        return failure
     depth, most = failure.limit_indentation, failure.limit_normal_force
     far = [] if most is None else [f"{most:.3g} N/mm"]
     far += [] if depth is None else [f"{depth:.3g} mm of indentation"]

@@ -20,13 +20,12 @@ from solver.equilibrium.expected_depth import DEEPEST, within_reach
 from solver.equilibrium.finger import LinearFinger, settled_moduli
 from solver.equilibrium.full_slip import settled as full_slip
 from solver.equilibrium.full_slip import slide_beside, slide_under
-from solver.equilibrium.load_path import march
+from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.failures import ContactLost, NoSteadyState, NotConverged, beyond_friction
+from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene.scene import Scene
-from solver.tolerances import ALL_SLIPS
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
@@ -184,22 +183,10 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
         return march(scene, finger, times).last
     if loading.normal_force is None:
         return full_slip(newton, load)
-    deepest = DEEPEST * scene.finger.pulp_thickness()
-    try:
-        slide = slide_under(newton, load, loading.normal_force, deepest)
-    except ContactLost:
-        if loading.tangential_force is None:
-            raise
-        # the drag may be met where sliding would wedge
-        return march(scene, finger, times).last
-    if loading.tangential_force is None:
-        return slide
-    most = abs(float(slide.force[0]))
-    if loading.tangential_force > most * (1.0 + 1e-9):
-        raise beyond_friction(loading.tangential_force, most, loading.normal_force)
-    if loading.tangential_force >= most * (1.0 - ALL_SLIPS):
-        return slide
-    return march(scene, finger, times).last
+    force, deepest = loading.normal_force, DEEPEST * scene.finger.pulp_thickness()
+    return slide_or_hold(
+        scene, lambda: slide_under(newton, load, force, deepest), lambda: march(scene, finger, times).last
+    )
 
 
 def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:

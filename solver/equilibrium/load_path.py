@@ -16,11 +16,11 @@ from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxi
 from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of, never
 from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
-from solver.failures import NotConverged, followed_to
+from solver.failures import NotConverged, SolveFailure, beyond_friction, followed_to
 from solver.progress import report_progress
 from solver.scene.scene import Scene
 from solver.scene.tables import Loading
-from solver.tolerances import SED_STILL
+from solver.tolerances import ALL_SLIPS, SED_STILL
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
 DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
@@ -207,6 +207,29 @@ def end(
 ) -> EquilibriumState:
     """Return the end of the course of a scene, in so many `times` the usual load steps. Raises as `march`."""
     return march(scene, finger, times, relaxing=scene.viscoelastic, stop=stop).last
+
+
+def slide_or_hold(
+    scene: Scene, slide: Callable[[], EquilibriumState], hold: Callable[[], EquilibriumState]
+) -> EquilibriumState:
+    """Return the state under the normal force of a scene: the `slide`, or the `hold` of a drag that friction carries.
+
+    A drag may be met where sliding has no state. Raises NoSteadyState where it is more than friction carries, and as
+    `slide` and `hold` do.
+    """
+    force, drag = scene.normal_force, scene.tangential_force
+    try:
+        state = slide()
+    except SolveFailure:
+        if drag is None:
+            raise
+        return hold()
+    most = abs(float(state.force[0]))
+    if drag is None or abs(drag - most) <= ALL_SLIPS * most:
+        return state
+    if drag > most:
+        raise beyond_friction(drag, most, force or 0.0)
+    return hold()
 
 
 def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
