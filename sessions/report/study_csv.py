@@ -1,7 +1,7 @@
 """A study as CSV files that R's read.csv and pandas' read_csv open as they are: its trials, its many paths."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 
 from sessions.exchange.csv_text import write_rows
@@ -76,28 +76,24 @@ def _heading(name: str) -> str:
 
 def columns_csv(study: StudyFindings) -> str:
     """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
-    out = io.StringIO()
     first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
     rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
     rows += [[_heading(name), *meaning] for name, meaning in {**_MEANING, **_RESPONSES}.items()]
-    write_rows(out, [*rows, ["excluded", "", _OWN["excluded"]]])
-    return out.getvalue()
+    return _csv([*rows, ["excluded", "", _OWN["excluded"]]])
 
 
 def paths_csv(study: StudyFindings) -> str:
     """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
     mark = [SIMULATED] if study.simulated else []
     names = [field.name for field in fields(Path)]
-    out = io.StringIO()
     heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
     rows: list[list[object]] = [[*mark, "descriptor", *names, *heads]]
     for one in study.descriptors:
         for path in one.paths:
             numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
             cells = [*(["yes"] if mark else []), one.descriptor, *(getattr(path.path, name) for name in names)]
-            rows.append([*cells, "yes" if path.usual else "no", *(_plain(number) for number in numbers)])
-    write_rows(out, rows)
-    return out.getvalue()
+            rows.append([*cells, "yes" if path.usual else "no", *numbers])
+    return _csv(rows)
 
 
 def rivals_csv(study: StudyFindings) -> str:
@@ -109,17 +105,10 @@ def rivals_csv(study: StudyFindings) -> str:
     for one in study.descriptors:
         for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
             for rival in rivals:
-                contrast = rival.contrast
-                less = (
-                    [None] * 5
-                    if contrast is None
-                    else [contrast.difference, contrast.low, contrast.high, contrast.z, contrast.p]
-                )
+                less = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
                 numbers = [*(getattr(rival, name) for name in names), *less]
-                rows.append([*(["yes"] if mark else []), one.descriptor, kind, *(_plain(each) for each in numbers)])
-    out = io.StringIO()
-    write_rows(out, rows)
-    return out.getvalue()
+                rows.append([*(["yes"] if mark else []), one.descriptor, kind, *numbers])
+    return _csv(rows)
 
 
 def trials_csv(study: StudyFindings) -> str:
@@ -130,7 +119,6 @@ def trials_csv(study: StudyFindings) -> str:
     names = list(_MEANING)  # paths have a table of their own
     heads = [_heading(name) for name in (*names, *_RESPONSES)]
     mark = [SIMULATED] if study.simulated else []
-    out = io.StringIO()
     rows: list[list[object]] = [[*mark, "session", "subject", *heads, "excluded"]]
     copies = dict(study.copies)
     for visit in study.visits:
@@ -140,8 +128,13 @@ def trials_csv(study: StudyFindings) -> str:
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             cells = ["yes" if visit.simulated else "no"] if mark else []
             numbers = [*(getattr(row, name) for name in names), *map(row.responses.get, _RESPONSES)]
-            rows.append([*cells, visit.session, visit.subject, *map(_plain, numbers), why])
-    write_rows(out, rows)
+            rows.append([*cells, visit.session, visit.subject, *numbers, why])
+    return _csv(rows)
+
+
+def _csv(rows: Iterable[Iterable[object]]) -> str:
+    out = io.StringIO()
+    write_rows(out, [[_plain(value) for value in row] for row in rows])
     return out.getvalue()
 
 

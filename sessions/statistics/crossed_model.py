@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from scipy import linalg, optimize
 
-from sessions.statistics.reml import Array
+from sessions.statistics.reml import Array, fits_exactly
 
 _WIDEST = 1e3  # spread relative to what is left: scores have three figures, and a step of the search may not go beyond
 _TO_ROUND_OFF = 1e-9  # gradient of the deviance: an error of a spread enters the deviance squared
@@ -30,7 +30,7 @@ def crossed_deviance(
     groups = [np.unique(np.asarray(one), return_inverse=True)[1] for one in (subjects, surfaces)]
     levels = [np.eye(int(codes.max()) + 1)[codes] for codes in groups]
     random = np.hstack(levels)
-    if _exact(random, columns):
+    if fits_exactly(np.hstack([random, columns[:, 1:2]]), columns[:, 2]):
         return None
     whose = np.repeat([0, 1], [one.shape[1] for one in levels])
     inner, across, total = random.T @ random, random.T @ columns, columns.T @ columns
@@ -72,10 +72,3 @@ def akaike_weights(deviances: Sequence[float]) -> tuple[float, ...]:
     """
     shares = np.exp(-0.5 * (np.asarray(deviances, np.float64) - min(deviances)))
     return tuple((shares / shares.sum()).tolist())
-
-
-def _exact(random: Array, columns: Array) -> bool:
-    """Say whether levels and slope leave nothing of the scores but round-off."""
-    design, values = np.hstack([random, columns[:, 1:2]]), columns[:, 2]
-    left = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
-    return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(values).max()))

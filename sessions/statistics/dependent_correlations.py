@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sessions.statistics.scores import CONFIDENCE
+from sessions.statistics.scores import t_quantile
 
 POWER = 0.8  # with which a study should tell two correlations apart (Cohen 1988, p. 56)
 _PERFECT = 1.0 - 1e-12  # Fisher's z has no value at 1
@@ -53,7 +53,7 @@ def cases_needed(first: float, second: float, mutual: float) -> int | None:
     if error is None or abs(first - second) < 1e-9:
         return None
     step = math.atanh(first) - math.atanh(second)
-    return 3 + math.ceil(error * (float(ndtri((1 + CONFIDENCE) / 2) + ndtri(POWER)) / step) ** 2)
+    return 3 + math.ceil(error * ((t_quantile(math.inf) + float(ndtri(POWER))) / step) ** 2)
 
 
 def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | None:
@@ -66,9 +66,7 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
     z = steiger_z(first, second, mutual, n)
     if z is None:
         return None
-    from scipy.special import ndtri
-
-    half = float(ndtri((1 + CONFIDENCE) / 2)) / math.sqrt(n - 3)
+    half = t_quantile(math.inf) / math.sqrt(n - 3)
     (a, b), (c, d) = ((math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)) for r in (first, second))
     shared = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
     difference = first - second

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from sessions.statistics.reml import Array, Fit, restricted_fit
+from sessions.statistics.reml import Fit, fits_exactly, restricted_fit
+from sessions.statistics.scores import t_quantile
 from sessions.statistics.variance_components import Spreads, spreads
 
-CONFIDENCE = 0.95
 INTERCEPT = "intercept"
 
 
@@ -76,7 +76,8 @@ def mixed_model(
     if slopes_differ and varies < 2:
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
     own = 2 if slopes_differ else 1
-    if _exact(np.array(score, np.float64), columns / scale, subjects):
+    levels = np.array(subjects)[:, None] == np.unique(np.array(subjects))[None, :]
+    if fits_exactly(np.hstack([levels, columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
     fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
     spread = np.sqrt(np.diag(fit.among)) / scale[:own]
@@ -99,19 +100,11 @@ def mixed_model(
     )
 
 
-def _exact(score: Array, columns: Array, subjects: Sequence[str]) -> bool:
-    """Say whether levels of the subjects and common slopes leave nothing of the scores."""
-    whose = np.array(subjects)[:, None] == np.unique(np.array(subjects))[None, :]
-    design = np.hstack([whose.astype(np.float64), columns[:, 1:]])
-    left = score - design @ np.linalg.lstsq(design, score, rcond=None)[0]
-    return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(score).max()))
-
-
 def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:
     """Return a fixed effect with a t interval of `dof` degrees of freedom, Wald's where None."""
     size = abs(estimate / error)
     if dof is None:
-        half, p = float(special.ndtri((1 + CONFIDENCE) / 2)), math.erfc(size / math.sqrt(2.0))
+        half, p = t_quantile(math.inf), math.erfc(size / math.sqrt(2.0))
     else:
-        half, p = float(special.stdtrit(dof, (1 + CONFIDENCE) / 2)), 2.0 * float(special.stdtr(dof, -size))
+        half, p = t_quantile(dof), 2.0 * float(special.stdtr(dof, -size))
     return Term(name, estimate, estimate - half * error, estimate + half * error, p)

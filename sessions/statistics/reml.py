@@ -127,3 +127,9 @@ class _Sums:
             criterion=self.criterion(at)[0],
             singular=bool(np.abs(np.diag(factor)).min() < _SINGULAR),
         )
+
+
+def fits_exactly(design: Array, y: Array) -> bool:
+    """Say whether columns (n, k) leave nothing of y (n) but round-off."""
+    left = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    return float(np.abs(left).max()) <= 1e-9 * (1.0 + float(np.abs(y).max()))

@@ -187,6 +187,24 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
     return {subject: rows[subject] for subject in sorted(rows)}
 
 
+def t_quantile(dof: float) -> float:
+    """Return how many standard errors a 95 % t interval reaches to each side; of a normal law where `dof` is inf.
+
+    >>> round(t_quantile(9), 3), round(t_quantile(math.inf), 3)
+    (2.262, 1.96)
+    """
+    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
+
+    return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
+
+
+def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
+    """Return the standard deviation of two values or more, and the ends of the 95 % t interval of their mean."""
+    n, mean, sd = len(values), float(np.mean(values)), float(np.std(values, ddof=1))
+    half = t_quantile(n - 1) * sd / math.sqrt(n)
+    return sd, mean - half, mean + half
+
+
 def sd_interval(sd: float, n: int) -> tuple[float, float]:
     """Return the 95 % interval of the standard deviation of n normal values, by chi squared.
 
@@ -208,9 +226,7 @@ def slope_interval(related: Relation) -> tuple[float, float] | None:
     r, slope, n = related.pearson, related.slope, related.n
     if r is None or slope is None or not r or n < 3 or abs(r) > 1 - 1e-12:
         return None
-    from scipy.special import stdtrit
-
-    half = float(stdtrit(n - 2, (1 + CONFIDENCE) / 2)) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
+    half = t_quantile(n - 2) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
     return slope - half, slope + half
 
 
@@ -218,11 +234,7 @@ def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
-    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
-
-    sd = float(np.std(values, ddof=1))
-    half = float(stdtrit(n - 1, (1 + CONFIDENCE) / 2)) * sd / math.sqrt(n)
-    low, high = mean - half, mean + half
+    sd, low, high = mean_interval(values)
     bootstrap = _bootstrap(values) if low < SCALE[0] or high > SCALE[1] else None
     return MeanScore(descriptor, index, n, mean, sd, low, high, bootstrap, None)
 
@@ -262,9 +274,7 @@ def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | No
     """
     if n < 4 or abs(r) > 1 - 1e-12:
         return None, None
-    from scipy.special import ndtri
-
-    half = float(ndtri((1 + CONFIDENCE) / 2)) * math.sqrt(inflated / (n - 3))
+    half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-CONFIDENCE = 0.95
+from sessions.statistics.scores import CONFIDENCE, sd_interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,8 @@ def spreads(
 
 def _of_square(square: float, dof: int) -> Spread:
     """Return the standard deviation whose square is estimated by `square` with `dof` degrees of freedom."""
-    tail = (1 - CONFIDENCE) / 2
-    low, high = (math.sqrt(square * dof / float(special.chdtri(dof, q))) for q in (tail, 1 - tail))
-    return Spread(math.sqrt(square), low, high)
+    sd = math.sqrt(square)
+    return Spread(sd, *sd_interval(sd, dof + 1))
 
 
 def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread:

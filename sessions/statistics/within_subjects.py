@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-CONFIDENCE = 0.95
+from sessions.statistics.scores import CONFIDENCE, t_quantile
 
 Array = NDArray[np.float64]
 Table = Mapping[str, Mapping[int, float]]  # subject -> stimulus' index -> score, as `scores.score_matrix` gives it
@@ -70,7 +70,7 @@ def within_means(table: Table) -> tuple[WithinMean, ...]:
         return ()
     levelled = scores - scores.mean(axis=1, keepdims=True) + scores.mean()
     deviation = levelled.std(axis=0, ddof=1) * math.sqrt(c / (c - 1))
-    half = float(special.stdtrit(len(subjects) - 1, (1 + CONFIDENCE) / 2)) * deviation / math.sqrt(n)
+    half = t_quantile(n - 1) * deviation / math.sqrt(n)
     means = scores.mean(axis=0)
     return tuple(
         WithinMean(index, len(subjects), float(mean), float(mean - h), float(mean + h))
@@ -102,16 +102,15 @@ def repeated_correlation(subjects: Sequence[str], x: Sequence[float], y: Sequenc
     if 1.0 - abs(r) < 1e-12:
         return RepeatedCorrelation(r, r, r, 0.0, dof, k, (r, r), 0.0)
     t = r * math.sqrt(dof / (1.0 - r * r))
-    half = float(special.ndtri((1 + CONFIDENCE) / 2)) / math.sqrt(dof - 1)
-    z = math.atanh(r)
     p = 2.0 * float(special.stdtr(dof, -abs(t)))
     xy, xx, yy = (np.bincount(codes, of).astype(np.float64)[several] for of in (left_x * left_y, left_x**2, left_y**2))
-    low, high, people_p = _jackknifed(xy, xx, yy) or (None, None, None)
-    people = None if low is None or high is None else (low, high)
-    return RepeatedCorrelation(r, math.tanh(z - half), math.tanh(z + half), p, dof, k, people, people_p)
+    people, people_p = _jackknifed(xy, xx, yy) or (None, None)
+    half = t_quantile(math.inf) / math.sqrt(dof - 1)
+    low, high = (math.tanh(math.atanh(r) + step) for step in (-half, half))
+    return RepeatedCorrelation(r, low, high, p, dof, k, people, people_p)
 
 
-def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float, float] | None:
+def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[tuple[float, float], float] | None:
     """Return the jackknife's interval of r, and its p, from each subject's sums (k).
 
     None of two subjects, or where r is ±1 without one of them.
@@ -123,9 +122,9 @@ def _jackknifed(xy: Array, xx: Array, yy: Array) -> tuple[float, float, float] |
     z = math.atanh(float(xy.sum()) / math.sqrt(float(xx.sum()) * float(yy.sum())))
     pseudo = k * z - (k - 1) * np.arctanh(others_xy / size)
     mean, error = float(pseudo.mean()), float(pseudo.std(ddof=1)) / math.sqrt(k)
-    half = float(special.stdtrit(k - 1, (1 + CONFIDENCE) / 2)) * error
+    half = t_quantile(k - 1) * error
     p = 2.0 * float(special.stdtr(k - 1, -abs(mean) / error)) if error > 0.0 else 0.0
-    return math.tanh(mean - half), math.tanh(mean + half), p
+    return (math.tanh(mean - half), math.tanh(mean + half)), p
 
 
 def agreement(table: Table) -> Agreement | None:

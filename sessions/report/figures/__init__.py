@@ -56,35 +56,31 @@ def _scores(report: Report) -> Plate:
     return Plate("scores", caption, panels)
 
 
-def _friction(report: Report) -> Plate:
-    caption = (
+_CAPTIONS = {
+    "friction": (
         "Ratio of tangential to normal force from contact onset on. Thick: the steady window, over which the dynamic "
         "coefficient is averaged. Dashed: a stroke of which no coefficient is given, the tables say why. The ratio is "
         "left out where the normal force is too small to divide by."
-    )
-    return Plate("friction", caption, _of_strokes(report, MU))
-
-
-def _speed(report: Report) -> Plate:
-    caption = (
+    ),
+    "speed": (
         "Speed of the centre of pressure along the stroke from contact onset on. Thick: the steady window. It moves "
         "by rolling and by skin shear as well as by sliding, most of all at onset; the tables give its mean slope "
         "over the steady window. Strokes whose speed was refused are left out."
-    )
-    return Plate("speed", caption, _of_strokes(report, SPEED))
-
-
-def _forces(report: Report) -> Plate:
-    caption = (
+    ),
+    "forces": (
         "Normal force N and tangential force T of the strokes of each series, laid over each other from contact onset "
         "on, zero taken off and filtered as for the analysis. Thick: the steady window. Dashed: a stroke without a "
         "steady window."
-    )
-    return Plate("forces", caption, _of_strokes(report, NORMAL, TANGENTIAL))
+    ),
+}
 
 
-def _of_strokes(report: Report, *quantities: StrokeQuantity) -> tuple[Panel, ...]:
-    """Return a panel for each quantity of the strokes of each experiment of which something can be drawn."""
+def _of_strokes(name: str, *quantities: StrokeQuantity) -> Callable[[Report], Plate]:
+    """Return what draws the plate of that name: a panel for each quantity of the strokes of each experiment."""
+    return lambda report: Plate(name, _CAPTIONS[name], _stroke_panels(report, quantities))
+
+
+def _stroke_panels(report: Report, quantities: Sequence[StrokeQuantity]) -> tuple[Panel, ...]:
     panels = [
         stroke_panel(one, strokes, experiment, simulated=report.simulated)
         for experiment, strokes in _grouped(report)
@@ -151,9 +147,9 @@ def _grouped(report: Report) -> list[tuple[str, Sequence[StrokeFinding]]]:
 _PLATES: Mapping[str, Callable[[Report], Plate]] = {
     "course": _course,
     "scores": _scores,
-    "friction": _friction,
-    "speed": _speed,
-    "forces": _forces,
+    "friction": _of_strokes("friction", MU),
+    "speed": _of_strokes("speed", SPEED),
+    "forces": _of_strokes("forces", NORMAL, TANGENTIAL),
     "finger": _fingers,
     "response": _responses,
     "relation": _relations,

@@ -18,8 +18,8 @@ from sessions.report.wording import NONE, correlation, digits, p_value, places, 
 from sessions.statistics.pooling.averages import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.visit import Visit
-from sessions.statistics.scores import Relation
-from sessions.statistics.within_subjects import RepeatedCorrelation
+from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
 
 
 def study_tables(study: StudyFindings) -> dict[str, tuple[Table, ...]]:
@@ -118,16 +118,7 @@ def _normalised(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
-            score = raw[index]
-            yield (
-                Cell(str(index)),
-                Cell(str(score.n)),
-                Cell(digits(score.mean, 1)),
-                range_cell(score.low, score.high, places(1)),
-                Cell(str(mean.n)),
-                Cell(digits(mean.mean, 2)),
-                range_cell(mean.low, mean.high, places(2)),
-            )
+            yield (Cell(str(index)), *_with_interval(raw[index], 1), *_with_interval(mean, 2))
 
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
@@ -143,14 +134,8 @@ def _normalised(study: StudyFindings) -> Table | None:
 def _differences(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         for pair in one.differences:
-            yield (
-                Cell(f"{pair.high_index} − {pair.low_index}"),
-                Cell(str(pair.n)),
-                Cell(digits(pair.mean, 1)),
-                range_cell(pair.low, pair.high, places(1)),
-                Cell(p_value(pair.p)),
-                Cell(p_value(pair.p_holm)),
-            )
+            name = Cell(f"{pair.high_index} − {pair.low_index}")
+            yield (name, *_with_interval(pair, 1), Cell(p_value(pair.p)), Cell(p_value(pair.p_holm)))
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
     caption = (
@@ -258,6 +243,12 @@ def _forces(study: StudyFindings) -> Table | None:
     return table(
         "table-forces", caption, columns, [Group(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
     )
+
+
+def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row:
+    """Return how many subjects a mean is over, the mean, and its interval."""
+    ends = range_cell(mean.low, mean.high, places(decimals))
+    return Cell(str(mean.n)), Cell(digits(mean.mean, decimals)), ends
 
 
 def _scaled(mean: Average, by: float) -> Average:

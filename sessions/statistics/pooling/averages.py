@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from sessions.statistics.pooling.visit import TrialRow, Visit
-from sessions.statistics.scores import CONFIDENCE
+from sessions.statistics.scores import mean_interval
 from sessions.statistics.within_subjects import RepeatedCorrelation, equal_moduli, repeated_correlation
 
 
@@ -41,9 +40,7 @@ def average(values: Sequence[float]) -> Average | None:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
         return Average(n, mean, None, None, None)
-    sd = float(np.std(values, ddof=1))
-    half = float(special.stdtrit(n - 1, (1 + CONFIDENCE) / 2)) * sd / math.sqrt(n)
-    return Average(n, mean, sd, mean - half, mean + half)
+    return Average(n, mean, *mean_interval(values))
 
 
 def averages(table: Mapping[str, Mapping[int, float]]) -> dict[int, Average]:
