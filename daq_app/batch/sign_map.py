@@ -236,14 +236,13 @@ def share(kept: Array) -> tuple[float, float, float] | None:
     >>> [round(number, 3) for number in share(np.array([1.0] * 4 + [0.0] * 9)) or ()]
     [0.308, 0.127, 0.576]
     """
+    from scipy import stats  # slow to load
+
     known = kept[np.isfinite(kept)]
-    of = len(known)
-    if not of:
+    if not len(known):
         return None
-    z, part = 1.959963984540054, float(known.mean())
-    middle = (part + z * z / (2 * of)) / (1 + z * z / of)
-    half = z / (1 + z * z / of) * math.sqrt(part * (1 - part) / of + z * z / (4 * of * of))
-    return part, max(middle - half, 0.0), min(middle + half, 1.0)
+    ends = stats.binomtest(int(known.sum()), len(known)).proportion_ci(method="wilson")
+    return float(known.mean()), float(ends.low), float(ends.high)
 
 
 def shares_by_thirds(kept: Array, values: Array) -> list[tuple[float, float, float | None]]:
@@ -267,14 +266,9 @@ def slope_indices(
     A block of the design with a finger without an answer is left out whole.
     """
     block = len(DESIGN) + 2
-    values = np.array(
-        [np.nan if isinstance(one, str) else _number(one[series][1][0][quantity]) for one in answers]
-    ).reshape(-1, block)
+    changes = [None if isinstance(one, str) else one[series][1][0][quantity] for one in answers]
+    values = np.array(changes, np.float64).reshape(-1, block)  # nan for None
     whole = values[np.isfinite(values).all(axis=1)]
     if len(whole) < 2:
         return (), 0
     return sobol_indices(DESIGN, whole.ravel(), seed, lambda _: False), whole.size
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
