@@ -9,7 +9,7 @@ from typing import Any
 from daq_app.console import Console, WrongValue
 from sessions.plan.plan import SessionPlan
 from sessions.plan.study_file import is_study
-from sessions.prediction import PredictionOptions, Progress, SessionPrediction, predict
+from sessions.prediction import PredictionOptions, Progress, SessionPrediction, part_of, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.stored import check_prediction, with_present_names
@@ -199,8 +199,8 @@ def _predict(
     intervals = options is not None and options.intervals
     parts = 1 + intervals + (options is not None and options.variants != "none")
 
-    def part(number: int) -> Progress:
-        return lambda done: progress((number + done) / parts)
+    def part(number: int) -> Progress | None:
+        return part_of(progress, number / parts, (number + 1) / parts)
 
     prediction = predict(analysis, plan, options, part(0))
     if intervals:

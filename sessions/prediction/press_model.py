@@ -4,7 +4,7 @@ At small strain N is linear in all stiffnesses together, so only two contrasts b
 the depth. Over them log N is a polynomial through solved forces and their exact derivatives by each stiffness.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from sessions.prediction.solving import settled
-from solver import Cancelled, Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
+from solver import Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
+from solver.progress import Progress, report_part
 from solver.response.nearby import stiffness_shares
 
 Array = NDArray[np.float64]
-Progress = Callable[[float], bool]
 
 LAYERS = ("epidermis", "dermis", "fat")  # the bone is rigid
 # Orthonormal contrasts of three log stiffnesses: skin's two layers, and both against the fat.
@@ -112,7 +112,7 @@ def press_model(
     wide = np.zeros(DEPTHS)
     blank = PressModel(scene, spread, depth, np.empty((0, 0)), np.empty((0, 0)), mu, 0.0, np.zeros(DEPTHS))
     for at, finger in enumerate(blank.fingers(contrast)):
-        _report(progress, at / count)
+        report_part(progress, at / count)
         presses = _pressed(finger, depth, 0.0)
         force[at] = np.log([one.normal_force for one in presses])
         shares = stiffness_shares(presses)[:, : len(LAYERS)]
@@ -127,7 +127,7 @@ def press_model(
     if mu:
         more = np.empty((len(sticking), DEPTHS))
         for at, finger in enumerate(blank.fingers(sticking)):
-            _report(progress, (len(contrast) + at) / count)
+            report_part(progress, (len(contrast) + at) / count)
             more[at] = np.log([one.normal_force for one in _pressed(finger, depth, mu)])
         more -= _basis(sticking, DEGREE)[0] @ coefficients
         basis = _basis(sticking, DEGREE_OF_FRICTION)[0]
@@ -195,11 +195,6 @@ def _pressed(finger: Scene, depth: Array, mu: float) -> Sequence[Prediction]:
             "the finger's own dimensions with --finger."
         )
     return states
-
-
-def _report(progress: Progress | None, part: float) -> None:
-    if progress is not None and not progress(part):
-        raise Cancelled
 
 
 def _design(rings: Sequence[int]) -> Array:

@@ -14,6 +14,7 @@ from sessions.prediction import (
     SessionPrediction,
     TrialPrediction,
     doubt_of,
+    part_of,
     scene_along,
     solved,
     tau_scale,
@@ -29,7 +30,7 @@ from sessions.strokes import Analysis
 def with_alternatives(
     prediction: SessionPrediction, progress: Progress | None = None, analysis: Analysis | None = None
 ) -> SessionPrediction:
-    """Return a prediction with every trial predicted in the variants that its options ask for (`beside`) as well.
+    """Return a prediction with every trial predicted in the variants that its options ask for (`variants`) as well.
 
     Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
     for `variant_intervals`; `analysis` is what the friction came from.
@@ -41,9 +42,10 @@ def with_alternatives(
     def drawn_of(variant: Variant) -> Sequence[Drawn] | None:
         return drawn if variant.kinematics == "small" or options.variant_intervals else None
 
+    count = len(kinds)
     along = [
-        _along(prediction, variant, drawn_of(variant), _part(progress, number / len(kinds), (number + 1) / len(kinds)))
-        for number, variant in enumerate(kinds)
+        _along(prediction, variant, drawn_of(variant), part_of(progress, n / count, (n + 1) / count))
+        for n, variant in enumerate(kinds)
     ]
     trials = tuple(
         _with_depth(replace(row, alternatives=tuple(one[number] for one in along)), options)
@@ -77,7 +79,7 @@ def _along(
     """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
     rows, options = prediction.trials, prediction.options
     known = _known(prediction, variant)
-    answers = known or _solved(prediction, variant, _part(progress, 0.0, 0.8))
+    answers = known or _solved(prediction, variant, part_of(progress, 0.0, 0.8))
     out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
     if drawn is not None:
         before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
@@ -85,7 +87,7 @@ def _along(
             intervals: Sequence[SedInterval | None] = before
         else:
             scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
-            intervals = intervals_of([one for _, one in answers], drawn, scale, _part(progress, 0.8, 1.0))
+            intervals = intervals_of([one for _, one in answers], drawn, scale, part_of(progress, 0.8, 1.0))
         out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
     return tuple(out)
 
@@ -139,7 +141,3 @@ def _alternative(
 def _none(row: TrialPrediction, variant: Variant, reason: str) -> Alternative:
     depth = None if variant.driven == "force" else row.indentation
     return Alternative(variant, None, depth, None, None, None, None, reason)
-
-
-def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
-    return None if progress is None else lambda done: progress(low + (high - low) * done)

@@ -1,15 +1,19 @@
 """Settled SEDs of scenes, and those beside a prediction: what intervals, variants and many paths ask of the solver."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from sessions.prediction.options import PredictionOptions, bound, template
 from sessions.prediction.scenes import SLIDES
-from solver import Cancelled, Friction, Loading, Prediction, Scene, Solve, SolveFailure, solve_many
+from solver import Friction, Loading, Prediction, Scene, Solve, SolveFailure, solve_many
 from solver.accuracy.audits import inside_out
+from solver.progress import Progress, report_part
 from solver.response.nearby import By, Nearby, nearby
 
-Progress = Callable[[float], bool]
+
+def part_of(progress: Progress | None, low: float, high: float) -> Progress | None:
+    """Return what reports the part done of a piece of work that reaches from `low` to `high` of the whole."""
+    return None if progress is None else lambda done: progress(low + (high - low) * done)
 
 
 def settled(scenes: Sequence[Scene], progress: Progress | None = None) -> tuple[Prediction | None, ...]:
@@ -58,8 +62,7 @@ def slides(predictions: Sequence[Prediction], progress: Progress | None = None) 
     None where there is none that does not depend on the way to it. Raises Cancelled.
     """
     for number, slide in enumerate(nearby(predictions)):
-        if progress is not None and not progress(number / len(predictions)):
-            raise Cancelled
+        report_part(progress, number / len(predictions))
         yield slide
 
 

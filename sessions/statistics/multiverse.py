@@ -24,6 +24,7 @@ from sessions.prediction import (
     Quantity,
     Scene,
     SessionPrediction,
+    part_of,
     scenes_of,
     settled,
     slides,
@@ -186,14 +187,14 @@ def _solved(
     first = {kind: group[0] for kind, group in alike.items()}
     solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
     new = [kind for kind in first if kind not in solved]
-    answers = settled([first[kind] for kind in new], _part(progress, 0.0, 0.5))
+    answers = settled([first[kind] for kind in new], part_of(progress, 0.0, 0.5))
     solved |= {kind: answer for kind, answer in zip(new, answers, strict=True) if answer is not None}
     pairs: dict[Scene, Pair | None] = {}
-    for kind, slide in zip(solved, slides(list(solved.values()), _part(progress, 0.5, 0.7)), strict=True):
+    for kind, slide in zip(solved, slides(list(solved.values()), part_of(progress, 0.5, 0.7)), strict=True):
         pairs |= _near(slide, alike[kind], quantity)
     rest = [scene for scene in scenes if scene not in pairs]
-    answers = [answer for answer in settled(rest, _part(progress, 0.7, 0.9)) if answer is not None]
-    for answer, slide in zip(answers, slides(answers, _part(progress, 0.9, 1.0)), strict=True):
+    answers = [answer for answer in settled(rest, part_of(progress, 0.7, 0.9)) if answer is not None]
+    for answer, slide in zip(answers, slides(answers, part_of(progress, 0.9, 1.0)), strict=True):
         pairs |= _near(slide, [answer.scene], quantity)
     return pairs
 
@@ -213,10 +214,6 @@ def _kind(scene: Scene) -> Scene:
 
 def _friction(scene: Scene) -> tuple[float, float]:
     return scene.friction.mu, np.inf if scene.friction.tau_max is None else scene.friction.tau_max
-
-
-def _part(progress: Progress | None, low: float, high: float) -> Progress | None:
-    return None if progress is None else lambda done: progress(low + (high - low) * done)
 
 
 @dataclass(frozen=True, slots=True)
