@@ -254,37 +254,26 @@ def _principal(stress: Stress) -> tuple[Array, Array]:
     return np.maximum(middle + radius, zz), np.minimum(middle - radius, zz)
 
 
-PRESSURE = Quantity(
-    "pressure",
-    "pressure",
-    "MPa",
-    "mean of the three normal stresses, compression positive",
-    lambda at: _pressure(_small_stress(at)),
-    lambda at: _pressure(_finite_stress(at)),
-)
-VON_MISES = Quantity(
-    "von_mises",
-    "von Mises stress",
-    "MPa",
-    "von Mises stress",
-    lambda at: _von_mises(_small_stress(at)),
-    lambda at: _von_mises(_finite_stress(at)),
-)
-GREATEST_STRESS = Quantity(
+def _of_stress(name: str, label: str, meaning: str, invariant: Callable[[Stress], Array]) -> Quantity:
+    """Return the quantity that is an invariant of the stress [MPa]."""
+    return Quantity(
+        name, label, "MPa", meaning, lambda at: invariant(_small_stress(at)), lambda at: invariant(_finite_stress(at))
+    )
+
+
+PRESSURE = _of_stress("pressure", "pressure", "mean of the three normal stresses, compression positive", _pressure)
+VON_MISES = _of_stress("von_mises", "von Mises stress", "von Mises stress", _von_mises)
+GREATEST_STRESS = _of_stress(
     "principal_stress_greatest",
     "greatest principal stress",
-    "MPa",
     "greatest of the three principal stresses, tension positive",
-    lambda at: _principal(_small_stress(at))[0],
-    lambda at: _principal(_finite_stress(at))[0],
+    lambda stress: _principal(stress)[0],
 )
-LEAST_STRESS = Quantity(
+LEAST_STRESS = _of_stress(
     "principal_stress_least",
     "least principal stress",
-    "MPa",
     "least of the three principal stresses, tension positive",
-    lambda at: _principal(_small_stress(at))[1],
-    lambda at: _principal(_finite_stress(at))[1],
+    lambda stress: _principal(stress)[1],
 )
 
 QUANTITIES = (
