@@ -182,20 +182,16 @@ def test_a_frozen_stretch_is_left_out_and_named():
     assert found.strokes[0].mu_dynamic == pytest.approx(0.5, rel=0.01)
 
 
-def test_a_sensor_frozen_most_of_the_time_is_refused():
+@pytest.mark.parametrize(
+    ("part", "value", "flaw"),
+    [(np.s_[200:], felt(PLAIN)[199], "frozen_sensor"), (np.s_[:, 0], 0.0, "dead_sensor")],
+)
+def test_a_sensor_frozen_most_of_the_time_or_with_a_dead_force_axis_is_refused(part, value, flaw):
     raw = felt(PLAIN)
-    raw[200:] = raw[199]
+    raw[part] = value
     found = analysed(block(T, raw))
     assert found.strokes == ()
-    assert names(found, "refused") == {"frozen_sensor"}
-
-
-def test_a_dead_force_axis_is_refused():
-    raw = felt(PLAIN)
-    raw[:, 0] = 0.0
-    found = analysed(block(T, raw))
-    assert found.strokes == ()
-    assert names(found, "refused") == {"dead_sensor"}
+    assert names(found, "refused") == {flaw}
 
 
 def test_a_dead_torque_axis_gives_no_speed_and_hence_no_proof_of_sliding():

@@ -100,11 +100,7 @@ def test_an_unknown_protocol_is_refused_with_the_names_of_those_there_are():
         ("indices = [0, 20, 55, 75, 100]", "indices = [0, 0]", r"blocks\[1\].indices = \[0, 0\] .*twice"),
         ("indices = [0, 20, 55, 75, 100]", "indices = [0, 101]", r"blocks\[1\].indices .*between 0 and 100"),
         ("indices = [0, 20, 55, 75, 100]", "indices = [0, 2.5]", r"blocks\[1\].indices\[1\] = 2.5 .*a whole number"),
-        (
-            'direction = "distal to proximal"',
-            'direction = "down"',
-            r'blocks\[1\].direction = "down" .*"proximal to dist',
-        ),
+        ('direction = "distal to proximal"', 'direction = "down"', r'blocks\[1\].direction = "down" .*"proximal to d'),
         ('rule = "shuffled"', 'rule = "random"', r'line 12: order.rule = "random" .*"shuffled" or "williams"'),
         ("contact_angle = 45.0", "contact_angle = 5", r"line 7: contact_angle = 5.0 .*between 10 and 90 degrees"),
         ('name = "slipperiness"', 'name = "stickiness"', r"blocks\[1\].name .*same name"),
