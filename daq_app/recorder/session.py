@@ -28,15 +28,7 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.provenance import software_versions, without_home
 from sessions.recording.storage_safety import unsafe
 from sessions.recording.wal_checkpoint import fold_log
-from sessions.run.resuming import (
-    RESUMABLE,
-    ContinuedClock,
-    check_resumable,
-    check_same_transducer,
-    continued,
-    resumed_data,
-    resumption,
-)
+from sessions.run import resuming
 from sessions.run.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
 from sessions.run.steps import Command, Event
 
@@ -94,14 +86,14 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
     fold_log(Recording.open(folder))  # fails while another recorder writes: its transducer is left alone then
     recording = Recording.open(folder)
-    check_resumable(recording)
+    resuming.check_resumable(recording)
     _folder_settings(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))
     check_room(folder, need(recording.plan, None if recording.info is None else recording.info.rate))
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
-    at, last = resumption(recording.plan, recording.events), recording.last_block()
-    going_on, gap = continued(recording, last, clock, datetime.now(UTC))
+    at, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
+    going_on, gap = resuming.continued(recording, last, clock, datetime.now(UTC))
     people = recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, planted=people.planted)
@@ -110,7 +102,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     if simulated_sentence(info, people.kind != "people") != recording.simulated_sentence:
         raise NotNow("what was simulated at the beginning must be simulated again, and nothing else")
     writer = SessionWriter.open(folder, going_on, reserve=RESERVE)
-    resumed = Resumed(at, resumed_data(gap, info, software_versions()), last)
+    resumed = Resumed(at, resuming.resumed_data(gap, info, software_versions()), last)
     return Prepared(
         recording.plan, writer, going_on, people, info, going_on.offset_ns, resumed, tuple(recording.events)
     )
@@ -138,7 +130,7 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
             stop=operator.stop,
             progress=operator.progress,
         )
-    resumable = end.cause in RESUMABLE
+    resumable = end.cause in resuming.RESUMABLE
     send(m.SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
     if end.cause == "device":
         bench.lost(end.reason)
@@ -295,7 +287,7 @@ def _folder_settings(folder: Path, *, any_folder: bool) -> list[Setting]:
 
 
 def _reopen(
-    request: m.ResumeSession, recording: Recording, bench: Bench, clock: ContinuedClock
+    request: m.ResumeSession, recording: Recording, bench: Bench, clock: resuming.ContinuedClock
 ) -> TransducerInfo | None:
     """Open the transducer of the session anew, and return who it is; None for a visit that only scores."""
     if recording.info is None:
@@ -304,7 +296,7 @@ def _reopen(
         return None
     bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock, streaming=False)
     info = _transducer_info(bench)
-    check_same_transducer(recording.info, info)
+    resuming.check_same_transducer(recording.info, info)
     return info
 
 

@@ -22,20 +22,8 @@ from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import RecordingError, Setting
 from sessions.recording.schema import LIVE_FILE
+from sessions.run import steps
 from sessions.run.runner import RunnerSettings
-from sessions.run.steps import (
-    Abort,
-    AskBegin,
-    AskFinish,
-    AskMount,
-    AskScore,
-    AskStroke,
-    Begin,
-    Command,
-    Finish,
-    Scored,
-    StimulusMounted,
-)
 from sessions.statistics.pooling.exclusions import EXCLUSIONS
 from sessions.statistics.pooling.ground_truth import Spoilt
 from simulators.bench import Bench, BenchSettings, PlantedStroke
@@ -175,24 +163,24 @@ class SyntheticPeople(DueEvents):
         self._plan, self._spoilt = planned, spoilt
         self.stroked: list[Trial] = []
 
-    def show(self, command: Command) -> None:
+    def show(self, command: steps.Command) -> None:
         """Do what the command asks for."""
         match command:
-            case AskBegin():
-                self.put(Begin())
-            case AskMount(trial) if trial.number == self._spoilt.aborted:
-                self.put(Abort("the subject had to leave"))
-            case AskMount(trial):
+            case steps.AskBegin():
+                self.put(steps.Begin())
+            case steps.AskMount(trial) if trial.number == self._spoilt.aborted:
+                self.put(steps.Abort("the subject had to leave"))
+            case steps.AskMount(trial):
                 self._bench.mount(self._perceived(trial))
-                self.put(StimulusMounted(trial.stimulus.code))
-            case AskStroke(trial):
+                self.put(steps.StimulusMounted(trial.stimulus.code))
+            case steps.AskStroke(trial):
                 stroke = self._subject.stroke(self._perceived(trial))
                 self._bench.begin_stroke(stroke, self._transducer.now())
                 self.stroked.append(trial)
-            case AskScore(trial):
+            case steps.AskScore(trial):
                 self.put(self._scored(trial), JUDGING)
-            case AskFinish():
-                self.put(Finish())
+            case steps.AskFinish():
+                self.put(steps.Finish())
             case _:
                 pass
 
@@ -213,10 +201,10 @@ class SyntheticPeople(DueEvents):
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
-    def _scored(self, trial: Trial) -> Scored:
+    def _scored(self, trial: Trial) -> steps.Scored:
         _, place, before = self._order(trial)
         at = self.clock.now_ns() * 1e-9 + JUDGING
         if trial.number == self._spoilt.unanswered:
-            return Scored(None, (), None, 0, None, "simulated")
+            return steps.Scored(None, (), None, 0, None, "simulated")
         score = self._subject.score(self._subject.perceived(planted_surface(trial)), 1, place, before)
-        return Scored(score, ((at, score),), at, 0, None, "simulated")
+        return steps.Scored(score, ((at, score),), at, 0, None, "simulated")

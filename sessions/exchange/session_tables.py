@@ -30,18 +30,13 @@ from sessions.strokes.bootstrap import NUMBERS
 Cell = str | int | float | None
 
 _NESTED = ("solver", "alternatives", "interval", "opposite_interval")
-_PAIRS = {
-    "steady": ("start", "stop"),
-    "mu_interval": ("low", "high"),
-    "tau_max_interval": ("low", "high"),
-    "sed_interval": ("low", "high"),
-    "opposite_sed_interval": ("low", "high"),
-    "normal_force_interval": ("low", "high"),
-    "tangential_force_interval": ("low", "high"),
-    "indentation_interval": ("low", "high"),
-    "matching_depth_interval": ("low", "high"),
-    "mu_dynamic_interval": ("low", "high"),
-} | {f"{name}_bootstrap": ("low", "high") for name in NUMBERS}
+_OF_INTERVALS = (
+    *("mu", "tau_max", "sed", "opposite_sed", "normal_force", "tangential_force", "indentation", "matching_depth"),
+    "mu_dynamic",
+)
+_PAIRS = {"steady": ("start", "stop")} | dict.fromkeys(
+    (*(f"{name}_interval" for name in _OF_INTERVALS), *(f"{name}_bootstrap" for name in NUMBERS)), ("low", "high")
+)
 
 EACH_EVENT = "a row for each thing that happened, in order"
 

@@ -21,21 +21,11 @@ from sessions.file_access import DATABASE_FAILURES, bounded, remedy
 from sessions.json_document import converted, json_value
 from sessions.plan.adaptive import with_mounted
 from sessions.plan.plan import SessionPlan
+from sessions.recording import schema
 from sessions.recording.errors import RecordingError
 from sessions.recording.event_shapes import event_data
 from sessions.recording.head import check_provenance, info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent, TrialRecord, trial_records
-from sessions.recording.schema import (
-    BYTES_A_READING,
-    COLUMNS,
-    FORMAT,
-    FORMAT_VERSION,
-    LIVE_FILE,
-    blobs_crc,
-    block_from_blobs,
-    event_crc,
-    text_crc,
-)
 from sessions.recording.wal_recovery import log_tail
 
 # Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.
@@ -74,9 +64,9 @@ class Recording:
 
         Raises RecordingError when it holds no recording, one of a later format, or one whose head is damaged.
         """
-        path = folder / LIVE_FILE
+        path = folder / schema.LIVE_FILE
         if not path.is_file():
-            raise RecordingError(f"{folder} holds no recording: there is no {LIVE_FILE}; give a session folder")
+            raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; give a session folder")
         losses: list[str] = []
         try:
             losses += torn_log(path)
@@ -157,10 +147,10 @@ class Recording:
 
     def _all_readings(self) -> ReadingBlock:
         """Return the readings of all blocks, each put where it stays as it comes: joining would hold an hour twice."""
-        path = self.folder / LIVE_FILE
+        path = self.folder / schema.LIVE_FILE
         bytes_held = sum(side.stat().st_size for side in (path, _side_file(path, "-wal")) if side.is_file())
-        most = min(bytes_held // BYTES_A_READING, self._stored())
-        room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in COLUMNS.items()}
+        most = min(bytes_held // schema.BYTES_A_READING, self._stored())
+        room = {name: np.empty((most, 6) if name == "raw" else most, kind) for name, kind in schema.COLUMNS.items()}
         count = 0
         for block in self.blocks():
             if count + len(block) > most:  # committed since it was counted
@@ -174,11 +164,11 @@ class Recording:
     def _stored(self) -> int:
         """Return how many readings the rows have room for, without reading them; a damaged row may claim too much."""
         try:
-            with _connected(self.folder / LIVE_FILE) as connection:
+            with _connected(self.folder / schema.LIVE_FILE) as connection:
                 (size,) = connection.execute("SELECT coalesce(sum(length(sequence)), 0) FROM blocks").fetchone()
         except DATABASE_FAILURES:
             return sum(len(block) for block in self.blocks())
-        return size // np.dtype(COLUMNS["sequence"]).itemsize
+        return size // np.dtype(schema.COLUMNS["sequence"]).itemsize
 
     def readings_between(self, start_ns: int, stop_ns: int | None) -> ReadingBlock:
         """Return the readings received from `start_ns` up to, not including, `stop_ns` (None: to the end) [ns]."""
@@ -194,7 +184,7 @@ class Recording:
 
     def last_block(self) -> ReadingBlock:
         """Return the last block of readings (an empty one where there is none). Raises RecordingError when damaged."""
-        path = self.folder / LIVE_FILE
+        path = self.folder / schema.LIVE_FILE
         try:
             with _connected(path) as connection:
                 (last,) = connection.execute("SELECT max(number) FROM blocks").fetchone()
@@ -210,12 +200,12 @@ class Recording:
         `between` limits it to blocks that hold readings received in that span of the session clock [ns].
         """
         damaged: list[str] = [] if losses is None else losses
-        path = self.folder / LIVE_FILE
+        path = self.folder / schema.LIVE_FILE
         try:
             with _connected(path) as connection:
                 yield from _blocks(connection, damaged, between)
         except DATABASE_FAILURES as error:
-            damaged.append(f"{LIVE_FILE} cannot be read to its end ({error})")
+            damaged.append(f"{schema.LIVE_FILE} cannot be read to its end ({error})")
 
 
 def _end(events: Iterable[LoggedEvent]) -> Mapping[str, Any] | None:
@@ -254,13 +244,13 @@ def _blocks(
 
 def _block(connection: sqlite3.Connection, number: int) -> ReadingBlock:
     """Return one block. Raises ValueError when it is not what was written."""
-    names = ", ".join(COLUMNS)
+    names = ", ".join(schema.COLUMNS)
     sql_columns = "readings, crc32, sequence_first, sequence_last, counter_first, counter_last"
     row = connection.execute(f"SELECT {sql_columns}, {names} FROM blocks WHERE number=?", (number,)).fetchone()
     readings, crc, ends, columns = row[0], row[1], list(row[2:6]), row[6:]
-    if blobs_crc(columns) != crc:
+    if schema.blobs_crc(columns) != crc:
         raise ValueError("its bytes do not give the CRC-32 stored with them")
-    block = block_from_blobs(columns)
+    block = schema.block_from_blobs(columns)
     if len(block) != readings or ends != [column[i] for column in (block.sequence, block.counter) for i in (0, -1)]:
         raise ValueError("its readings are not those that its row describes")
     return block
@@ -272,7 +262,7 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     head: dict[str, Any] = {"simulated": "no", "transducer": None}
     for name, value, crc in rows:
         try:
-            sound = text_crc(value) == crc
+            sound = schema.text_crc(value) == crc
             head[name] = value if name == "simulated" else json_value(value)
         except (ValueError, TypeError, AttributeError):
             sound = False
@@ -281,8 +271,8 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
     form: Any = head.get("format")
     if not _readable(form):
         raise RecordingError(
-            f"{path} holds {form or 'no format'}; this program reads '{FORMAT}' up to version {FORMAT_VERSION}:"
-            " use a later program"
+            f"{path} holds {form or 'no format'}; this program reads '{schema.FORMAT}' up to version "
+            f"{schema.FORMAT_VERSION}: use a later program"
         )
     return head
 
@@ -299,7 +289,7 @@ def _readable(form: Any) -> bool:  # noqa: ANN401  any JSON value
         return False
     known = cast("dict[str, Any]", form)
     version = known.get("version", 0)
-    return known.get("name") == FORMAT and isinstance(version, int) and version <= FORMAT_VERSION
+    return known.get("name") == schema.FORMAT and isinstance(version, int) and version <= schema.FORMAT_VERSION
 
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:
@@ -321,7 +311,7 @@ def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEv
 def _event(number: int, row: Sequence[object]) -> LoggedEvent:
     """Return an event from its row. Raises ValueError where it is damaged or oddly shaped."""
     time_ns, kind, trial, readings, text, crc = converted(row, tuple[int, str, int | None, int, str, int])
-    if event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
+    if schema.event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
         raise ValueError("CRC-32 differs")
     return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, text))
 

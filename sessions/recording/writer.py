@@ -13,6 +13,7 @@ from drivers.transducer import TransducerInfo
 from sessions.atomic_file import sync_folder
 from sessions.file_access import remedy
 from sessions.plan.plan import SessionPlan
+from sessions.recording import schema
 from sessions.recording.disk_space import Reserve, release_reserve
 from sessions.recording.errors import RecordingError
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
@@ -21,17 +22,6 @@ from sessions.recording.manifest import is_sealed
 from sessions.recording.provenance import without_home
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import identities, rescued
-from sessions.recording.schema import (
-    APPLICATION_ID,
-    FORMAT,
-    FORMAT_VERSION,
-    LIVE_FILE,
-    TABLES,
-    blobs,
-    blobs_crc,
-    event_row,
-    text_crc,
-)
 from sessions.recording.wal_checkpoint import fold_log
 
 COMMIT_EVERY_NS = 1_000_000_000
@@ -90,12 +80,12 @@ class SessionWriter:
         simulated = simulated_sentence(info, subject_simulated)
         head = {
             "simulated": simulated or "no",
-            "format": json_text({"name": FORMAT, "version": FORMAT_VERSION}),
+            "format": json_text({"name": schema.FORMAT, "version": schema.FORMAT_VERSION}),
             "plan": json_text(plan_to_dict(plan)),
             "transducer": json_text(info_to_dict(info) if info else None),
             "provenance": json_text(dict(provenance)),
         }
-        path = folder / LIVE_FILE
+        path = folder / schema.LIVE_FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.iterdir()):
@@ -130,7 +120,7 @@ class SessionWriter:
         if is_sealed(folder):
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
         fold_log(Recording.open(folder))
-        path = folder / LIVE_FILE
+        path = folder / schema.LIVE_FILE
         try:
             kept_back = Reserve(folder, reserve) if reserve else None
         except OSError as error:
@@ -305,17 +295,17 @@ class SessionWriter:
         for start in range(0, len(waiting), LARGEST_BLOCK):
             block = waiting.between(start, start + LARGEST_BLOCK)
             rows += 1
-            columns = blobs(block)
+            columns = schema.blobs(block)
             ends = [int(column[i]) for column in (block.sequence, block.counter) for i in (0, -1)]
             received = int(block.received_ns.min()), int(block.received_ns.max())
-            values = (rows, len(block), *ends, *received, *columns, blobs_crc(columns))
+            values = (rows, len(block), *ends, *received, *columns, schema.blobs_crc(columns))
             self._connection.execute(f"INSERT INTO blocks VALUES ({','.join('?' * len(values))})", values)
         return rows
 
     def _insert_events(self) -> None:
         """Insert the waiting events."""
         for event in self._events:
-            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", schema.event_row(event))
 
     def _fail(self, error: sqlite3.Error) -> NoReturn:
         """Refuse everything from now on."""
@@ -340,14 +330,14 @@ class FleetingWriter(SessionWriter):
 
 def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable: bool) -> None:
     """Lay out the tables and write the head, in one commit."""
-    connection.execute(f"PRAGMA application_id={APPLICATION_ID}")
+    connection.execute(f"PRAGMA application_id={schema.APPLICATION_ID}")
     _make_durable(connection)
     connection.execute("BEGIN IMMEDIATE")
-    for table in TABLES:
+    for table in schema.TABLES:
         connection.execute(table)
     for number, (name, value) in enumerate(head.items(), 1):
-        connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, text_crc(value)))
-    connection.execute(f"PRAGMA user_version={FORMAT_VERSION}")
+        connection.execute("INSERT INTO head VALUES (?,?,?,?)", (number, name, value, schema.text_crc(value)))
+    connection.execute(f"PRAGMA user_version={schema.FORMAT_VERSION}")
     connection.execute("COMMIT")
     if not durable:
         connection.execute("PRAGMA synchronous=OFF")
