@@ -201,6 +201,7 @@ QAbstractItemView {{ selection-background-color: {t.act}; selection-color: {t.on
   background: {t.surface}; alternate-background-color: {t.raised}; }}
 QListView::item:selected, QTreeView::item:selected, QTableView::item:selected {{ background: {t.act};
   color: {t.on_act}; }}
+QComboBox QLineEdit {{ border: none; min-height: 0; padding: 0 6px; }}
 QComboBox QAbstractItemView {{ background: {t.raised}; }}
 QHeaderView::section {{ background: {t.ground}; color: {t.quiet}; border: 1px solid {t.line}; padding: 3px 6px; }}
 QProgressBar {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 4px; text-align: center; }}

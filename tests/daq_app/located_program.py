@@ -1,4 +1,4 @@
-"""The program as it is started, which tells a test where on the screen something is: a name in, "x y" or "" out."""
+"""The program as it is started, which tells a test where something is: a name in, "x y title of its window" out."""
 
 import sys
 
@@ -6,14 +6,14 @@ from daq_app.qt import start
 
 
 def where(name):
-    """Return the middle of a part that can be seen and used, by how its name for screen readers begins [pixels]."""
+    """Return the middle of a part that can be used [pixels], by how its name for screen readers begins; "" for none."""
     from PySide6.QtWidgets import QApplication, QWidget
 
     for window in QApplication.topLevelWidgets():
         for part in window.findChildren(QWidget):
             if part.isVisible() and part.isEnabled() and part.accessibleName().startswith(name):
                 middle = part.mapToGlobal(part.rect().center())
-                return f"{middle.x()} {middle.y()}"
+                return f"{middle.x()} {middle.y()} {window.windowTitle()}"
     return ""
 
 

@@ -33,15 +33,16 @@ class Mouse:
     def where(self, name):
         self.program.stdin.write(f"{name}\n")
         self.program.stdin.flush()
-        return self.program.stdout.readline().split()
+        return self.program.stdout.readline().rstrip("\n").split(" ", 2)
 
     def click(self, name):
-        """Click on a part as soon as it can be seen and used, and stays where it is."""
+        """Click on a part as soon as it can be used, stays where it is, and the X server has its window in front."""
 
         def still():
             before = self.where(name)
             time.sleep(0.3)
-            return before if before == self.where(name) else []
+            in_front = len(before) == 3 and self._desk.active() == before[2]
+            return before[:2] if in_front and before == self.where(name) else []
 
         self._desk.do("mousemove", *until(still, name), "click", 1)
 
