@@ -17,7 +17,7 @@ from solver.verification.survey.answers import SURFACES, Row, report, solve, tab
 
 Key = tuple[str, int, Kinematics]
 CAPTION = (
-    "Scenes number {first} to {last} of each set; three answers each. Above: share of estimates at or above the true "
+    "Scenes from number {first} on, of each set; three answers each. Above: share of estimates at or above the true "
     "error. Near: below ten times the larger of true error and 0.02 %. Ratio: median of estimate by error. Corrected: "
     "median of its error by the answer's. Counted where the truth can tell."
 )
@@ -59,8 +59,8 @@ def main() -> None:
         print(line)
     if options.page is not None:
         every = sorted(stored(options.keep), key=lambda row: (row.kinematics != "small", row.family, row.number))
-        ends = {"first": min(row.number for row in every), "last": max(row.number for row in every)}
-        judgements = "\n".join([CAPTION.format(**ends), "", *table(every)])
+        caption = CAPTION.format(first=min(row.number for row in every))
+        judgements = "\n".join([caption, "", *table(every)])
         options.page.write_text(filled(options.page.read_text("utf-8"), "judged", judgements), "utf-8")
 
 
