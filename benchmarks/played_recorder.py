@@ -97,5 +97,6 @@ OPEN = (m.Device(INFO, FRAME), health(), TARED)
 SIMULATED = "SIMULATED transducer and hand"
 BEGUN = (m.SessionBegun(FOLDER, PLAN, "simulated hand", SIMULATED, 0, 1.0), steps.AskBegin(), status(1))
 ENDED = m.SessionEnded(FOLDER, SessionEnd("every trial is done", "finished", True, 900_000, Health()), False)
-LOST = SessionEnd("the transducer does not answer", "device", False, 90_000, Health(lost=12))
+GONE = "the transducer does not answer; check its power and the cable"
+LOST = SessionEnd(GONE, "device", False, 90_000, Health(lost=12))
 CUT = m.SessionEnded(FOLDER, LOST, True)

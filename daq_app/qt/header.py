@@ -157,13 +157,17 @@ class ToDo(QFrame):
         layout.setSpacing(2 * GRID)
         layout.addWidget(self._arrow)
         layout.addWidget(self.sentence, 1)
-        layout.addWidget(self.second)
-        layout.addWidget(self.primary)
+        self._buttons = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._buttons.setSpacing(GRID)
+        self._buttons.addWidget(self.second)
+        self._buttons.addWidget(self.primary)
+        layout.addLayout(self._buttons)
 
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
         """Show a sentence, its button and the stroke's direction."""
         say(self.sentence, sentence)
         self._arrow.show_direction(direction)
+        self._arrow.setVisible(direction != 0 or not self._small)
         if primary is not None:
             text = f"{primary.label}   {tr(primary.key)}"
             if self.primary.text() != text:
@@ -173,9 +177,11 @@ class ToDo(QFrame):
         self.primary.setVisible(primary is not None)
 
     def show_small(self, small: bool) -> None:
-        """Use smaller type, where there is little room."""
+        """Use smaller type, and one button below the other, where there is little room."""
         if small != self._small:
             self._small = small
+            ways = QBoxLayout.Direction
+            self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
             self.sentence.setProperty("role", "title" if small else "headline")
             self.sentence.style().unpolish(self.sentence)
             self.sentence.style().polish(self.sentence)

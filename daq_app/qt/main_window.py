@@ -369,7 +369,9 @@ class MainWindow(QMainWindow):
         layout = bare(QVBoxLayout(here), GRID)
         layout.addWidget(self.notice)
         layout.addWidget(self.to_do)
-        layout.addWidget(scrolled(panels), 1)
+        below = scrolled(panels)
+        below.setMinimumHeight(1)  # what to do now is whole, however low the window is
+        layout.addWidget(below, 1)
         self.rooms.addWidget(here)
         frame = QGridLayout(window)
         frame.setContentsMargins(GRID, GRID // 2, GRID, GRID)

@@ -118,7 +118,8 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", sentence(state.gone))
     if bench.link == "lost":
         lost = "" if not running else tr(" Readings are being lost; what came before is kept.")
-        return Banner("wrong", tr("The transducer does not answer: {problem}.{lost}", problem=bench.problem, lost=lost))
+        problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
+        return Banner("wrong", tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost))
     if running and state.heard is not None and state.now - state.heard > SILENT:
         return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
     if over := bench.peak.over:

@@ -23,6 +23,7 @@ from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
 from daq_app.qt.press_bar import FULL, PressBar
 from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.view_course import Button
 
 pytestmark = pytest.mark.qt
 
@@ -129,6 +130,20 @@ def test_of_a_window_lower_than_its_panels_all_can_be_scrolled_to(driver):
         place = shown.rect().translated(shown.mapTo(window, shown.rect().topLeft()))
         assert window.rect().contains(place)
         assert shown.height() >= shown.minimumHeight()
+    window.resize(1440, 900)
+
+
+def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lines_and_two_buttons(driver):
+    window = driver.window
+    window.resize(683, 384)
+    window.notice.warn("The session was cut short. " * 6)
+    window.to_do.show_what("The session was cut short and can go on at the same trial.", Button("Resume", "Space"), 0)
+    window.to_do.second.show()
+    driver.application.processEvents()
+    sentence, first, second = window.to_do.sentence, window.to_do.primary, window.to_do.second
+    assert sentence.height() >= sentence.heightForWidth(sentence.width())
+    assert not first.geometry().intersects(second.geometry())
+    assert window.to_do.rect().contains(first.geometry().united(second.geometry()))
     window.resize(1440, 900)
 
 
