@@ -172,10 +172,10 @@ class CoursePanel(QFrame):
             if item is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None beyond the last
                 item = QListWidgetItem()
                 self.plan.addItem(item)
-            text = f"{row.name}   {row.found}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.found}"
+            text = f"{row.name}   {row.outcome}" if row.kind == "block" else f"{row.mark}  {row.name}   {row.outcome}"
             if item.text() != text:
                 item.setText(text)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.found}")
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
             made = self.plan.font()
             made.setBold(row.kind in ("block", "current"))
             item.setFont(made)

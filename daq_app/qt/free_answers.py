@@ -39,7 +39,7 @@ class _Field(QWidget):
 
     def given(self, hand: Hand | None) -> Event:
         """Return the answer."""
-        return self.answer.given(hand)
+        return self.answer.judgement(hand)
 
 
 class NumberField(_Field):

@@ -113,7 +113,7 @@ class MainWindow(QMainWindow):
         """Show what is known now."""
         course = view.course
         self.header.show_view(view)
-        self.notice.show_view(view.banner, "" if course is None else course.told)
+        self.notice.show_view(view.banner, "" if course is None else course.notice)
         self.bench.show_view(view.bench)
         self.strip.show_view(view.bench)
         self.middle.show_view(course)

@@ -11,7 +11,7 @@ from daq_app.qt.press_bar import FULL, newest_force
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import USUAL_DPI
 from daq_app.tablet.dialogue import Dialogue
-from daq_app.tablet.messages import Force, FromTablet, Given, Hello, Ruler
+from daq_app.tablet.messages import AnswerGiven, Force, FromTablet, Hello, Ruler
 from daq_app.tablet.server import TabletServer, own_address
 from daq_app.window.course_state import SessionState
 from daq_app.window.live_trace import LiveTrace
@@ -105,7 +105,7 @@ class TabletScreen(QObject):
             case Hello(pixels_per_mm=pixels) | Ruler(pixels):
                 self._pixels = pixels
                 self.changed.emit()
-            case Given():
+            case AnswerGiven():
                 event = self._dialogue.take(said, partial(self._session_time, said.sent, arrived))
                 if event is not None:
                     self.answered.emit(event)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from daq_app.tablet.messages import Act, Given, Page, Stored, ToTablet
+from daq_app.tablet.messages import Act, AnswerGiven, Page, Stored, ToTablet
 from daq_app.window.answer import Answer, Choice
 from daq_app.window.course_state import SessionState
 from daq_app.window.subject_texts import SubjectText as Text
@@ -72,16 +72,16 @@ class Dialogue:
             self._page = page
             self._send(page)
 
-    def take(self, given: Given, clock: Callable[[float], float]) -> Event | None:
+    def take(self, answer: AnswerGiven, clock: Callable[[float], float]) -> Event | None:
         """Return what the recorder is to be told of an answer; None where it knows already, or no session runs.
 
         `clock` makes of the tablet's clock [ms] that of the session [s]. An answer that nobody asks for any more is
         returned as a note, so that it is not lost.
         """
-        session, page, key = self._session, self._page, given.key
+        session, page, key = self._session, self._page, answer.key
         if session is None or session.over or page is None or key in self._waiting or self._acknowledge(key):
             return None
-        event = event_of(given.acts, clock, session.plan.answering_hand)
+        event = event_of(answer.acts, clock, session.plan.answering_hand)
         if key == page.key and isinstance(event, ANSWERS[page.kind]):
             self._waiting.add(key)
             return event
@@ -120,7 +120,7 @@ def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | 
                 choice = choice.chosen(time, which, act.device)
             case _:
                 pass  # a value that does not go with its act
-    return choice.given(hand) if choice != Choice() else line.released().scored(hand)
+    return choice.judgement(hand) if choice != Choice() else line.released().scored(hand)
 
 
 def _value(event: Answered) -> float | str | None:

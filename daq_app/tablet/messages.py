@@ -37,7 +37,7 @@ class Act(Struct, frozen=True, array_like=True):
     device: Device
 
 
-class Given(Struct, frozen=True, tag="given"):
+class AnswerGiven(Struct, frozen=True, tag="given"):
     """An answer, sent again and again until it is stored."""
 
     key: Short  # of the question
@@ -45,7 +45,7 @@ class Given(Struct, frozen=True, tag="given"):
     sent: float  # clock of the tablet [ms]
 
 
-FromTablet = Hello | Ruler | Given
+FromTablet = Hello | Ruler | AnswerGiven
 
 # ---- to the tablet
 

@@ -60,7 +60,7 @@ class TabletServer:
         self._changed = changed
         self._lock = threading.Lock()
         self._door = threading.Lock()  # one guess at a time, however many ask at once
-        self._held: ServerConnection | None = None  # of the tablet that was let in
+        self._admitted: ServerConnection | None = None  # of the tablet that was let in
         self._token = ""
         self._wrong = 0
         self._last: dict[type, str] = {}  # what a tablet that comes back has to know
@@ -84,7 +84,7 @@ class TabletServer:
     @property
     def connected(self) -> bool:
         """Say whether the tablet is there."""
-        return self._held is not None
+        return self._admitted is not None
 
     @property
     def link(self) -> str:
@@ -96,16 +96,16 @@ class TabletServer:
         text = written(message)
         with self._lock:  # so that a tablet that comes now does not hear of it too early
             self._last[type(message)] = text
-            if self._held is not None:
-                _tell(self._held, text)
+            if self._admitted is not None:
+                _tell(self._admitted, text)
 
     def renew(self) -> None:
         """Let go of the tablet, and let in whoever says the new code."""
         with self._lock:
-            held, self._held, self._token = self._held, None, ""
+            admitted, self._admitted, self._token = self._admitted, None, ""
             self.code, self._wrong = _new_code(), 0
-        if held is not None:
-            held.close()
+        if admitted is not None:
+            admitted.close()
         self._changed()
 
     def close(self) -> None:
@@ -140,8 +140,8 @@ class TabletServer:
                     self._received(said, time.monotonic())
             finally:
                 with self._lock:
-                    if gone := self._held is connection:
-                        self._held = None
+                    if gone := self._admitted is connection:
+                        self._admitted = None
                 if gone:
                     self._changed()
 
@@ -162,7 +162,7 @@ class TabletServer:
             right = self.code if by_code else self._token
             if by_code == bool(self._token) or not secrets.compare_digest(said.encode(), right.encode()):
                 return False
-            before, self._held = self._held, connection
+            before, self._admitted = self._admitted, connection
             self._token = self._token or secrets.token_urlsafe()
             for text in (written(Welcome(self._token)), *self._last.values()):
                 _tell(connection, text)
@@ -190,10 +190,10 @@ def own_address() -> str:
 
     No packet is sent: the system only looks up which way one would take.
     """
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            asked.connect(("192.0.2.1", 9))  # documentation's own network (RFC 5737): no machine is there
-            return str(asked.getsockname()[0])
+            probe.connect(("192.0.2.1", 9))  # documentation's own network (RFC 5737): no machine is there
+            return str(probe.getsockname()[0])
         except OSError:
             return "127.0.0.1"
 
@@ -209,9 +209,9 @@ def _listening(address: str, port: int) -> socket.socket:
             f"{address} is no address of a private network: the subject's page is served in the lab alone;"
             " give --subject-address with this machine's address there"
         )
-    for asked in (port, 0):
+    for wanted in (port, 0):
         try:
-            return socket.create_server((address, asked))
+            return socket.create_server((address, wanted))
         except OSError as error:
             refused = error
     raise NoTabletServer(f"{address} is no address of this machine ({refused.strerror}); give --subject-address")

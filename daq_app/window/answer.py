@@ -24,7 +24,7 @@ class Answer:
     positions: tuple[tuple[float, float], ...] = ()  # (session clock [s], 0 to 100)
     corrections: int = 0  # how often an answer that stood was changed
     device: Device | None = None  # that gave the last position
-    held: bool = False  # a finger or button is down
+    down: bool = False  # a finger or button is down
 
     @property
     def score(self) -> float | None:
@@ -34,15 +34,15 @@ class Answer:
     def pressed(self, time: float, position: float, device: Device) -> "Answer":
         """Return the answer after the line was touched, clicked or tapped on [s, 0 to 100]."""
         again = self.corrections + bool(self.positions)
-        return replace(self._moved(time, position, device), corrections=again, held=True)
+        return replace(self._moved(time, position, device), corrections=again, down=True)
 
     def dragged(self, time: float, position: float, device: Device) -> "Answer":
         """Return the answer after what is held down has moved; one answer, however far it goes."""
-        return self._moved(time, position, device) if self.held else self
+        return self._moved(time, position, device) if self.down else self
 
     def released(self) -> "Answer":
         """Return the answer after the finger or button has left."""
-        return replace(self, held=False)
+        return replace(self, down=False)
 
     def stepped(self, time: float, by: float) -> "Answer":
         """Return the answer after a key moved the mark by so much; the first key puts it in the middle."""
@@ -87,7 +87,7 @@ class Choice:
         first = time if self.first_touch is None else self.first_touch
         return Choice(value, first, self.corrections, "keyboard")
 
-    def given(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
+    def judgement(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
         """Return the event of an answer that is given."""
         if self.value in ("first", "second"):
             return PairedChoice(self.value, self.first_touch, self.corrections, hand, self.device)

@@ -40,7 +40,7 @@ class BenchState:
     problem: str | None = None  # why the link is lost, or was not made
     searching: bool = False
     searched: bool = False  # a search has ended since somebody connected or let go
-    found: tuple[Probe, ...] = ()
+    devices: tuple[Probe, ...] = ()
     health: Health = field(default_factory=Health)
     rate: float = float("nan")  # measured [Hz]
     load: Load = field(default_factory=Load)
@@ -73,8 +73,8 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
             return replace(bench, peak=Load(), saturated=0)
         case Searching():
             return replace(bench, searching=True)
-        case DevicesFound(found):
-            return replace(bench, searching=False, searched=True, found=found)
+        case DevicesFound(devices):
+            return replace(bench, searching=False, searched=True, devices=devices)
         case _:
             return bench
 
@@ -84,11 +84,11 @@ def _linked(
 ) -> BenchState:
     match message:
         case m.Connect(uri):
-            return BenchState(link="connecting", uri=uri, found=bench.found)
+            return BenchState(link="connecting", uri=uri, devices=bench.devices)
         case m.Device(info, frame):
             return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
         case m.NoDevice():
-            return BenchState(found=bench.found, problem=bench.problem)
+            return BenchState(devices=bench.devices, problem=bench.problem)
         case m.LinkDown(sentence):
             return replace(bench, link="lost", problem=sentence)
         case m.LinkBack(info, same):
@@ -106,7 +106,7 @@ def _left(bench: BenchState, message: m.SessionEnded | m.Gone) -> BenchState:
         case m.SessionEnded(end=end) if end.cause == "device":
             return replace(bench, link="lost", problem=end.reason)
         case m.Gone(requested=False):
-            return BenchState(found=bench.found)  # the recorder's process held the transducer
+            return BenchState(devices=bench.devices)  # the recorder's process held the transducer
         case _:
             return bench
 
@@ -124,7 +124,7 @@ def _tared(bench: BenchState, message: m.Tare | m.Tared | LoggedEvent) -> BenchS
 def _not_done(bench: BenchState, failed: m.Failed) -> BenchState:
     """Return the bench after a request that could not be met."""
     if failed.request == "Connect":
-        return BenchState(found=bench.found, problem=failed.sentence)
+        return BenchState(devices=bench.devices, problem=failed.sentence)
     return replace(bench, taring=False) if failed.request == "Tare" else bench
 
 

@@ -37,11 +37,11 @@ def checklist(form: SessionForm, bench: Bench, screen: str) -> tuple[Card, ...]:
         "Transducer": "" if not form.forces or not bench.simulated else tr("The simulated bench."),
         "Subject's screen": screen,
     }
-    made: list[Card] = []
+    cards: list[Card] = []
     for name, fields in FIELDS.items():
         first = next((field for field in fields if field in wrong), "")
-        made.append(Card(name, not first, wrong.get(first, notes.get(name, "")), first))
-    return tuple(made)
+        cards.append(Card(name, not first, wrong.get(first, notes.get(name, "")), first))
+    return tuple(cards)
 
 
 def first_missing(cards: tuple[Card, ...]) -> Card | None:
@@ -71,7 +71,7 @@ def codes_in(folder: Path) -> tuple[str, ...]:
     except OSError:
         return ()
     matched = (re.fullmatch(r"(.+)_[^_]+_\d{8}T\d{6}", name) for name in dict.fromkeys(names))
-    return tuple(found[1] for found in matched if found is not None)
+    return tuple(match[1] for match in matched if match is not None)
 
 
 def next_code(codes: tuple[str, ...]) -> str:
@@ -80,7 +80,7 @@ def next_code(codes: tuple[str, ...]) -> str:
     >>> next_code(("P01", "P09", "pilot")), next_code(())
     ('P10', 'P01')
     """
-    numbered = [found.groups() for code in codes if (found := re.fullmatch(r"(.*?)(\d{1,9})", code))]
+    numbered = [match.groups() for code in codes if (match := re.fullmatch(r"(.*?)(\d{1,9})", code))]
     if not numbered:
         return "P01"
     before, digits = max(numbered, key=lambda parts: int(parts[1]))
@@ -103,11 +103,11 @@ def _study_note(form: SessionForm) -> str:
     if said is not None:
         return tr("A study of protocol {protocol}.", protocol=said.protocol)
     there = ", ".join(studies_in(place_of(form).parent))
-    others = tr(" Studies there: {there}.", there=there) if there else ""
+    elsewhere = tr(" Studies there: {there}.", there=there) if there else ""
     return tr(
         "“{name}” is no study: sessions go to a plain folder, by this page's protocol.{others}",
         name=name,
-        others=others,
+        others=elsewhere,
     )
 
 

@@ -93,8 +93,8 @@ class SessionState:
     before_pause: Phase = "idle"
     trial: int | None = None  # number of the trial in hand
     block: Block | None = None
-    asked: steps.Command | None = None  # what is waited for
-    told: str | None = None  # the last sentence that needs no answer, or that refuses one
+    command: steps.Command | None = None  # what is waited for
+    notice: str | None = None  # the last sentence that needs no answer, or that refuses one
     redone: tuple[int, ...] = ()  # numbers of the trials whose redo can still be undone
     judged: int | None = None  # number of the trial whose stroke was looked at last
     time_offset: float = 0.0  # of the times in the log to those of the stream that is shown, after a resumption [s]
@@ -171,12 +171,12 @@ def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | 
     match message:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)
-        case m.Gone(asked, sentence) if not asked and not session.over:
+        case m.Gone(requested, sentence) if not requested and not session.over:
             return replace(_over(session), broken=sentence, resumable=True)
         case m.Gone(False) | m.Failed("ResumeSession") if session.phase == "resuming":
             return replace(session, phase="ended")
         case m.ResumeSession():
-            return replace(session, phase="resuming", asked=None)
+            return replace(session, phase="resuming", command=None)
         case m.Failed(kind=""):
             return session  # a request that has to wait for the end of this session
         case m.Gone() | m.Failed("StartSession" | "ResumeSession") if session.sealing == "running":
@@ -189,7 +189,7 @@ def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | 
 
 def _over(session: SessionState) -> SessionState:
     """Return the session once nothing is recorded any more; its marks go with the clock of its stream."""
-    return replace(session, phase="ended", asked=None, marks=(), redone=())
+    return replace(session, phase="ended", command=None, marks=(), redone=())
 
 
 def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
@@ -211,20 +211,20 @@ def _shown(session: SessionState, message: Message) -> SessionState:
     """Return the session after a command: what it asks for is what is waited for now."""
     match message:
         case steps.AskBegin():
-            return replace(session, phase="idle", asked=message)
+            return replace(session, phase="idle", command=message)
         case steps.AskMount(trial):
             session = session.with_trial(trial.number, trial=trial, chosen=True)
-            return replace(session, phase="mounting", trial=trial.number, asked=message, told=None)
+            return replace(session, phase="mounting", trial=trial.number, command=message, notice=None)
         case steps.MeasureZero():
-            return replace(session, phase="taring", asked=message, told=None)
+            return replace(session, phase="taring", command=message, notice=None)
         case steps.AskStroke(trial):
-            return replace(session, phase="ready", trial=trial.number, asked=message, told=None)
+            return replace(session, phase="ready", trial=trial.number, command=message, notice=None)
         case steps.AskScore(trial) | steps.AskNumber(trial) | steps.AskChoice(second=trial):
-            return replace(session, phase="scoring", trial=trial.number, asked=message)
+            return replace(session, phase="scoring", trial=trial.number, command=message)
         case steps.AskRest():
-            return replace(session, phase="resting", trial=None, asked=message, told=None)
+            return replace(session, phase="resting", trial=None, command=message, notice=None)
         case steps.AskFinish():
-            return replace(session, phase="closing", trial=None, asked=message, told=None)
+            return replace(session, phase="closing", trial=None, command=message, notice=None)
         case _:
             return _noticed(session, message)
 
@@ -237,9 +237,9 @@ def _noticed(session: SessionState, message: Message) -> SessionState:
         case steps.StartTake(trial, take):
             return replace(session.with_trial(trial, takes=take, outcome="coming", quality=None))
         case steps.Tell(sentence) | steps.Refuse(sentence):
-            return replace(session, told=sentence)
+            return replace(session, notice=sentence)
         case steps.EndSession():
-            return replace(session, phase="ended", asked=None)
+            return replace(session, phase="ended", command=None)
         case _:
             return session
 

@@ -90,8 +90,8 @@ class LiveFeed:
         self._sequence = int(live.sequence[-1])
         self._keep(live)
         self.trace.add(time, drawn)
-        felt = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
-        return load_of(info.calibration.own(felt), info.calibration.rated)
+        sensed = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
+        return load_of(info.calibration.own(sensed), info.calibration.rated)
 
     def take(self) -> ReadingBlock:
         """Return the readings of the take in hand, as a wrench: N, N mm."""

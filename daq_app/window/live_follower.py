@@ -138,18 +138,18 @@ class Follower:
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
-    def settle(self, asked: Settle) -> Settled:
+    def settle(self, request: Settle) -> Settled:
         """Return the full solve of a stroke, beside the mean of what was said of it."""
-        return self.settling(asked)()
+        return self.settling(request)()
 
-    def settling(self, asked: Settle) -> Callable[[], Settled]:
+    def settling(self, request: Settle) -> Callable[[], Settled]:
         """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
-        first, last = asked.steady
+        first, last = request.steady
         said = np.array([sed for time, sed in self._said if first <= time <= last])
         said = said[np.isfinite(said)]
         provisional = float(said.mean()) if len(said) else None
         seen = next((seen for seen in reversed(self._seen) if first <= seen.time <= last), None)
-        return lambda: _settled(asked, self._kinematics, provisional, seen)
+        return lambda: _settled(request, self._kinematics, provisional, seen)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
         """Return the SED under forces [N], and whether finite strain told it; nothing that touches is within reach."""
@@ -183,42 +183,42 @@ class Follower:
             self._finite.stepper.forget()
 
 
-def _settled(asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
-    scene = settled_scene(asked.plan, asked.friction, asked.normal_force, kinematics)
+def _settled(request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
+    scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
     try:
-        found = None if scene is None else solve(scene)
+        prediction = None if scene is None else solve(scene)
     except SolveFailure as failure:
-        return _unsettled(asked, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
-    if found is None:
-        return _unsettled(asked, kinematics, provisional, seen, tr("The stroke gives no friction."))
-    fields = fields_of(found)
+        return _unsettled(request, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
+    if prediction is None:
+        return _unsettled(request, kinematics, provisional, seen, tr("The stroke gives no friction."))
+    fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
     return Settled(
-        asked.trial, found.sed_ending, known_error(found, found.error_estimate), provisional, found.row.sed,
-        picture, found.indentation, kinematics, effect=_greatest_effect(found),
+        request.trial, prediction.sed_ending, known_error(prediction, prediction.error_estimate), provisional,
+        prediction.row.sed, picture, prediction.indentation, kinematics, effect=_greatest_effect(prediction),
     )  # fmt: skip
 
 
-def _greatest_effect(found: Prediction) -> str:
+def _greatest_effect(prediction: Prediction) -> str:
     """Return which effect that the model leaves out changes the SED most, and how much; "" without an estimate."""
-    known = {name: one["estimate"] for name, one in found.model["left_out"].items() if one["estimate"] is not None}
+    known = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
     name = max(known, key=lambda one: known[one], default="")
     return name and f"{name} {float(f'{100 * known[name]:.2g}'):g} % of the SED"
 
 
 def _unsettled(
-    asked: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None, why: str, *,
+    request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None, why: str, *,
     failed: bool = False,
 ) -> Settled:  # fmt: skip
     """Return why there is no full solve, with the last state that was followed in the steady window."""
     if seen is None:
         unknown = np.full(len(ROW), np.nan)
-        return Settled(asked.trial, None, None, provisional, unknown, None, None, kinematics, why)
+        return Settled(request.trial, None, None, provisional, unknown, None, None, kinematics, why)
     picture = seen.picture
     if failed:
         picture = replace(picture, lost=most_squeezed(seen.rest, picture.nodes, picture.faces))
-    return Settled(asked.trial, None, None, provisional, seen.row, picture, seen.depth, kinematics, why)
+    return Settled(request.trial, None, None, provisional, seen.row, picture, seen.depth, kinematics, why)
 
 
 def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:

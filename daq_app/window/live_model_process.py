@@ -53,9 +53,9 @@ def run(connection: Connection) -> None:
                     say(Ready(problem))
                 case Forces() as forces if follower is not None:
                     say(follower.take(forces))
-                case Settle() as asked:
+                case Settle() as request:
                     if follower is not None:  # beside the next stroke, which is followed meanwhile
-                        threading.Thread(target=solve, args=(follower.settling(asked),), daemon=True).start()
+                        threading.Thread(target=solve, args=(follower.settling(request),), daemon=True).start()
                 case _:
                     say(Ready(tr("no finger to follow")))
 
@@ -74,7 +74,7 @@ class LiveModel:
         self._connection: Connection | None = None
         self._under_way = 0
         self._waiting: list[Forces] = []
-        self._asked: list[Use | Settle] = []
+        self._requests: list[Use | Settle] = []
         self._plan: SessionPlan | None = None
         self._kinematics: Kinematics = "small"
 
@@ -132,10 +132,10 @@ class LiveModel:
         while len(self._waiting) > 1 and forces.time[-1] - self._waiting[0].time[0] > WAITING:
             self._waiting.pop(0)
 
-    def settle(self, asked: Settle) -> None:
+    def settle(self, request: Settle) -> None:
         """Ask for the full solve of a stroke."""
         if self._connection is not None:
-            self._asked.append(asked)
+            self._requests.append(request)
 
     def poll(self) -> tuple[Provisional, ...]:
         """Take what came, and send what waits; return the predictions that are new."""
@@ -168,10 +168,10 @@ class LiveModel:
                 self.settled = message
 
     def _send(self, connection: Connection) -> None:
-        if self._asked:
-            asked = self._asked.pop(0)
-            connection.send(asked)
-            if isinstance(asked, Settle):
+        if self._requests:
+            request = self._requests.pop(0)
+            connection.send(request)
+            if isinstance(request, Settle):
                 return
         elif self._waiting and not self.problem:
             connection.send(joined(self._waiting))
@@ -182,4 +182,4 @@ class LiveModel:
 
     def _use(self) -> None:
         self.said = None  # of another finger
-        self._asked = [Use(self._plan, self._kinematics)]
+        self._requests = [Use(self._plan, self._kinematics)]

@@ -37,7 +37,7 @@ class LiveTrace:
         self._end = 0  # one behind the newest; the ring is written from left to right and moved when full
         self._start = 0
         self._full = False  # whether readings were dropped for newer ones
-        self._made = self._none_made()
+        self._columns = self._no_columns()
 
     def add(self, time: Array, values: Array) -> None:
         """Take readings: time (n,) [s, device time, rising] and values (channels, n)."""
@@ -69,7 +69,7 @@ class LiveTrace:
         """Forget every reading, as at a new connection."""
         self._start = self._end = 0
         self._full = False
-        self._made = self._none_made()
+        self._columns = self._no_columns()
 
     def between(self, first: float, last: float, every: int = 1) -> tuple[Array, Array]:
         """Return time (n,) [s] and values (channels, n) of the readings from `first` to `last` [s], or of each `every`.
@@ -90,14 +90,14 @@ class LiveTrace:
         if b - a <= 2 * count:
             return _one_by_one(self._time[a:b], self._values[:, a:b], self._gap)
         width = (last - first) / count
-        if self._made.width != width or self._made.first > first:
-            self._made = self._none_made(width, first)
-        begin, _ = self._positions(self._made.open_from, last)
-        self._made = self._made.onward(self._time[begin:b], self._values[:, begin:b], first)
-        return self._made.drawn(self._gap)
+        if self._columns.width != width or self._columns.first > first:
+            self._columns = self._no_columns(width, first)
+        begin, _ = self._positions(self._columns.open_from, last)
+        self._columns = self._columns.onward(self._time[begin:b], self._values[:, begin:b], first)
+        return self._columns.drawn(self._gap)
 
-    def _none_made(self, width: float = 0.0, first: float = 0.0) -> "_Made":
-        return _Made(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
+    def _no_columns(self, width: float = 0.0, first: float = 0.0) -> "_Columns":
+        return _Columns(width, first, np.empty(0, np.int64), np.empty((len(self._values), 0), np.float32))
 
     def _positions(self, first: float, last: float) -> tuple[int, int]:
         kept = self._time[self._start : self._end]
@@ -106,7 +106,7 @@ class LiveTrace:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Made:
+class _Columns:
     """Columns made so far; the newest is open, since readings may still fall into it."""
 
     width: float  # of a column [s]
@@ -119,14 +119,14 @@ class _Made:
         """From which time on readings are needed [s]."""
         return float(self.numbers[-1]) * self.width if len(self.numbers) else self.first
 
-    def onward(self, time: Array, values: NDArray[np.float32], first: float) -> "_Made":
+    def onward(self, time: Array, values: NDArray[np.float32], first: float) -> "_Columns":
         """Return the columns with the readings since `open_from`, without those before `first` [s]."""
         column = np.floor(time / self.width).astype(np.int64)
         starts = np.flatnonzero(np.diff(column, prepend=-1) > 0)
         keep = slice(int(np.searchsorted(self.numbers, first // self.width)), max(len(self.numbers) - 1, 0))
         old = self.pairs[:, 2 * keep.start : 2 * keep.stop] if keep.stop > keep.start else self.pairs[:, :0]
         numbers = np.concatenate([self.numbers[keep], column[starts]])
-        return _Made(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
+        return _Columns(self.width, first, numbers, np.hstack([old, _pairs(values, starts)]))
 
     def drawn(self, gap: float) -> Columns:
         """Return what is drawn of them."""

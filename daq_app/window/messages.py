@@ -22,7 +22,7 @@ class Searching(Struct, frozen=True):
 class DevicesFound(Struct, frozen=True):
     """What answered when devices were looked for."""
 
-    found: tuple[Probe, ...]
+    devices: tuple[Probe, ...]
 
 
 class Loaded(Struct, frozen=True):

@@ -118,11 +118,11 @@ def checked(
     try:
         chosen, seed, body, place = _decided(form, new_seed)
     except StudyError as error:
-        return Refused({"subject": _told(error)})
+        return Refused({"subject": _sentence(error)})
     except (SettingsError, OSError) as error:
-        return Refused({"protocol": _told(error)})
-    asked: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
-    phases: list[Phase] = [phase for phase, wanted in asked.items() if wanted]
+        return Refused({"protocol": _sentence(error)})
+    phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
+    phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
     try:
         planned = plan(
             chosen,
@@ -141,7 +141,7 @@ def checked(
             place=place,
         )
     except SettingsError as error:
-        return Refused({"protocol": _told(error)})
+        return Refused({"protocol": _sentence(error)})
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
         planned = replace(planned, frame=face)
@@ -170,18 +170,18 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
         try:
             protocol(form.protocol)
         except (SettingsError, OSError) as error:
-            wrong["protocol"] = _told(error)
+            wrong["protocol"] = _sentence(error)
     elif not said.enrolled:
         wrong.setdefault("subject" if said.protocol else "study", said.words)
     if wrong:
         return wrong
-    made = checked(form, bench, datetime.now(), 0)
-    if isinstance(made, Refused):
-        return made.sentences
+    session = checked(form, bench, datetime.now(), 0)
+    if isinstance(session, Refused):
+        return session.sentences
     try:
-        check_room(Path(made.folder).parent, need(made.plan, bench.rate if form.forces else None))
+        check_room(Path(session.folder).parent, need(session.plan, bench.rate if form.forces else None))
     except (RecordingError, OSError) as error:
-        return {"folder": _told(error)}
+        return {"folder": _sentence(error)}
     return {}
 
 
@@ -224,7 +224,7 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     try:
         study = open_study(folder)
     except (StudyError, SettingsError) as error:
-        return Enrolment("", _told(error))
+        return Enrolment("", _sentence(error))
     subject, name = form.subject.strip(), study.protocol.name
     if not is_code(subject):
         return Enrolment(name, tr("A study of protocol {name}: give the code of one of its subjects.", name=name))
@@ -237,7 +237,7 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     try:
         member = study.member(subject)
     except StudyError as error:
-        return Enrolment(name, _told(error))
+        return Enrolment(name, _sentence(error))
     blinded = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
     return Enrolment(
         name,
@@ -257,7 +257,7 @@ def enrolled(form: SessionForm) -> str:
     try:
         enrol(place_of(form), form.subject.strip(), Body())
     except (StudyError, SettingsError) as error:
-        return _told(error)
+        return _sentence(error)
     return ""
 
 
@@ -286,11 +286,11 @@ def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | No
 
 def unfinished(folder: Path) -> tuple[Unfinished, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
-    found: list[Unfinished] = []
+    unfinished: list[Unfinished] = []
     places = sorted((*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")), key=_age)
     for place in places:
         session = place.parent
-        if len(found) == SHOWN:
+        if len(unfinished) == SHOWN:
             break
         if is_sealed(session):
             continue
@@ -306,8 +306,8 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
             done=done,
             count=len(recording.trials),
         )
-        found.append(Unfinished(session, words))
-    return tuple(found)
+        unfinished.append(Unfinished(session, words))
+    return tuple(unfinished)
 
 
 def _age(path: Path) -> float:
@@ -365,7 +365,7 @@ def _kind(form: SessionForm, bench: Bench) -> Kind:
     return "simulated hand" if form.forces and bench.simulated else "people"
 
 
-def _told(error: Exception) -> str:
+def _sentence(error: Exception) -> str:
     text = str(error)
     if isinstance(error, OSError) and error.strerror:
         text = f"{error.filename}: {error.strerror.lower()}"

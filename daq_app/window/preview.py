@@ -41,18 +41,18 @@ def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage,
     plain = replace(
         form, subject=PILOT, folder=folder, seed="", height="", normal="", area="", simulated=False, pilot=True
     )
-    made = checked(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
-    if isinstance(made, Refused):
-        return made
-    language = made.plan.language
+    session_plan = checked(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
+    if isinstance(session_plan, Refused):
+        return session_plan
+    language = session_plan.plan.language
     first = PreviewPage(tr("before the session"), subject_view(None, translate, language))
     thanks = SubjectView("read", translate(SubjectText.THANKS), language=language)
-    *course, end = _pages(made.plan, translate)
+    *course, end = _pages(session_plan.plan, translate)
     return (first, *course, PreviewPage(tr("an answer was given"), thanks), end)
 
 
 def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
-    found: dict[str, SubjectView] = {}
+    pages: dict[str, SubjectView] = {}
     session: SessionState = session_begun(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
     step = machine.start(plan)
     while not isinstance(step[0], states.Ended):
@@ -62,11 +62,11 @@ def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
         if isinstance(state, states.Settling):
             session = replace(session, phase="settling")
         if session.phase in OF_A_BLOCK or session.phase in NAMES:
-            found.setdefault(_name(session), replace(subject_view(session, translate), key=(len(found) + 1, 1)))
+            pages.setdefault(_name(session), replace(subject_view(session, translate), key=(len(pages) + 1, 1)))
         step = machine.advance(state, _next_event(state))
-    found[NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
-    found[NAMES["closing"]] = found.pop(NAMES["closing"])  # the last one
-    return tuple(PreviewPage(tr(name), view) for name, view in found.items())
+    pages[NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
+    pages[NAMES["closing"]] = pages.pop(NAMES["closing"])  # the last one
+    return tuple(PreviewPage(tr(name), view) for name, view in pages.items())
 
 
 def _name(session: SessionState) -> str:

@@ -46,8 +46,8 @@ def _of_the_session(state: AppState, message: Message) -> AppState:
             return replace(state, session=None)
         case m.Failed():
             return replace(state, failed=message)
-        case m.Gone(asked, sentence):
-            return replace(state, gone=None if asked else sentence)
+        case m.Gone(requested, sentence):
+            return replace(state, gone=None if requested else sentence)
         case _:
             return state
 

@@ -105,19 +105,19 @@ def stroke_quality(
     analysis = analyse_blocks([(trial, block)], plan, info, settings or AnalysisSettings())
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
-    told = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in WORDS]
-    found = [(flaw.grade, _words(flaw), flaw.sentence, ADVICE.get(flaw.name, "")) for flaw in told]
+    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in WORDS]
+    remarks = [(flaw.grade, _words(flaw), flaw.sentence, ADVICE.get(flaw.name, "")) for flaw in mentioned]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
         at_length = tr(
             "The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=100 * (1 - fell)
         )
-        refusals = sum(grade == "refused" for grade, *_ in found)
-        found.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
-    words = list(dict.fromkeys(short for _, short, _, _ in found))
-    sentences = [at_length for _, _, at_length, _ in found]
-    advice = found[0][3] if found else ""
-    grades = {flaw.grade for flaw in told}
+        refusals = sum(grade == "refused" for grade, *_ in remarks)
+        remarks.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
+    words = list(dict.fromkeys(short for _, short, _, _ in remarks))
+    sentences = [at_length for _, _, at_length, _ in remarks]
+    advice = remarks[0][3] if remarks else ""
+    grades = {flaw.grade for flaw in mentioned}
     grade = "refused" if "refused" in grades else "doubtful" if words else "good"
     if stroke is None:
         known = tuple(words) or (WORDS[FlawName.NO_STROKE],)
@@ -136,7 +136,7 @@ def stroke_quality(
         stroke.normal_force,
         advice,
         _picture(stroke),
-        bool(advice) and found[0][0] != "note",
+        bool(advice) and remarks[0][0] != "note",
     )
 
 

@@ -125,9 +125,9 @@ def _search_words(bench: BenchState) -> str:
         return tr("Looking for transducers.")
     if not bench.searched:
         return ""
-    if not bench.found:
+    if not bench.devices:
         return tr("No transducer answered. Check power and cable, or type an address, such as net-ft://192.168.1.1.")
-    return tr("Found {count}: choose from the list.", count=len(bench.found))
+    return tr("Found {count}: choose from the list.", count=len(bench.devices))
 
 
 def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], str]:
@@ -161,9 +161,9 @@ def _lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wrong"], s
 def _rate(bench: BenchState) -> str:
     if bench.info is None:
         return "–"
-    asked = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
+    rate = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
     measured = f"{bench.rate:.0f}" if isfinite(bench.rate) else "–"
-    return tr("{measured} Hz (set {asked})", measured=measured, asked=asked)
+    return tr("{measured} Hz (set {asked})", measured=measured, asked=rate)
 
 
 def _counters(bench: BenchState) -> tuple[tuple[str, str], ...]:
@@ -232,9 +232,9 @@ def _nmm(torque: float) -> str:
 
 def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:
     rows = [DeviceRow("sim:", tr("Simulated bench"), tr("always there"))]
-    for found in bench.found:
-        if found.info is not None:
-            info = found.info
+    for device in bench.devices:
+        if device.info is not None:
+            info = device.info
             detail = tr("serial {serial} · {source}", serial=info.serial, source=info.calibration.source)
-            rows.append(DeviceRow(found.uri, info.model, detail))
+            rows.append(DeviceRow(device.uri, info.model, detail))
     return tuple(rows)

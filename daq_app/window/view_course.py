@@ -34,7 +34,7 @@ class PlanRow:
     kind: Literal["block", "done", "current", "coming", "skipped"]
     mark: str  # shape that tells the kind without colour
     name: str
-    found: str = ""  # what came of it
+    outcome: str = ""  # what came of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class CourseView:
     primary: Button | None
     direction: int  # of the stroke to be made: +1 away from the subject, -1 towards, 0 where none is in hand
     timer: str  # how long it has been waited for what is asked
-    told: str
+    notice: str
     rows: tuple[PlanRow, ...]
     tiles: tuple[Tile, ...]
     stroke: StrokeView
@@ -81,7 +81,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
         timer="" if over else _clock(now - session.since),
-        told=tr("It is kept in {folder}", folder=session.folder) if over else session.told or _undo_words(session),
+        notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_words(session),
         rows=_rows(session),
         tiles=tiles(session),
         stroke=stroke,
@@ -192,7 +192,7 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
 
 
 def _answer_sentence(session: SessionState, code: str) -> str:
-    match session.asked:
+    match session.command:
         case steps.AskNumber():
             return tr("The subject gives sample {code} a number.", code=code)
         case steps.AskChoice(first, second):
@@ -207,13 +207,13 @@ def _answer_sentence(session: SessionState, code: str) -> str:
 
 def _no_answer_button(session: SessionState) -> Button:
     """Return the button for a subject who cannot say; while a number is due, 0 is a digit of it."""
-    key = "" if isinstance(session.asked, steps.AskNumber) else "0"
-    return Button(tr("No answer"), key, session.phase == "scoring", _no_answer(session.asked))
+    key = "" if isinstance(session.command, steps.AskNumber) else "0"
+    return Button(tr("No answer"), key, session.phase == "scoring", _no_answer(session.command))
 
 
-def _no_answer(asked: steps.Command | None) -> steps.Event | None:
+def _no_answer(command: steps.Command | None) -> steps.Event | None:
     """Return the event of a subject who cannot say."""
-    match asked:
+    match command:
         case steps.AskScore():
             return steps.Scored(None)
         case steps.AskNumber():
@@ -225,7 +225,7 @@ def _no_answer(asked: steps.Command | None) -> steps.Event | None:
 
 
 def _rest(session: SessionState) -> tuple[str, Button]:
-    duration = session.asked.duration if isinstance(session.asked, steps.AskRest) else None
+    duration = session.command.duration if isinstance(session.command, steps.AskRest) else None
     by_itself = "" if duration is None else tr(" It goes on by itself after {duration:g} s.", duration=duration)
     return tr("The subject rests.{by_itself}", by_itself=by_itself), Button(tr("Go on"), "Space", sends=steps.Resume())
 
@@ -288,14 +288,14 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
     if trial.outcome == "coming":
         return PlanRow("coming", " ", name)
     shown = session.plan.shown.experimenter
-    found: list[str] = []
+    results: list[str] = []
     if trial.quality is not None and "forces" in shown:
-        found.append(_mu(trial.quality))
+        results.append(_mu(trial.quality))
     if trial.answer is not None and "answer" in shown:
-        found.append(trial.answer)
+        results.append(trial.answer)
     if trial.quality is not None and trial.quality.words:
-        found.append("!")
-    return PlanRow("done", "✓", name, "   ".join(found))
+        results.append("!")
+    return PlanRow("done", "✓", name, "   ".join(results))
 
 
 def _mu(quality: Quality) -> str:

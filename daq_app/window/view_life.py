@@ -18,13 +18,13 @@ def life_rows(info: TransducerInfo | None, life: Life | None) -> tuple[tuple[str
         why = tr("not kept while simulated") if info is not None and info.simulated else "–"
         overloads = "–" if life is None else _overloads(life)
         return tuple(zip(NAMES, (why, "–", "–", overloads), strict=True))
-    told = (
+    texts = (
         tr("{count} since {since}", count=life.zeros, since=life.since),
         "–" if life.zeros == 1 else tr("{drift} since the first", drift=greatest(life.drift)),
         tr("{noise} usually", noise=greatest(life.noise)),
         _overloads(life),
     )
-    return tuple(zip(NAMES, told, strict=True))
+    return tuple(zip(NAMES, texts, strict=True))
 
 
 def _overloads(life: Life) -> str:

@@ -36,7 +36,7 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
         return ModelWords(
             tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics])), "none"
         )
-    told = tr(
+    known = tr(
         "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
         kpa=_kpa(float(said.sed[-1])),
         errors=errors_words(None),
@@ -44,9 +44,9 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
     )
     if said.instead[-1]:
         return ModelWords(
-            tr("{told}small strain: these forces are beyond the reach of finite strain", told=told), "instead"
+            tr("{told}small strain: these forces are beyond the reach of finite strain", told=known), "instead"
         )
-    return ModelWords(told + tr(KINEMATICS[said.kinematics]), "provisional")
+    return ModelWords(known + tr(KINEMATICS[said.kinematics]), "provisional")
 
 
 def _of_settled(settled: Settled) -> str:

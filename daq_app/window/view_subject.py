@@ -67,11 +67,11 @@ class _Page:
             case "idle":
                 return self._read(self.say(Text.WELCOME), self.say(Text.BEGINS))
             case "mounting" | "taring":
-                return self._read(self.say(Text.WAIT), self._told(self.say(Text.HANDS_OFF)))
+                return self._read(self.say(Text.WAIT), self._notice(self.say(Text.HANDS_OFF)))
             case "ready" | "stroking":
                 force = session.plan.forces and "forces" in shown
                 instruction = session.block.instruction if session.block and "instruction" in shown else ""
-                return replace(self._read(self._stroke(), self._told(instruction)), force=force)
+                return replace(self._read(self._stroke(), self._notice(instruction)), force=force)
             case "scoring":
                 return self._question()
             case "settling":
@@ -93,7 +93,7 @@ class _Page:
         allowed = 1 if trial is None else self.session.plan.strokes_allowed(trial.trial)
         return self.say(Text.STROKE) if allowed == 1 else self.say(Text.STROKES).format(number=allowed)
 
-    def _told(self, to_do: str) -> str:
+    def _notice(self, to_do: str) -> str:
         """Return what to do with the finger, and what the protocol lets the subject know beside it."""
         session = self.session
         shown, trial = session.plan.shown.subject, session.of(session.trial)
@@ -111,13 +111,13 @@ class _Page:
         if trial is None:
             return self._read(self.say(Text.WAIT))
         key = (trial.trial.number, trial.takes)
-        match self.session.asked:
+        match self.session.command:
             case steps.AskScore(_, ends, ticks, question):
-                asked = question or self._judge(trial.trial.stimulus.descriptor)
-                return SubjectView("line", asked, "", ends, ticks, key, hand)
+                title = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("line", title, "", ends, ticks, key, hand)
             case steps.AskNumber(_, question):
-                asked = question or self._judge(trial.trial.stimulus.descriptor)
-                return SubjectView("number", asked, self.say(Text.NUMBER), key=key, hand=hand)
+                title = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("number", title, self.say(Text.NUMBER), key=key, hand=hand)
             case steps.AskChoice(_, _, question):
                 return SubjectView("choice", question or self.say(Text.WHICH), "", key=key, hand=hand)
             case _:

@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from daq_app.tablet import server as module
-from daq_app.tablet.messages import Force, Given, Hello
+from daq_app.tablet.messages import AnswerGiven, Force, Hello
 from daq_app.tablet.server import NoTabletServer, TabletServer
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")
@@ -155,8 +155,8 @@ def test_nonsense_ends_the_conversation_and_nothing_else(server, text):
     with socket(server, token=token) as talk:
         assert said(talk)["type"] == "welcome"
         talk.send(json.dumps({"type": "given", "key": "a", "acts": [[1.0, "press", 5.0, "pen"]], "sent": 2.0}))
-        until(lambda: isinstance(server.heard[-1], Given))
-    assert isinstance(server.heard[-1], Given)
+        until(lambda: isinstance(server.heard[-1], AnswerGiven))
+    assert isinstance(server.heard[-1], AnswerGiven)
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,7 @@ def test_a_redo_that_is_undone_brings_back_stroke_and_score_until_the_next_onset
     session = after(*done, *again).session
     view = course_view(session, BenchState(), 0.0)
     assert (view.undo.label, view.undo.key, view.undo.enabled) == ("Undo redo 1", "Ctrl+Z", True)
-    assert view.told.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
+    assert view.notice.startswith(f"Done again: trial 1 ({FIRST.stimulus.code}). Ctrl+Z undoes that")
     undone = (
         logged("undo_redo", 1),
         logged("take_discarded", 1, take=2, reason="the redo was undone"),

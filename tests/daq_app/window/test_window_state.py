@@ -81,18 +81,18 @@ def test_the_plan_shows_what_is_done_in_hand_and_coming():
     )
     rows = derive_view(after(*messages)).course.rows
     assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
-    assert "µ 0.44" in rows[1].found
-    assert "score 38" in rows[1].found
+    assert "µ 0.44" in rows[1].outcome
+    assert "score 38" in rows[1].outcome
     assert len(rows) == 2 + 10
 
 
 def test_a_skipped_and_an_unanswered_trial_are_told_apart():
     skipped = (*READY, logged("skip", 1, reason="torn"), logged("take_discarded", 1, take=1, reason="skipped: torn"))
     rows = derive_view(after(*skipped, steps.AskMount(SECOND))).course.rows
-    assert (rows[1].kind, rows[1].found) == ("skipped", "skipped")
+    assert (rows[1].kind, rows[1].outcome) == ("skipped", "skipped")
     unanswered = (*SCORE, logged("scored", 1, score=None), logged("take_kept", 1, take=1), steps.AskMount(SECOND))
     rows = derive_view(after(*unanswered)).course.rows
-    assert (rows[1].kind, rows[1].found) == ("done", "no answer")
+    assert (rows[1].kind, rows[1].outcome) == ("done", "no answer")
 
 
 def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
@@ -106,7 +106,7 @@ def test_a_redone_trial_loses_its_score_and_says_which_take_it_is():
     state = after(*again)
     assert state.session.trials[0].answer is None
     row = derive_view(state).course.rows[1]
-    assert (row.kind, row.found) == ("current", "take 2")
+    assert (row.kind, row.outcome) == ("current", "take 2")
 
 
 def test_a_flawed_stroke_is_redone_by_one_key_whose_reason_is_what_was_found():
@@ -339,4 +339,4 @@ def test_a_session_that_goes_on_shows_what_was_done_before():
     begun = m.SessionBegun("recordings/P07", PLAN, "people", None, 0, 1.0, before)
     rows = derive_view(after(m.Device(INFO, None), begun, steps.AskMount(SECOND))).course.rows
     assert [row.kind for row in rows[:4]] == ["block", "done", "current", "coming"]
-    assert rows[1].found == "score 40"
+    assert rows[1].outcome == "score 40"
