@@ -47,11 +47,12 @@ def _work(folder: Path) -> None:
     work = Work(folder, say)
     work.go_on()
     print(
-        f"trials and strokes are known after {known['Found']:4.2f} s, the first finger after {known['Answered']:.2f} s"
+        f"trials and strokes are known after {known['ReportReady']:4.2f} s, "
+        f"the first finger after {known['Answered']:.2f} s"
     )
     answers = sum(isinstance(one, m.Answered) for one in said)
     print(f"all {answers} trials are answered after {time.process_time() - begun:4.2f} s")
-    report = next(one.report for one in said if isinstance(one, m.Found))
+    report = next(one.report for one in said if isinstance(one, m.ReportReady))
     stroke = next(s for s in report.strokes if s.steady is not None)
     for words, request in (
         (

@@ -19,7 +19,7 @@ ONLY_IN_SOLVER = {"evidence"}
 HELD_NODES = {"held"}  # of a mesh: driven nodes, as scripts name them
 # A value that has a kind is not called by what happened to it. Other folders join as their names are mended.
 PARTICIPLES = {"asked", "beside", "both", "felt", "found", "given", "held", "made", "others", "told"}
-UNORDERED = ("daq_app/analyst", "daq_app/qt")
+UNORDERED = ("daq_app/qt",)
 # Modules that read what can run, and calls that run what was read.
 RUNS = frozenset({"pickle", "cPickle", "dill", "cloudpickle", "joblib", "marshal", "shelve", "yaml"})
 CALLS = frozenset({"eval", "exec", "compile", "__import__", "read_pickle"})

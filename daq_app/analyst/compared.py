@@ -54,4 +54,4 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
     for experiment in report.experiments:
         for score in experiment.scores:
             gathered[experiment.name, score.index]["score"].append(score.mean)
-    return {key: {name: sum(v) / len(v) for name, v in found.items()} for key, found in gathered.items()}
+    return {key: {name: sum(v) / len(v) for name, v in values.items()} for key, values in gathered.items()}

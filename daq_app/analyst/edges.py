@@ -17,7 +17,7 @@ class Placed:
 
     edge: Edge
     time: float  # [s, device time]
-    found: bool  # False where there is none yet and this is only where one could be
+    present: bool  # False where there is none yet and this is only where one could be
     decided: str  # who decided it and why; "" where the analysis found it
 
 

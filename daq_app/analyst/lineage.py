@@ -25,12 +25,12 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
     row = chosen(state)
     if row is None:
         return ()
-    made = [Link(state.folder.name, "session", str(state.folder))]
+    links = [Link(state.folder.name, "session", str(state.folder))]
     if row.trial is not None:
-        made.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
+        links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
     said, stroke = row.prediction, row.stroke
     if said is not None and said.sed is not None:
-        made.append(
+        links.append(
             Link(
                 f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
                 "prediction",
@@ -38,11 +38,11 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
             )
         )
     if stroke is None:
-        return tuple(made)
-    made.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))
+        return tuple(links)
+    links.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))
     if stroke.steady is not None:
         begin, end = stroke.steady
-        made.append(
+        links.append(
             Link(
                 tr("steady window {begin:.3f} to {end:.3f} s", begin=begin, end=end),
                 "window",
@@ -51,17 +51,17 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         )
     read = state.read
     if read is not None and read.stroke == stroke.number:
-        made.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
+        links.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
     else:
-        made.append(
+        links.append(
             Link(tr("raw readings"), "readings", tr("counts, sequence and device counter, as they were recorded"))
         )
-    return tuple(made)
+    return tuple(links)
 
 
-def _friction(stroke: StrokeFinding, given: tuple[float, str] | None) -> Link:
-    if given is not None:
-        mu, rule = given
+def _friction(stroke: StrokeFinding, friction: tuple[float, str] | None) -> Link:
+    if friction is not None:
+        mu, rule = friction
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
         return Link(f"µ {mu:.3f}{tau}", "friction", tr("the model was given the {rule}", rule=tr(rule)))
     if stroke.mu_dynamic is None:

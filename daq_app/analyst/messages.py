@@ -34,7 +34,7 @@ class History(Struct, frozen=True):
     undone: tuple[str, ...] = ()
 
 
-class Found(Struct, frozen=True):
+class ReportReady(Struct, frozen=True):
     """What is known of the session now: its strokes alone, or the model's answers too."""
 
     stage: Literal["analysed", "predicted"]
@@ -178,5 +178,5 @@ class Stop(Struct, frozen=True):
 
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
-Said = Step | Found | Answered | Drawn | Filmed | Read | Compared | Written | Decided | Problem | Cancelled | Idle
+Said = Step | ReportReady | Answered | Drawn | Filmed | Read | Compared | Written | Decided | Problem | Cancelled | Idle
 Message = Ask | Said | Respond

@@ -14,7 +14,7 @@ from solver.response.fields import Fields, Sketch, Still, fields_of, most_squeez
 
 MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn before progress is told
-Told = Callable[[float], bool]
+Progress = Callable[[float], bool]
 
 
 def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
@@ -23,22 +23,22 @@ def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
     return Finger(_parts(sketch), _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc)
 
 
-def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, told: Told) -> Film:
-    """Return the states of a way. Raises Cancelled where `told` returns False."""
-    made: list[Still] = []
+def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
+    """Return the states of a way. Raises Cancelled where `progress` returns False."""
+    pictures: list[Still] = []
     for begin in range(0, len(instants), AT_ONCE):
-        made += stills(way.finger, instants[begin : begin + AT_ONCE], sketch)
-        if not told(min(1.0, (begin + AT_ONCE) / len(instants))):
+        pictures += stills(way.finger, instants[begin : begin + AT_ONCE], sketch)
+        if not progress(min(1.0, (begin + AT_ONCE) / len(instants))):
             raise Cancelled
-    frames = tuple(_frame(still.fields, still.skin, still.row) for still in made)
-    return Film(_parts(sketch), frames, tuple(_instant(still) for still in made), ROW)
+    frames = tuple(_frame(still.fields, still.skin, still.row) for still in pictures)
+    return Film(_parts(sketch), frames, tuple(_instant(still) for still in pictures), ROW)
 
 
-def lost_film(way: Way, sketch: Sketch, told: Told) -> tuple[Film, str]:
+def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     """Return the states up to where a solve that has no answer came, and what stopped it there."""
-    instants, failure = way_until(way.scene, way.finger, told)
+    instants, failure = way_until(way.scene, way.finger, progress)
     every = max(1, -(-len(instants) // MOST))
-    film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, told)
+    film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, progress)
     if failure is None:
         return film, ""
     last = instants[-1]

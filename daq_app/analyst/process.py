@@ -36,7 +36,7 @@ class _Server:
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
-        self._asked: deque[m.Ask] = deque()
+        self._requests: deque[m.Ask] = deque()
         self._halted = False  # somebody stopped the model's answers
 
     def serve(self, folder: Path) -> None:
@@ -51,23 +51,23 @@ class _Server:
         while True:
             self._take()
             going_on = work.unfinished and not self._halted
-            if not self._asked and not going_on:
+            if not self._requests and not going_on:
                 self._say(m.Idle())
-                self._asked.append(self._connection.recv())
-            asked = self._asked.popleft() if self._asked else None
+                self._requests.append(self._connection.recv())
+            request = self._requests.popleft() if self._requests else None
             try:
-                if asked is None:
+                if request is None:
                     work.go_on()
-                elif isinstance(asked, m.Stop):
+                elif isinstance(request, m.Stop):
                     self._halted = True
                     self._say(m.Cancelled())
                 else:
-                    self._halted = self._halted and not isinstance(asked, m.GoOn | m.Move | m.Undo)
-                    work.do(asked)
+                    self._halted = self._halted and not isinstance(request, m.GoOn | m.Move | m.Undo)
+                    work.do(request)
             except _cancelled():
                 pass  # what it was left for is the next that is asked
             except Exception as error:  # noqa: BLE001  likewise
-                self._halted = self._halted or asked is None
+                self._halted = self._halted or request is None
                 self._say(m.Problem(sentence_of(error)))
 
     def _say(self, message: m.Said) -> None:
@@ -75,16 +75,16 @@ class _Server:
 
     def _take(self) -> None:
         while self._connection.poll():
-            self._asked.append(self._connection.recv())
+            self._requests.append(self._connection.recv())
 
     def _urgent(self) -> bool:
         """Say whether something waits that does not bear to; it comes first then."""
         self._take()
-        stops = [asked for asked in self._asked if isinstance(asked, m.Stop)]
+        stops = [request for request in self._requests if isinstance(request, m.Stop)]
         if stops:
-            self._asked.clear()
-            self._asked.append(stops[0])
-        return any(isinstance(asked, URGENT) for asked in self._asked)
+            self._requests.clear()
+            self._requests.append(stops[0])
+        return any(isinstance(request, URGENT) for request in self._requests)
 
 
 def _cancelled() -> type[Exception]:
@@ -125,17 +125,17 @@ class Analyst:
             said.append(m.Cancelled())
         return tuple(said)
 
-    def ask(self, asked: m.Ask) -> None:
+    def ask(self, request: m.Ask) -> None:
         """Ask for something; where the work was ended before, it begins anew and does that first."""
-        if isinstance(asked, m.Stop):
+        if isinstance(request, m.Stop):
             self._stopped = time.monotonic()
         if self._connection is None:
-            if isinstance(asked, m.Stop):
+            if isinstance(request, m.Stop):
                 return
             self._start()
         assert self._connection is not None
         with suppress(OSError):  # `poll` finds that it is gone
-            self._connection.send(asked)
+            self._connection.send(request)
 
     def close(self) -> None:
         """End the work."""

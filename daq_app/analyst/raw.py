@@ -92,9 +92,9 @@ class RawFile:
                 self._before[int(block.sequence[0]), int(block.received_ns[0])] = count
                 count += len(block)
         for block in self._recording.blocks(between=(received_ns, received_ns + 1)):
-            found = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
-            if len(found):
-                return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(found[0])
+            matches = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
+            if len(matches):
+                return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(matches[0])
         return None
 
 

@@ -69,11 +69,11 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
         return None, ""
     mine, theirs = (_of_stimulus(report, row.prediction) for report in (state.report, other.report))
     place = [said.stroke for said in mine].index(row.prediction.stroke)
-    found = theirs[place] if place < len(theirs) else None
-    finger = None if found is None else other.fingers.get((found.trial, found.stroke))
-    if found is None or found.sed is None or finger is None:
+    theirs_row = theirs[place] if place < len(theirs) else None
+    finger = None if theirs_row is None else other.fingers.get((theirs_row.trial, theirs_row.stroke))
+    if theirs_row is None or theirs_row.sed is None or finger is None:
         return None, tr("{session} has no answer to this stimulus.", session=other.report.session)
-    return finger, " · ".join((other.report.session, sed_words(other.report, found), _contact_words(finger.frame)))
+    return finger, " · ".join((other.report.session, sed_words(other.report, theirs_row), _contact_words(finger.frame)))
 
 
 def _of_stimulus(report: Report, of: PredictionFinding) -> list[PredictionFinding]:

@@ -35,14 +35,14 @@ def words_of(row: Row) -> str:
 
 def marks_of(row: Row) -> str:
     """Return what the marks of a line mean, for who hovers and for screen readers."""
-    told: list[str] = []
+    remarks: list[str] = []
     if row.stroke is not None and row.stroke.flaws:
-        told.append(tr("! has flaws: ") + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
+        remarks.append(tr("! has flaws: ") + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
     if row.stroke is not None and row.stroke.decided:
-        told.append(tr("✎ somebody decided something about it"))
+        remarks.append(tr("✎ somebody decided something about it"))
     if row.prediction is not None and row.prediction.sed is None:
-        told.append(tr("✗ the model has no SED for it"))
-    return "; ".join(told)
+        remarks.append(tr("✗ the model has no SED for it"))
+    return "; ".join(remarks)
 
 
 def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
@@ -50,11 +50,11 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
     row = chosen(state)
     if row is None:
         return ()
-    told: list[tuple[str, str]] = []
+    lines: list[tuple[str, str]] = []
     if (stroke := row.stroke) is not None:
         why = stroke.reasons
         interval = "" if stroke.mu_interval is None else f"  [{stroke.mu_interval[0]:.3f}, {stroke.mu_interval[1]:.3f}]"
-        told += [
+        lines += [
             (tr("µ over the steady window"), _value(stroke.mu_dynamic, "{:.3f}" + interval, why, "mu_dynamic")),
             (tr("µ at its greatest"), _value(stroke.mu_max, "{:.3f}", why, "mu_max")),
             (tr("traction bound"), _value(_kpa(stroke.tau_max), "{:.1f} kPa", why, "tau_max")),
@@ -63,7 +63,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
         ]
     if (said := row.prediction) is not None:
-        told += [
+        lines += [
             (
                 tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
                 sed_with_errors(state.report, said) if said.sed is not None else _value(None, "", said.reasons, "sed"),
@@ -85,25 +85,25 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             ),
         ]
     elif state.stage == "analysed":
-        told.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
-    return tuple(told)
+        lines.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
+    return tuple(lines)
 
 
 def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[str, str]]:
     """Return the chosen quantity with its errors; nothing where it is the SED, which always stands."""
     shown = shown_response(state.response)
-    found = shown.of(said)
-    if shown.name == SED.name or not found:
+    response = shown.of(said)
+    if shown.name == SED.name or not response:
         return []
-    value, *error = found
+    value, *error = response
     mesh = error[0] / abs(value) if error and value else None
-    told = shown.text(shown.factor * value) + errors_words(mesh)
+    text = shown.text(shown.factor * value) + errors_words(mesh)
     name = tr(
         "{response} {condition}, averaged over the ending",
         response=tr(shown.label),
         condition=condition(state.report, said),
     )
-    return [(name, told)]
+    return [(name, text)]
 
 
 def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
@@ -124,17 +124,19 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     """
     shown = shown_response(response)
     pairs = [(said, shown.of(said)) for said in (() if report is None else report.predictions)]
-    found = [(said, value) for said, value in pairs if value]
-    if not found:
+    known = [(said, value) for said, value in pairs if value]
+    if not known:
         return ""
-    mesh = [value[1] / abs(value[0]) for _, value in found if len(value) > 1 and value[0]]
-    told = errors_words(max(mesh) if len(mesh) == len(found) else None, _effect(report) if response == SED.name else "")
-    conditions = {condition(report, said) for said, _ in found}
+    mesh = [value[1] / abs(value[0]) for _, value in known if len(value) > 1 and value[0]]
+    errors = errors_words(
+        max(mesh) if len(mesh) == len(known) else None, _effect(report) if response == SED.name else ""
+    )
+    conditions = {condition(report, said) for said, _ in known}
     return tr(
         "{response} {condition}{errors}",
         response=tr(shown.label),
         condition=" / ".join(sorted(conditions)),
-        errors=told,
+        errors=errors,
     )
 
 
@@ -186,10 +188,10 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     """Return what the model holds of the chosen trial, and of all: name, value, remark."""
     row = chosen(state)
     said = None if row is None else row.prediction
-    told: list[tuple[str, str, str]] = []
+    facts: list[tuple[str, str, str]] = []
     if said is not None:
         way = "" if said.direction is None else tr("{way}, as measured", way=tr(WAYS[said.direction]))
-        told += [
+        facts += [
             (tr("µ of this trial"), _value(said.mu, "{:.4f}", said.reasons, "mu"), tr(said.mu_rule)),
             (tr("τ max of this trial"), _value(_kpa(said.tau_max), "{:.2f} kPa", said.reasons, "tau_max"), ""),
             (
@@ -201,8 +203,8 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
         ]
     report = state.report
     if report is not None:
-        told += [(fact.name, fact.value, fact.remark) for fact in (*report.modelled, *report.left_out)]
-    return tuple(told)
+        facts += [(fact.name, fact.value, fact.remark) for fact in (*report.modelled, *report.left_out)]
+    return tuple(facts)
 
 
 def row_words(state: AnalystState) -> tuple[str, ...]:
@@ -222,10 +224,10 @@ def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
         "speed": tr("speed over time"),
         "response": tr("response over time"),
     }
-    made = [("course", tr("forces over the whole recording"))]
+    names = [("course", tr("forces over the whole recording"))]
     for kind, words in kinds.items():
-        made += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
-    return tuple(made)
+        names += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
+    return tuple(names)
 
 
 def points(state: AnalystState) -> tuple[Point, ...]:
@@ -234,16 +236,16 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     if report is None:
         return ()
     listed, shown = rows(state), shown_response(state.response)
-    made: list[Point] = []
+    points: list[Point] = []
     for experiment in report.experiments:
         scores = {score.index: score.mean for score in experiment.scores}
         for number, row in enumerate(listed):
             said = row.prediction
-            found = None if said is None else shown.of(said)
-            if said is None or not found or said.experiment != experiment.name or said.index not in scores:
+            response = None if said is None else shown.of(said)
+            if said is None or not response or said.experiment != experiment.name or said.index not in scores:
                 continue
-            made.append(Point(experiment.name, said.index, scores[said.index], shown.factor * found[0], number))
-    return tuple(made)
+            points.append(Point(experiment.name, said.index, scores[said.index], shown.factor * response[0], number))
+    return tuple(points)
 
 
 def progress_words(step: Step | None) -> str:

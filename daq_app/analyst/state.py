@@ -30,7 +30,7 @@ class AnalystState:
     read: m.Read | None = None  # likewise
     compared: m.Compared | None = None
     step: m.Step | None = OPENING  # None: nothing is being done
-    told: str = ""  # how the last work ended
+    outcome: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
     row: int = 0  # that is chosen
     response: str = SED.name  # the quantity at the ending that is held against the scores
@@ -53,24 +53,24 @@ class Row:
 def fold(state: AnalystState, message: m.Message) -> AnalystState:
     """Return the state after a message; what was known stays until it is known anew."""
     match message:
-        case m.Found():
-            return _found(state, message)
+        case m.ReportReady():
+            return _on_report(state, message)
         case m.Answered():
             return _answered(state, message)
         case m.Drawn():
             return replace(state, drawn={**state.drawn, message.name: message})
         case m.Filmed():
-            return replace(state, film=message, told="")
+            return replace(state, film=message, outcome="")
         case m.Read():
             return replace(state, read=message)
         case m.Respond(response):
             return replace(state, response=response)
         case m.Compared():
-            return replace(state, compared=message, told="")
+            return replace(state, compared=message, outcome="")
         case m.Step() | m.Idle() | m.Written() | m.Decided() | m.Problem() | m.Cancelled():
             return _gone_on(state, message)
         case _:
-            return _asked(state, message)
+            return _on_request(state, message)
 
 
 def _gone_on(
@@ -82,31 +82,31 @@ def _gone_on(
         case m.Idle():
             return replace(state, step=None)
         case m.Written(path):
-            return replace(state, told=tr("Written: {path}", path=path))
+            return replace(state, outcome=tr("Written: {path}", path=path))
         case m.Decided(sentence):
-            return replace(state, told=sentence)
+            return replace(state, outcome=sentence)
         case m.Problem(sentence):
-            return replace(state, step=None, told=sentence)
+            return replace(state, step=None, outcome=sentence)
         case m.Cancelled():
             kept = "" if state.report is None else tr(" What was done before is kept.")
-            return replace(state, step=None, told=tr("Stopped.{kept}", kept=kept), halted=state.stage != "predicted")
+            return replace(state, step=None, outcome=tr("Stopped.{kept}", kept=kept), halted=state.stage != "predicted")
 
 
-def _asked(state: AnalystState, asked: m.Ask) -> AnalystState:
-    match asked:
+def _on_request(state: AnalystState, request: m.Ask) -> AnalystState:
+    match request:
         case m.Choose(row):
             row = max(0, min(row, len(rows(state)) - 1))
-            return state if row == state.row else replace(state, row=row, told="")  # which was of the one before
+            return state if row == state.row else replace(state, row=row, outcome="")  # which was of the one before
         case m.Write(what, path):
-            return replace(state, step=m.Step(0.0, tr("writing {what} to {path}", what=what, path=path)), told="")
+            return replace(state, step=m.Step(0.0, tr("writing {what} to {path}", what=what, path=path)), outcome="")
         case m.GoOn():
-            return replace(state, step=m.Step(0.0, tr("predicting")), told="", halted=False)
+            return replace(state, step=m.Step(0.0, tr("predicting")), outcome="", halted=False)
         case m.Stop():
             return replace(state, step=m.Step(0.0, tr("stopping")))
         case m.ShowReadings():
             return state
         case _:
-            return replace(state, step=m.Step(0.0, tr("working")), told="")
+            return replace(state, step=m.Step(0.0, tr("working")), outcome="")
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:
@@ -126,11 +126,11 @@ def chosen(state: AnalystState) -> Row | None:
     return listed[state.row] if state.row < len(listed) else None
 
 
-def _found(state: AnalystState, found: m.Found) -> AnalystState:
+def _on_report(state: AnalystState, message: m.ReportReady) -> AnalystState:
     """Take a report; answers to strokes that did not change since stay until they are given anew."""
-    report, before = found.report, state.report
+    report, before = message.report, state.report
     fingers = state.fingers
-    if found.stage == "analysed" and before is not None:
+    if message.stage == "analysed" and before is not None:
         same = {_measured(stroke) for stroke in report.strokes} & {_measured(stroke) for stroke in before.strokes}
         numbers = {number for number, _ in same}
         kept = tuple(p for p in before.predictions if p.stroke in numbers)
@@ -138,9 +138,9 @@ def _found(state: AnalystState, found: m.Found) -> AnalystState:
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
     after = replace(
         state,
-        stage=found.stage,
+        stage=message.stage,
         report=report,
-        history=found.history,
+        history=message.history,
         version=state.version + 1,
         fingers=fingers,
         drawn={},
@@ -150,16 +150,16 @@ def _found(state: AnalystState, found: m.Found) -> AnalystState:
 
 def _measured(stroke: StrokeFinding) -> tuple[int, object]:
     """Return what the model is given of a stroke, and which it is."""
-    given = (stroke.mu_dynamic, stroke.mu_max, stroke.tau_max, stroke.speed, stroke.direction, stroke.normal_force)
-    return stroke.number, (stroke.trial, given)
+    friction = (stroke.mu_dynamic, stroke.mu_max, stroke.tau_max, stroke.speed, stroke.direction, stroke.normal_force)
+    return stroke.number, (stroke.trial, friction)
 
 
 def _answered(state: AnalystState, answered: m.Answered) -> AnalystState:
     report, finding = state.report, answered.finding
     if report is None:
         return state
-    others = tuple(p for p in report.predictions if (p.trial, p.stroke) != (finding.trial, finding.stroke))
+    rest = tuple(p for p in report.predictions if (p.trial, p.stroke) != (finding.trial, finding.stroke))
     fingers = {key: finger for key, finger in state.fingers.items() if key != (finding.trial, finding.stroke)}
     if answered.finger is not None:
         fingers[finding.trial, finding.stroke] = answered.finger
-    return replace(state, report=replace(report, predictions=(*others, finding)), fingers=fingers)
+    return replace(state, report=replace(report, predictions=(*rest, finding)), fingers=fingers)

@@ -12,8 +12,8 @@ def number_in(text: str) -> float | None:
     >>> number_in("0.440 to 0.453"), number_in("−3.5 %"), number_in("–"), number_in("stroke 3")
     (0.44, -3.5, None, None)
     """
-    found = NUMBER.match(text.strip())
-    return None if found is None else float(found[0].replace("−", "-"))
+    match = NUMBER.match(text.strip())
+    return None if match is None else float(match[0].replace("−", "-"))
 
 
 def sort_key(text: str) -> tuple[bool, float, str]:

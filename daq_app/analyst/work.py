@@ -63,21 +63,21 @@ class Work:
 
     def go_on(self) -> None:
         """Have the model answer, the chosen trial first. Raises Cancelled, and keeps what was answered."""
-        told = self.timed(tr("predicting"))
+        progress = self.timed(tr("predicting"))
         options = _options(self._recording)
         self._prediction = predict(
-            self._analysis, self._recording.plan, options, progress=told, watch=self._answered, first=self._first()
+            self._analysis, self._recording.plan, options, progress=progress, watch=self._answered, first=self._first()
         )
         self._report = findings(self._recording, self._analysis, self._prediction)
-        self._say(m.Found("predicted", self._report, history(read(self._recording.folder))))
+        self._say(m.ReportReady("predicted", self._report, history(read(self._recording.folder))))
 
-    def do(self, asked: m.Ask) -> None:
+    def do(self, request: m.Ask) -> None:
         """Do what was asked, and say what came of it. Raises Cancelled and whatever `sentence_of` knows."""
-        match asked:
+        match request:
             case m.Choose(row):
                 self._chosen = row
             case m.Move():
-                self._move(asked)
+                self._move(request)
             case m.Undo(by, again):
                 self._undo(by, again=again)
             case m.Draw(name):
@@ -89,7 +89,7 @@ class Work:
             case m.Compare(folder):
                 self._compare(Path(folder))
             case m.Write():
-                self._say(m.Written(self._write(asked)))
+                self._say(m.Written(self._write(request)))
             case _:
                 pass
 
@@ -97,7 +97,7 @@ class Work:
         """Return a listener to progress that says part done and time left, and stops for what is urgent."""
         began = said = time.monotonic()
 
-        def told(part: float) -> bool:
+        def report_part(part: float) -> bool:
             nonlocal said
             now = time.monotonic()
             if now - said > 0.05:
@@ -106,27 +106,27 @@ class Work:
                 self._say(m.Step(part, words, left, load_steps))
             return not self._urgent()
 
-        return told
+        return report_part
 
     def _analyse(self) -> None:
         self._say(m.Step(0.0, tr("analysing")))
         self._analysis = analyse(self._recording, stored_settings(self._recording))
         self._prediction = None
         self._report = findings(self._recording, self._analysis)
-        self._say(m.Found("analysed", self._report, history(read(self._recording.folder))))
+        self._say(m.ReportReady("analysed", self._report, history(read(self._recording.folder))))
 
-    def _move(self, asked: m.Move) -> None:
-        stroke = self._report.strokes[asked.stroke - 1]
-        made = append(self._recording, decision_of(stroke, asked.edge, asked.time, asked.by, asked.why))
+    def _move(self, request: m.Move) -> None:
+        stroke = self._report.strokes[request.stroke - 1]
+        record = append(self._recording, decision_of(stroke, request.edge, request.time, request.by, request.why))
         self._analyse()
-        self._say(m.Decided(tr("Recorded: {sentence}", sentence=made.sentence)))
+        self._say(m.Decided(tr("Recorded: {sentence}", sentence=record.sentence)))
 
     def _undo(self, by: str, *, again: bool) -> None:
         decisions = read(self._recording.folder)
         line = brought_back(decisions, by) if again else taken_back(decisions, by)
         if line is None:
             raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
-        made = append(self._recording, line)
+        record = append(self._recording, line)
         self._analyse()
         meant = decision_meant(decisions, line)
         self._say(
@@ -134,7 +134,7 @@ class Work:
                 tr(
                     "{act}, as decision {number}: {sentence}",
                     act=tr("Redone") if again else tr("Undone"),
-                    number=made.number,
+                    number=record.number,
                     sentence=meant.sentence,
                 )
             )
@@ -156,8 +156,8 @@ class Work:
         self._ways[finding.trial, finding.stroke] = row, way
         self._say(m.Answered(finding, self._finger(row.prediction)))
 
-    def _finger(self, found: Prediction | None) -> Finger | None:
-        return None if found is None else finger_of(found, self._sketch(found.mesh, found.scene))
+    def _finger(self, prediction: Prediction | None) -> Finger | None:
+        return None if prediction is None else finger_of(prediction, self._sketch(prediction.mesh, prediction.scene))
 
     def _sketch(self, mesh: Mesh, scene: Scene) -> Sketch:
         if id(mesh) not in self._sketches:
@@ -237,24 +237,24 @@ class Work:
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
-        made: dict[int, Field] = {}
+        fields: dict[int, Field] = {}
         for (_, stroke), (row, _) in self._ways.items():
             field = field_of(row.block or "", row)
             if field is not None and stroke is not None:
-                made[stroke] = field
-        return made
+                fields[stroke] = field
+        return fields
 
     def _film(self, key: m.Key) -> None:
-        found = self._ways.get(key)
-        if found is None:
+        kept = self._ways.get(key)
+        if kept is None:
             raise NothingToShow(tr("The model has no way to show for this trial: it was not solved."))
-        prediction, way = found
+        prediction, way = kept
         if way is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
         sketch = self._sketch(way.finger.geometry.mesh, way.scene)
         if way.march is not None:
-            told = self.timed(tr("drawing the history"), len(way.march))
-            self._filmed = m.Filmed(key, film_of(way, way.march, sketch, told))
+            progress = self.timed(tr("drawing the history"), len(way.march))
+            self._filmed = m.Filmed(key, film_of(way, way.march, sketch, progress))
             self._say(self._filmed)
             return
         if prediction.prediction is not None or way.scene.materials.relax:
@@ -274,7 +274,7 @@ class Work:
         self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))
         recording = _opened(folder)
         analysis = analyse(recording, stored_settings(recording))
-        told = self.timed(tr("predicting {name}", name=folder.name))
+        progress = self.timed(tr("predicting {name}", name=folder.name))
         fingers: dict[m.Key, Finger] = {}
 
         def answered(_number: int, row: TrialPrediction, _way: Way | None) -> None:
@@ -283,38 +283,38 @@ class Work:
                 finding = finding_of(row)
                 fingers[finding.trial, finding.stroke] = finger
 
-        prediction = predict(analysis, recording.plan, _options(recording), progress=told, watch=answered)
+        prediction = predict(analysis, recording.plan, _options(recording), progress=progress, watch=answered)
         self._other = findings(recording, analysis, prediction)
         self._say(m.Compared(str(folder), self._other, fingers))
 
-    def _write(self, asked: m.Write) -> str:
+    def _write(self, request: m.Write) -> str:
         """Write the report, a picture or an export, and return where it is."""
-        path = Path(asked.path)
-        if asked.what.startswith("picture "):
-            return self._write_picture(asked.what.removeprefix("picture "), path)
-        self._say(m.Step(0.0, tr("writing {what}", what=asked.what)))
+        path = Path(request.path)
+        if request.what.startswith("picture "):
+            return self._write_picture(request.what.removeprefix("picture "), path)
+        self._say(m.Step(0.0, tr("writing {what}", what=request.what)))
         if self._prediction is None:
             self.go_on()
         assert self._prediction is not None  # it was just made
-        if asked.what == "report":
+        if request.what == "report":
             from sessions.report import html
 
-            told = self.timed(tr("carrying the uncertainty of friction through"))
+            progress = self.timed(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
-            self._prediction = with_intervals(self._analysis, with_them, progress=told)
+            self._prediction = with_intervals(self._analysis, with_them, progress=progress)
             html.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}
         source = ExportSource(
             self._recording, made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
         )
-        told = self.timed(tr("writing {what}", what=asked.what))
+        progress = self.timed(tr("writing {what}", what=request.what))
 
         def shown(part: float) -> None:
-            if not told(part):
+            if not progress(part):
                 raise Cancelled
 
-        return str(export(source, asked.what, path, shown))
+        return str(export(source, request.what, path, shown))
 
     def _write_picture(self, name: str, path: Path) -> str:
         from sessions.atomic_file import write_whole

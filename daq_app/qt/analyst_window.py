@@ -228,7 +228,7 @@ class AnalystWindow(QMainWindow):
         busy = state.step is not None
         self.progress.setVisible(busy)
         self.progress.setValue(0 if state.step is None else round(100 * state.step.part))
-        self._words.show_text(progress_words(state.step) or state.told)
+        self._words.show_text(progress_words(state.step) or state.outcome)
         self.stop.setEnabled(busy)
         self.go_on.setVisible(state.halted and not busy)
         for made in (self.report, self.export):

@@ -76,9 +76,9 @@ class EdgeHandle(QPushButton):
             self.setAccessibleName(tr("{name}: no stroke", name=name))
             return
         at = f"{self._time - self._origin:.3f}"
-        mark = "✎ " if placed.decided else "" if placed.found else "○ "
+        mark = "✎ " if placed.decided else "" if placed.present else "○ "
         self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
-        state = placed.decided or (tr("as found") if placed.found else tr("not found; where it could be"))
+        state = placed.decided or (tr("as found") if placed.present else tr("not found; where it could be"))
         self.setToolTip(
             tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
         )

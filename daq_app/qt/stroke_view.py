@@ -155,7 +155,7 @@ class StrokeView(QWidget):
                 line.setVisible(one is not None)
                 if one is not None:
                     style = Qt.PenStyle.DashDotLine if one.decided else Qt.PenStyle.SolidLine
-                    style = style if one.found else Qt.PenStyle.DotLine
+                    style = style if one.present else Qt.PenStyle.DotLine
                     line.setPen(pg.mkPen(self._tokens.act, width=3 if one.decided else 1.5, style=style))
                     line.setPos(one.time - self._origin)
             label: Any = self._lines[edge][0].label

@@ -41,7 +41,7 @@ FINGER = Finger(
 
 @pytest.fixture(scope="module")
 def state():
-    return fold(AnalystState(Path("recordings/P07")), m.Found("predicted", example()))
+    return fold(AnalystState(Path("recordings/P07")), m.ReportReady("predicted", example()))
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +99,7 @@ def test_a_number_that_is_withheld_says_why(state):
 def test_what_was_found_stays_whatever_comes_after(state, message, going_on, told):
     after = fold(state, message)
     assert after.report == state.report
-    assert (after.step is not None, after.told) == (going_on, told)
+    assert (after.step is not None, after.outcome) == (going_on, told)
 
 
 def test_nothing_is_shown_of_a_session_before_it_is_open():
@@ -113,7 +113,7 @@ def test_nothing_is_shown_of_a_session_before_it_is_open():
 
 
 def test_answers_are_shown_as_they_come_and_stay_when_the_work_is_stopped(state):
-    bare = fold(AnalystState(Path("x")), m.Found("analysed", replace(state.report, predictions=())))
+    bare = fold(AnalystState(Path("x")), m.ReportReady("analysed", replace(state.report, predictions=())))
     said = state.report.predictions[1]
     after = fold(fold(bare, m.Answered(said, FINGER)), m.Cancelled())
     assert after.report.predictions == (said,)
@@ -128,7 +128,7 @@ def test_a_moved_window_takes_back_the_answer_to_its_stroke_alone(state, steady)
         with_fingers = fold(with_fingers, m.Answered(said, FINGER))
     moved = replace(steady, mu_dynamic=steady.mu_dynamic + 0.01)
     strokes = tuple(moved if s is steady else s for s in state.report.strokes)
-    after = fold(with_fingers, m.Found("analysed", replace(state.report, strokes=strokes, predictions=())))
+    after = fold(with_fingers, m.ReportReady("analysed", replace(state.report, strokes=strokes, predictions=())))
     left = {s.number for s in strokes} - {p.stroke for p in after.report.predictions}
     assert left == {steady.number}
     assert {stroke for _, stroke in after.fingers} == {s.number for s in strokes} - {steady.number}
@@ -147,7 +147,7 @@ def test_edges_stand_in_order_of_time_and_say_who_moved_them(steady):
 
 def test_a_stroke_without_a_steady_window_is_offered_one(steady):
     placed = edges_of(replace(steady, steady=None))
-    assert [one.found for one in placed] == [True, False, False, True]
+    assert [one.present for one in placed] == [True, False, False, True]
     assert placed[0].time < placed[1].time < placed[2].time < placed[3].time
 
 
@@ -277,7 +277,7 @@ def test_a_window_moved_in_a_session_is_a_decision_beside_it_and_its_numbers_fol
     assert after.normal_force != before.normal_force
     work.do(m.Undo("E03"))
     assert said[-1].report.strokes[0].steady == before.steady
-    assert said[-1].told.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
+    assert said[-1].outcome.startswith("Undone, as decision 2: decision 1 by E02: steady of stroke 1 of trial 1")
     work.do(m.Undo("E03", again=True))
     assert said[-1].report.strokes[0].steady == after.steady
     assert len(read(tmp_path / "session").lines) == 3
@@ -295,8 +295,8 @@ def test_a_compared_session_comes_with_the_fingers_of_its_answers(at_work):
 
 def test_what_is_said_of_one_trial_does_not_stay_with_the_next(state):
     said = fold(state, m.Problem("Trial 1 has no history."))
-    assert fold(said, m.Choose(state.row)).told == "Trial 1 has no history."
-    assert fold(said, m.Choose(state.row + 1)).told == ""
+    assert fold(said, m.Choose(state.row)).outcome == "Trial 1 has no history."
+    assert fold(said, m.Choose(state.row + 1)).outcome == ""
 
 
 def test_the_readings_shown_are_those_of_the_file_and_their_rows_are_told(at_work):

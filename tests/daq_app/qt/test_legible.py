@@ -275,7 +275,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
     window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
     window.resize(*size)
     window.show()
-    window.take(m.Found("predicted", example()))
+    window.take(m.ReportReady("predicted", example()))
     window.take(m.Filmed(chosen(window.state).key, film()))
     window.take(m.Compared("other", example()))
     about = about_box(window)

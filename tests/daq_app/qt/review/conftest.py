@@ -25,7 +25,7 @@ def window(one_window):
     one_window.resize(1440, 900)
     one_window.state = AnalystState(SESSION)
     one_window.model.tabs.setCurrentIndex(0)
-    one_window.take(m.Found("predicted", example()))
+    one_window.take(m.ReportReady("predicted", example()))
     one_window.take(m.Idle())
     one_window._work.asked.clear()
     return one_window

@@ -39,7 +39,7 @@ def test_another_quantity_than_the_sed_is_held_against_the_scores_and_stands_amo
     report = example()
     pressures = {said.stroke: -0.001 * at for at, said in enumerate(report.predictions, 1)}  # [MPa]
     told = (replace(said, responses={"pressure": (pressures[said.stroke], 2e-7)}) for said in report.predictions)
-    window.take(m.Found("predicted", replace(report, predictions=tuple(told))))
+    window.take(m.ReportReady("predicted", replace(report, predictions=tuple(told))))
     responses = window.trials.responses
     responses.setCurrentText("pressure [kPa]")
     responses.activated.emit(responses.currentIndex())
@@ -98,7 +98,7 @@ def test_ctrl_c_copies_the_selected_range_as_tab_separated_values(window):
 def test_every_sed_carries_its_depth_its_strain_and_the_errors_of_mesh_and_model(window):
     effects = (Fact("viscosity", "below 0.01 to 4 % of the SED"), Fact("warning", "99 mm"), Fact("bone", "2 %"))
     report = replace(example(), model="small strain, settled sliding, τ max mean", left_out=effects)
-    window.take(m.Found("predicted", report))
+    window.take(m.ReportReady("predicted", report))
     [said] = [row.prediction for row in rows(window.state)[:1]]
     condition = f"SED at {said.indentation:.3g} mm, small strain"
     error = f"{1000 * said.sed:.3f} kPa ± 0.1 % by the mesh; model: viscosity below 0.01 to 4 % of the SED"
@@ -136,7 +136,7 @@ def test_stopping_is_answered_at_once_and_keeps_what_was_found(window):
     window.stop.click()
     assert window._work.asked[-1] == m.Stop()
     window.take(m.Cancelled())
-    assert "kept" in window.state.told
+    assert "kept" in window.state.outcome
     assert window.trials.list.count() == len(rows(window.state))
 
 
@@ -195,13 +195,15 @@ def test_ctrl_z_undoes_and_ctrl_shift_z_redoes_and_the_buttons_say_what(window):
     QTest.keyClick(window, Qt.Key.Key_Z, held)
     assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
     window.take(
-        m.Found("predicted", example(), m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",)))
+        m.ReportReady(
+            "predicted", example(), m.History(("onset of trial 1", "lift of trial 2"), ("steady of trial 3",))
+        )
     )
     assert not any(isinstance(asked, m.Undo) for asked in window._work.asked)
     assert bar.undo.accessibleName() == "undo lift of trial 2, Ctrl+Z"
     assert bar.redo.accessibleName() == "redo steady of trial 3, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, held)
-    window.take(m.Found("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
+    window.take(m.ReportReady("predicted", example(), m.History(("onset of trial 1",), ("lift of trial 2",))))
     assert bar.redo.accessibleName() == "redo lift of trial 2, Ctrl+Shift+Z"
     QTest.keyClick(window, Qt.Key.Key_Z, held | Qt.KeyboardModifier.ShiftModifier)
     assert [asked.again for asked in window._work.asked if isinstance(asked, m.Undo)] == [False, True]
@@ -314,6 +316,6 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
 def test_a_recorded_session_is_opened_and_analysed_while_the_window_stays_alive(application):
     window = AnalystWindow(SESSION, LIGHT)
     until(application, lambda: window.state.stage != "opening" or window.state.step is None)
-    assert window.state.report is not None, window.state.told
+    assert window.state.report is not None, window.state.outcome
     assert window.state.report.session == SESSION.name
     window.close()

@@ -161,7 +161,7 @@ def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(wi
 def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
     report = example()
     first = replace(report.predictions[0], sed=None, reasons={"sed": "It wedges."})
-    window.take(m.Found("predicted", replace(report, predictions=(first, *report.predictions[1:]))))
+    window.take(m.ReportReady("predicted", replace(report, predictions=(first, *report.predictions[1:]))))
     at = next(i for i, row in enumerate(rows(window.state)) if row.prediction is first)
     window.ask(m.Choose(at))
     assert m.ShowHistory(rows(window.state)[at].key) in window._work.asked
