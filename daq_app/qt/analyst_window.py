@@ -45,7 +45,7 @@ class Work(Protocol):
         """Return what came since the last call."""
         ...
 
-    def ask(self, asked: m.Ask) -> None:
+    def ask(self, request: m.Ask) -> None:
         """Ask for something; nothing is waited for."""
         ...
 
@@ -75,7 +75,7 @@ class AnalystWindow(QMainWindow):
         self.model.other_wanted.connect(self._choose_other)
         self.model.said.connect(self._say)
         for column in (self.trials, self.stroke, self.model):
-            column.asked.connect(self.ask)
+            column.requested.connect(self.ask)
         self.trials.responded.connect(self.take)  # no work: the model answers with every quantity
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
@@ -94,8 +94,8 @@ class AnalystWindow(QMainWindow):
         self._parts = [self._panel(name, column) for name, column in self._named()]
         self._pages = QTabWidget()
         self._pages.setAccessibleName(tr("trials, stroke or model"))
-        self._beside = QWidget()
-        self._row = bare(QHBoxLayout(self._beside), GRID)
+        self._panes = QWidget()
+        self._row = bare(QHBoxLayout(self._panes), GRID)
         self._narrow: bool | None = None
         self.setCentralWidget(self._placed())
         self._place_columns()
@@ -113,12 +113,12 @@ class AnalystWindow(QMainWindow):
         self.state = fold(self.state, message)
         self._show()
 
-    def ask(self, asked: m.Ask) -> None:
+    def ask(self, request: m.Ask) -> None:
         """Ask the work for something."""
-        if isinstance(asked, m.Choose) and asked.row == self.state.row:
+        if isinstance(request, m.Choose) and request.row == self.state.row:
             return
-        self._work.ask(asked)
-        self.take(asked)
+        self._work.ask(request)
+        self.take(request)
 
     def write(self, what: str, path: str) -> None:
         """Have a report, an export or a picture written."""
@@ -132,7 +132,7 @@ class AnalystWindow(QMainWindow):
         if event.matches(QKeySequence.StandardKey.Redo):
             self.stroke.decisions.stack.redo()
             return
-        held = event.modifiers() & Qt.KeyboardModifier.ControlModifier
+        control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():
             case Qt.Key.Key_F1:
                 self._show_keys()
@@ -142,7 +142,7 @@ class AnalystWindow(QMainWindow):
                 self.ask(m.Stop())
             case Qt.Key.Key_Home:
                 self.stroke.stroke.show_all()
-            case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if held:
+            case Qt.Key.Key_1 | Qt.Key.Key_2 | Qt.Key.Key_3 if control:
                 self._go_to(event.key() - Qt.Key.Key_1)
             case _:
                 super().keyPressEvent(event)
@@ -231,8 +231,8 @@ class AnalystWindow(QMainWindow):
         self._words.show_text(progress_words(state.step) or state.outcome)
         self.stop.setEnabled(busy)
         self.go_on.setVisible(state.halted and not busy)
-        for made in (self.report, self.export):
-            made.setEnabled(not busy and state.report is not None)
+        for widget in (self.report, self.export):
+            widget.setEnabled(not busy and state.report is not None)
         head = "" if state.report is None else state.report.head
         self._head.setVisible(bool(head))
         self._head.setText(tr("SIMULATED"))
@@ -267,7 +267,7 @@ class AnalystWindow(QMainWindow):
             return
         self._narrow = narrow
         self._pages.setVisible(narrow)
-        self._beside.setVisible(not narrow)
+        self._panes.setVisible(not narrow)
         for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):
             if narrow:
                 self._pages.addTab(part, name)
@@ -294,7 +294,7 @@ class AnalystWindow(QMainWindow):
         layout = QVBoxLayout(window)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
         layout.addLayout(top)
-        layout.addWidget(self._beside, 1)
+        layout.addWidget(self._panes, 1)
         layout.addWidget(self._pages, 1)
         layout.addLayout(foot)
         return window

@@ -190,8 +190,8 @@ class Bridge(QObject):
         session, quality = self.state.session, judged.quality
         if session is None or quality.friction is None or quality.steady is None or quality.normal_force is None:
             return
-        asked = Settle(judged.trial, session.plan, quality.friction, quality.normal_force, quality.steady)
-        self.model.settle(asked)
+        request = Settle(judged.trial, session.plan, quality.friction, quality.normal_force, quality.steady)
+        self.model.settle(request)
 
     def _fold(self, message: Message) -> None:
         self.state = fold(self.state, message)

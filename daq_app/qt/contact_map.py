@@ -84,11 +84,11 @@ class ContactMap(PaintedWidget):
     def draw_ground(self) -> QPixmap:
         """Return sample, grid, words and arrow."""
         t = self.tokens
-        made = blank(self, t.surface)
+        picture = blank(self, t.surface)
         per_mm = self._per_mm()
         if per_mm <= TOO_SMALL:
-            return made
-        painter = QPainter(made)
+            return picture
+        painter = QPainter(picture)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         middle = self._middle()
         box = QRectF(0, 0, ACROSS * per_mm, ALONG * per_mm)
@@ -98,11 +98,11 @@ class ContactMap(PaintedWidget):
         painter.drawRoundedRect(box, 4, 4)
         painter.setFont(font(SMALL, self._scale))
         painter.setPen(QColor(t.quiet))
-        beside = QRectF(box.right() + 2 * MARGIN, box.top(), self.width() - box.right() - 2 * MARGIN, box.height())
+        margin_box = QRectF(box.right() + 2 * MARGIN, box.top(), self.width() - box.right() - 2 * MARGIN, box.height())
         places = (Qt.AlignmentFlag.AlignTop, Qt.AlignmentFlag.AlignVCenter, Qt.AlignmentFlag.AlignBottom)
         if box.height() >= len(places) * painter.fontMetrics().height():
             for place, text in zip(places, self._words, strict=True):
-                painter.drawText(beside, Qt.AlignmentFlag.AlignLeft | place, text)
+                painter.drawText(margin_box, Qt.AlignmentFlag.AlignLeft | place, text)
         painter.setPen(QPen(QColor(t.line), 1, Qt.PenStyle.DotLine))
         for mm in range(-20, 30, 10):
             y = middle.y() - mm * per_mm
@@ -112,7 +112,7 @@ class ContactMap(PaintedWidget):
             painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
         self._paint_arrow(painter, box)
         painter.end()
-        return made
+        return picture
 
     def _paint_arrow(self, painter: QPainter, box: QRectF) -> None:
         if not self._direction:

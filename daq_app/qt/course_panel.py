@@ -51,12 +51,12 @@ class CoursePanel(QFrame):
         )
         self.end = button(tr("End Ctrl+E"), tr("end the session, with a reason"), self._end, "small")
         self._all = (self.skip, self.redo, self.pause, self.note, self.no_answer, self.end)
-        self.line = EntryLine(self._given, self.leave)
+        self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
         self._bottom = QStackedWidget()
         self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
-        self._bottom.addWidget(self._asked(scale))
+        self._bottom.addWidget(self._entry_row(scale))
         self._timer = label("", "quiet")
         self.mirror = Mirror(tokens, scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
@@ -86,10 +86,10 @@ class CoursePanel(QFrame):
             return
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
-        for made, shown in zip(
+        for widget, shown in zip(
             (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end), _buttons(view), strict=True
         ):
-            _show_button(made, shown)
+            _show_button(widget, shown)
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
@@ -122,19 +122,19 @@ class CoursePanel(QFrame):
             self.window().setFocus()
             self._bottom.setCurrentIndex(0)
 
-    def _given(self) -> None:
+    def _keep(self) -> None:
         text = self.line.text().strip()
         if not text:
             say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
             return
-        made: dict[str, Callable[[str], Message]] = {
+        messages: dict[str, Callable[[str], Message]] = {
             "redo": steps.Redo,
             "skip": steps.Skip,
             "note": steps.Note,
             "end": steps.Abort,
         }
         self.leave()
-        self._send(made[self._asking](text))
+        self._send(messages[self._asking](text))
 
     def _pause(self) -> None:
         if self._view is not None and self._view.pause.enabled and self._view.pause.sends is not None:
@@ -146,19 +146,19 @@ class CoursePanel(QFrame):
     def _actions(self, columns: int) -> QWidget:
         page = QWidget()
         grid = bare(QGridLayout(page), GRID)
-        for at, made in enumerate(self._all):
-            grid.addWidget(made, at // columns, at % columns)
+        for at, widget in enumerate(self._all):
+            grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
-    def _asked(self, scale: float) -> QWidget:
+    def _entry_row(self, scale: float) -> QWidget:
         page = QWidget()
         layout = bare(QVBoxLayout(page), GRID)
         layout.addStretch(1)
         layout.addWidget(self._question)
         layout.addWidget(self.line)
         row = QHBoxLayout()
-        row.addWidget(button(tr("Keep  Enter"), tr("keep what was typed"), self._given))
+        row.addWidget(button(tr("Keep  Enter"), tr("keep what was typed"), self._keep))
         row.addWidget(button(tr("Leave  Esc"), tr("leave it"), self.leave))
         layout.addLayout(row)
         page.setMinimumHeight(round(88 * scale))
@@ -176,9 +176,9 @@ class CoursePanel(QFrame):
             if item.text() != text:
                 item.setText(text)
             item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.kind}: {row.name} {row.outcome}")
-            made = self.plan.font()
-            made.setBold(row.kind in ("block", "current"))
-            item.setFont(made)
+            typeface = self.plan.font()
+            typeface.setBold(row.kind in ("block", "current"))
+            item.setFont(typeface)
             if row.kind == "current":
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
@@ -196,6 +196,6 @@ def _buttons(view: CourseView) -> tuple[Button, ...]:
     return (view.redo, view.skip, view.pause, view.note, view.no_answer, view.end)
 
 
-def _show_button(made: QPushButton, shown: Button) -> None:
-    made.setText(f"{shown.label} {tr(shown.key)}".strip())
-    made.setEnabled(shown.enabled)
+def _show_button(widget: QPushButton, shown: Button) -> None:
+    widget.setText(f"{shown.label} {tr(shown.key)}".strip())
+    widget.setEnabled(shown.enabled)

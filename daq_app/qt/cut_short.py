@@ -47,16 +47,16 @@ class CutShort(QFrame):
         timer.timeout.connect(look)
         timer.start()
 
-    def show_sessions(self, found: tuple[Unfinished, ...]) -> None:
+    def show_sessions(self, sessions: tuple[Unfinished, ...]) -> None:
         """Offer these sessions."""
-        if found != self._shown:
-            self._shown = found
+        if sessions != self._shown:
+            self._shown = sessions
             self._sessions.clear()
-            for session in found:
+            for session in sessions:
                 self._sessions.addItem(session.words, str(session.folder))
                 at = self._sessions.count() - 1
                 self._sessions.setItemData(at, str(session.folder), Qt.ItemDataRole.ToolTipRole)
-        self.setVisible(bool(found))
+        self.setVisible(bool(sessions))
 
     def _resumed(self) -> None:
         folder = self._sessions.currentData()

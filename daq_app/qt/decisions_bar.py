@@ -19,7 +19,7 @@ DRAGGED = "dragged by hand"
 class DecisionsBar(QWidget):
     """A code, a reason, undo and redo; under them what was decided about the chosen stroke."""
 
-    asked = Signal(object)
+    requested = Signal(object)
 
     def __init__(self) -> None:
         """Remember who decided last."""
@@ -39,7 +39,7 @@ class DecisionsBar(QWidget):
         self.undo = button(tr("Undo"), "", self.stack.undo, "small")
         self.redo = button(tr("Redo"), "", self.stack.redo, "small")
         self._show_next()
-        self.told = Wrapped("value", "look")
+        self.sentences_label = Wrapped("value", "look")
         line = QHBoxLayout()
         line.setSpacing(GRID // 2)
         line.addWidget(label(tr("by"), "quiet"))
@@ -50,7 +50,7 @@ class DecisionsBar(QWidget):
         line.addWidget(self.redo)
         layout = bare(QVBoxLayout(self), GRID // 2)
         layout.addLayout(line)
-        layout.addWidget(self.told)
+        layout.addWidget(self.sentences_label)
 
     def who(self) -> str:
         """Return the code of who decides."""
@@ -62,19 +62,19 @@ class DecisionsBar(QWidget):
 
     def show_decided(self, sentences: tuple[str, ...], history: m.History) -> None:
         """Show what was decided about a stroke, and what of the session can be undone."""
-        self.told.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
+        self.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
         self.stack.show_history(history)
 
     def _ask(self, again: bool) -> None:
-        self.asked.emit(m.Undo(self.who(), again))
+        self.requested.emit(m.Undo(self.who(), again))
 
     def _show_next(self) -> None:
         """Say on each button what it would do next."""
         stack = self.stack
-        for made, can, words in (
+        for widget, can, words in (
             (self.undo, stack.canUndo(), tr("undo {decision}, Ctrl+Z", decision=stack.undoText())),
             (self.redo, stack.canRedo(), tr("redo {decision}, Ctrl+Shift+Z", decision=stack.redoText())),
         ):
-            made.setEnabled(can)
-            made.setAccessibleName(words if can else tr("{button}: no decision", button=made.text()))
-            made.setToolTip(made.accessibleName())
+            widget.setEnabled(can)
+            widget.setAccessibleName(words if can else tr("{button}: no decision", button=widget.text()))
+            widget.setToolTip(widget.accessibleName())

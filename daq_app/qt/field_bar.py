@@ -78,10 +78,10 @@ class FieldBar(QWidget):
 
 
 def _number(name: str) -> QDoubleSpinBox:
-    made = QDoubleSpinBox()
-    made.setAccessibleName(name)
-    made.lineEdit().setAccessibleName(name)
-    made.setMinimumHeight(TARGET)
-    made.setRange(-LARGEST, LARGEST)
-    made.setDecimals(3)
-    return made
+    box = QDoubleSpinBox()
+    box.setAccessibleName(name)
+    box.lineEdit().setAccessibleName(name)
+    box.setMinimumHeight(TARGET)
+    box.setRange(-LARGEST, LARGEST)
+    box.setDecimals(3)
+    return box

@@ -282,12 +282,12 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def _colour_bar(self) -> Any:  # noqa: ANN401  pyqtgraph has no types
         pens = {"pen": self._tokens.text, "hoverPen": self._tokens.act, "hoverBrush": f"{self._tokens.act}80"}
         line = QFontMetricsF(self._font).height()
-        made = pg.ColorBarItem(width=line - 4.0, orientation="h", colorMapMenu=False, **pens)
-        style_axis(made.getAxis("bottom"), self._tokens, self._font)
+        bar = pg.ColorBarItem(width=line - 4.0, orientation="h", colorMapMenu=False, **pens)
+        style_axis(bar.getAxis("bottom"), self._tokens, self._font)
         self.ci.layout.setRowFixedHeight(1, BAR_LINES * line)  # colours, ticks and the field's name keep their place
-        made.hide()
-        made.sigLevelsChangeFinished.connect(self._choose_range)
-        return made
+        bar.hide()
+        bar.sigLevelsChangeFinished.connect(self._choose_range)
+        return bar
 
     def _choose_range(self) -> None:
         self.range_chosen.emit(self._bar.levels())

@@ -138,11 +138,11 @@ def _mp4(frames: list[Image.Image]) -> bytes:
         raise ImportError(tr(NO_MP4)) from error
     width, height = (length - length % 2 for length in frames[0].size)  # colours are kept for four pixels together
     taken = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{1000 / SHOWN:g}", "-i", "-"]
-    made = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
+    codec = ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart"]
     pixels = b"".join(frame.crop((0, 0, width, height)).tobytes() for frame in frames)
     with TemporaryDirectory() as folder:  # the place of an MP4's parts is known at its end: no pipe takes it
         film = Path(folder) / "film.mp4"
-        encoder = [get_ffmpeg_exe(), "-loglevel", "error", *taken, *made, str(film)]
+        encoder = [get_ffmpeg_exe(), "-loglevel", "error", *taken, *codec, str(film)]
         done = subprocess.run(encoder, input=pixels, capture_output=True, check=False)
         if done.returncode != 0:
             raise OSError(f"the encoder stopped: {done.stderr.decode(errors='replace').strip()[:200]}")

@@ -37,7 +37,7 @@ class _Field(QWidget):
         """Say whether there is an answer."""
         return self.answer.value is not None
 
-    def given(self, hand: Hand | None) -> Event:
+    def answer_event(self, hand: Hand | None) -> Event:
         """Return the answer."""
         return self.answer.judgement(hand)
 
@@ -99,9 +99,9 @@ class ChoiceOfTwo(_Field):
 
     def set_words(self, first: str, second: str) -> None:
         """Name the buttons."""
-        for made, words in ((self.first, first), (self.second, second)):
-            made.setText(words)
-            made.setAccessibleName(words)
+        for choice, words in ((self.first, first), (self.second, second)):
+            choice.setText(words)
+            choice.setAccessibleName(words)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
@@ -118,13 +118,13 @@ class ChoiceOfTwo(_Field):
             super().keyPressEvent(event)
 
     def _button(self, words: str, which: Which, scale: float) -> QPushButton:
-        made = button(words, words, lambda: self._take(self.answer.chosen(self.now(), which, "mouse")))
-        made.setCheckable(True)
-        made.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        choice = button(words, words, lambda: self._take(self.answer.chosen(self.now(), which, "mouse")))
+        choice.setCheckable(True)
+        choice.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         # In a sheet of its own: the window's sets the height of every button.
         size = f"min-width: {round(WIDE * scale)}px; min-height: {round(HIGH * scale)}px;"
-        made.setStyleSheet(f"font-size: {round(WORDS * scale)}px; {size}")
-        return made
+        choice.setStyleSheet(f"font-size: {round(WORDS * scale)}px; {size}")
+        return choice
 
     def _take(self, answer: Choice) -> None:
         self.answer = answer

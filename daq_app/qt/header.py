@@ -97,17 +97,17 @@ class Notice(QFrame):
         layout.addWidget(self._words, 1)
         layout.addWidget(self._button)
 
-    def show_view(self, banner: Banner | None, told: str) -> None:
+    def show_view(self, banner: Banner | None, notice: str) -> None:
         """Show a banner, or else what was told."""
         if banner is None and self._warning is not None:
-            told = self._warning
+            notice = self._warning
         if banner is not None:
             self._warning = None
         if banner is not None and banner.grade == "wrong" and (self._banner is None or self._banner.grade != "wrong"):
             QApplication.beep()  # nobody looks at the window all the time
         self._banner = banner
         mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
-        text = f"{mark}{banner.sentence}" if banner else told[:1].upper() + told[1:]
+        text = f"{mark}{banner.sentence}" if banner else notice[:1].upper() + notice[1:]
         say(self._words, text, tr("Notice:"))
         regrade(self, banner.grade if banner else "")
         self._button.setVisible(banner is not None and banner.sends is not None)

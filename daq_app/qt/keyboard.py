@@ -24,10 +24,10 @@ class Keyboard(QObject):
         self._plan = plan
         self._subject = subject
         self._act = act
-        self._given = QElapsedTimer()
+        self._since_answer = QElapsedTimer()
         for watched in (plan, subject, *subject.findChildren(QWidget)):
             watched.installEventFilter(self)
-        subject.answered.connect(self._given.start)
+        subject.answered.connect(self._since_answer.start)
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         application.focusChanged.connect(self._focus_changed)
@@ -71,7 +71,7 @@ class Keyboard(QObject):
 
     def _pressed_twice(self, event: QKeyEvent) -> bool:
         """Say whether a key is the second press of the one that gave the answer, as the system counts presses."""
-        soon = self._given.isValid() and self._given.elapsed() < QApplication.doubleClickInterval()
+        soon = self._since_answer.isValid() and self._since_answer.elapsed() < QApplication.doubleClickInterval()
         return soon and event.key() == self._subject.given_with
 
     def _focus_changed(self, old: QWidget | None, new: QWidget | None) -> None:

@@ -121,10 +121,10 @@ def act_of(event: QKeyEvent) -> str | None:
     """Return the act a key stands for; None where it stands for none."""
     key = Qt.Key(event.key())
     name = _NAMED.get(key) or (chr(key) if Qt.Key.Key_A <= key <= Qt.Key.Key_Z else "")
-    held = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
-    if held == Qt.KeyboardModifier.ControlModifier:
+    modifiers = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
+    if modifiers == Qt.KeyboardModifier.ControlModifier:
         name = f"Ctrl+{name}"
-    elif held != Qt.KeyboardModifier.NoModifier:
+    elif modifiers != Qt.KeyboardModifier.NoModifier:
         return None
     return next((known.act for known in KEYS if known.key == name), None)
 

@@ -34,5 +34,7 @@ def name_of(language: str) -> str:
 
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
     """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
-    drawn, asked = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
-    return "".join(sorted(c for c in asked if not (c.isspace() or category(c) == "Cf" or drawn.inFontUcs4(ord(c)))))
+    drawn, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
+    return "".join(
+        sorted(c for c in characters if not (c.isspace() or category(c) == "Cf" or drawn.inFontUcs4(ord(c))))
+    )

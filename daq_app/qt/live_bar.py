@@ -36,7 +36,7 @@ class LiveBar(QWidget):
         super().__init__()
         self._show_length = length
         self._forces_shown = True
-        self._held = False
+        self._on_hold = False
         self._short = False  # the buttons show their keys alone
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self._scale = scale
@@ -62,12 +62,12 @@ class LiveBar(QWidget):
         self._place_numbers(numbers)
         numbers.addStretch(1)
         acts.addStretch(1)
-        for made in (self.finite, self.length, self.hold):
-            acts.addWidget(made)
-        for made in (self.hold, self.finite):
-            made.setCheckable(True)
-        for made in (self.hold, self.finite, self.length):
-            made.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        for widget in (self.finite, self.length, self.hold):
+            acts.addWidget(widget)
+        for widget in (self.hold, self.finite):
+            widget.setCheckable(True)
+        for widget in (self.hold, self.finite, self.length):
+            widget.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
         self.setMinimumSize(1, QFontMetrics(font(TITLE, scale)).height())
 
@@ -78,12 +78,12 @@ class LiveBar(QWidget):
 
     def fit_into(self, height: int) -> None:
         """Fold the buttons away where the panel is so low; their keys still serve."""
-        for made in (self.finite, self.length, self.hold):
-            made.setVisible(height >= LEAST_FOR_ACTS * self._scale)
+        for widget in (self.finite, self.length, self.hold):
+            widget.setVisible(height >= LEAST_FOR_ACTS * self._scale)
 
-    def show_held(self, held: bool) -> None:
+    def show_held(self, on_hold: bool) -> None:
         """Say whether the picture is held."""
-        self._held = held
+        self._on_hold = on_hold
         self._show_words()
 
     def show_numbers(self, values: NDArray[np.float64]) -> None:
@@ -112,9 +112,9 @@ class LiveBar(QWidget):
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self._show_words()
-        beside = self._forces_shown and self._needed(TITLE) + self._acts <= self.width()
+        side_by_side = self._forces_shown and self._needed(TITLE) + self._acts <= self.width()
         size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
-        direction = QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom
+        direction = QBoxLayout.Direction.LeftToRight if side_by_side else QBoxLayout.Direction.TopToBottom
         self._rows.setDirection(direction if self._forces_shown else QBoxLayout.Direction.LeftToRight)
         room = self.width()
         for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
@@ -124,13 +124,13 @@ class LiveBar(QWidget):
                 value.style().unpolish(value)
                 value.style().polish(value)
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
-            for made in (caption, value):
-                made.setVisible(self._forces_shown and room >= 0)
+            for widget in (caption, value):
+                widget.setVisible(self._forces_shown and room >= 0)
 
     def _show_words(self) -> None:
         self.finite.setText("M" if self._short else tr("Finite  M"))
-        held = tr("Held  H") if self._held else tr("Hold  H")
-        self.hold.setText("H" if self._short else held)
+        words = tr("Held  H") if self._on_hold else tr("Hold  H")
+        self.hold.setText("H" if self._short else words)
 
     def _needed(self, size: int) -> int:
         """Return the width of all numbers in a type [px]."""

@@ -64,7 +64,7 @@ class LivePanel(QFrame):
         self._model = model
         self._model_trace = ModelTrace()
         self._seconds = 10
-        self._held: float | None = None  # device time the picture is held at; readings go on behind it
+        self._hold_time: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
         self._drawn: object = None  # what the picture was drawn of
         self._forces_shown = True
@@ -95,7 +95,7 @@ class LivePanel(QFrame):
     @property
     def holding(self) -> bool:
         """Say whether the picture is held."""
-        return self._held is not None
+        return self._hold_time is not None
 
     @property
     def seconds(self) -> int:
@@ -165,7 +165,7 @@ class LivePanel(QFrame):
             return
         trace = self._feed.trace
         newest = trace.newest
-        now = self._held if self._held is not None else newest
+        now = self._hold_time if self._hold_time is not None else newest
         if now is None or newest is None:
             now, marks = 0.0, ()
         end = picture_end(marks, now)
@@ -179,7 +179,7 @@ class LivePanel(QFrame):
             frozen = newest is not None and end < newest
             for plot in (*self.plots[:3], self._model_plot):
                 plot.show_end(
-                    tr("lift + 1 s") if frozen and self._held is None else tr("held") if frozen else tr("now")
+                    tr("lift + 1 s") if frozen and self._hold_time is None else tr("held") if frozen else tr("now")
                 )
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
@@ -258,7 +258,7 @@ class LivePanel(QFrame):
         return stroke, drawer
 
     def _hold(self) -> None:
-        self._held = self._feed.trace.newest if self.bar.hold.isChecked() else None
+        self._hold_time = self._feed.trace.newest if self.bar.hold.isChecked() else None
         self.bar.show_held(self.bar.hold.isChecked())
 
     def _finite(self, chosen: bool) -> None:

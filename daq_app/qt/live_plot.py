@@ -116,8 +116,8 @@ class LivePlot(PaintedWidget):
 
     def draw_ground(self) -> QPixmap:
         """Return axes, grid, numbers and names."""
-        made = blank(self, self.tokens.surface)
-        painter = QPainter(made)
+        picture = blank(self, self.tokens.surface)
+        painter = QPainter(picture)
         painter.setFont(font(SMALL, self._type_scale))
         inside = self._inside()
         self._paint_values(painter, inside)
@@ -127,7 +127,7 @@ class LivePlot(PaintedWidget):
         painter.drawLine(inside.bottomLeft(), inside.bottomRight())
         self._paint_names(painter, inside)
         painter.end()
-        return made
+        return picture
 
     def _paint_values(self, painter: QPainter, inside: QRectF) -> None:
         line = painter.fontMetrics().height()

@@ -99,8 +99,8 @@ class MainWindow(QMainWindow):
         self.show_view(bridge.view)
         self.page.look_for_unfinished()
         restore_place(self)
-        for made in self.findChildren(QAbstractButton):
-            made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
+        for widget in self.findChildren(QAbstractButton):
+            widget.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.page.subject.setFocus()
         self._line_changed()
         self._fit()
@@ -275,13 +275,13 @@ class MainWindow(QMainWindow):
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
         """Ask the recorder for the session of a form; what keeps it from beginning is said."""
-        made = checked(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
-        if isinstance(made, Refused):
-            self.notice.warn(" ".join(made.sentences.values()))
+        session = checked(form, bench, datetime.now(), secrets.randbelow(2**31), self.side.line_settings())
+        if isinstance(session, Refused):
+            self.notice.warn(" ".join(session.sentences.values()))
             return
-        if made.people.kind == "simulated people":
+        if session.people.kind == "simulated people":
             self.subject.hide()
-        self.bridge.send(made)
+        self.bridge.send(session)
 
     def _form_changed(self) -> None:
         """Say what is to be done on the page of a new session."""

@@ -90,11 +90,11 @@ class Menus:
 
     def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
         """Offer what can be done now."""
-        for made in self.course:
-            made.setEnabled(in_hand and not over)
+        for action in self.course:
+            action.setEnabled(in_hand and not over)
         self.pilot.setEnabled(not in_hand)
-        for made in (self.report, self.export):
-            made.setEnabled(opened)
+        for action in (self.report, self.export):
+            action.setEnabled(opened)
 
     def _add(self, menu: QMenu, name: str, words: str) -> QAction:
         """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
@@ -104,10 +104,10 @@ class Menus:
     def _choices(self, menu: QMenu, names: tuple[str, ...], now: str, take: Callable[[str], None]) -> QActionGroup:
         group = QActionGroup(menu)
         for name in names:
-            made = menu.addAction(tr(name).capitalize(), lambda name=name: take(name))
-            made.setCheckable(True)
-            made.setChecked(name == now)
-            group.addAction(made)
+            action = menu.addAction(tr(name).capitalize(), lambda name=name: take(name))
+            action.setCheckable(True)
+            action.setChecked(name == now)
+            group.addAction(action)
         return group
 
     def _size(self, scale: float) -> None:

@@ -40,9 +40,9 @@ STEPS_A_SECOND = 10.0  # of a history that plays: its steps are told, for pressi
 
 
 class ModelColumn(QWidget):
-    """Three tabs; `asked` tells what the work is to do."""
+    """Three tabs; `requested` tells what the work is to do."""
 
-    asked = Signal(object)
+    requested = Signal(object)
     other_wanted = Signal()
     said = Signal(str)  # what came of a picture or film that was written
 
@@ -69,12 +69,12 @@ class ModelColumn(QWidget):
             canvas.range_chosen.connect(self.fields.fix)
         self.near = button(tr("Contact"), tr("show the contact alone, with its tractions"), self._paint, "small")
         self.mesh = button(tr("Mesh"), tr("show the mesh"), self._paint, "small")
-        self.both = button(
+        self.together = button(
             tr("Both"), tr("show the finger of the compared session beside this one"), self._paint, "small"
         )
-        self.both.hide()
-        for made in (self.near, self.mesh, self.both):
-            made.setCheckable(True)
+        self.together.hide()
+        for widget in (self.near, self.mesh, self.together):
+            widget.setCheckable(True)
         self.history = button(tr("History"), tr("show the finger from first touch on"), self._ask_history, "small")
         self.film = button(tr("Film"), tr("save the history as a film, GIF or MP4"), self._ask_film, "small")
         self._filming = False
@@ -126,7 +126,7 @@ class ModelColumn(QWidget):
         self._ask_where(state, film)
         drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
         self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
-        self.both.setVisible(state.compared is not None)
+        self.together.setVisible(state.compared is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
         if before is None or before.version != state.version or before.report is None:
@@ -143,10 +143,10 @@ class ModelColumn(QWidget):
         reports = (state.report, other.report)
         first, second = map(named_errors, reports)
         self.compared.show_rows(compared(*reports), (first, second))
-        self.both.setChecked(True)
+        self.together.setChecked(True)
         self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
-        self.asked.emit(m.Draw(PICTURE))
+        self.requested.emit(m.Draw(PICTURE))
 
     def _show_session(self) -> None:
         """Show the picture that is chosen; what is not drawn is asked for only when it is looked at."""
@@ -175,7 +175,7 @@ class ModelColumn(QWidget):
     def _draw(self, name: str, version: int) -> None:
         if self._drawing != (name, version):
             self._drawing = (name, version)
-            self.asked.emit(m.Draw(name))
+            self.requested.emit(m.Draw(name))
 
     def _paint(self) -> None:
         state = self._state
@@ -186,7 +186,7 @@ class ModelColumn(QWidget):
         else:
             finger = None if state is None or row is None else state.fingers.get(row.key)
             words = finger_words(state)
-        other, other_words = other_finger(state) if self.both.isChecked() else (None, "")
+        other, other_words = other_finger(state) if self.together.isChecked() else (None, "")
         lost = film.film.lost if film is not None and at == len(film.film.frames) - 1 else None
         field = self.fields.field
         shown = tuple(one.frame for one in (finger, other) if one is not None)
@@ -230,7 +230,7 @@ class ModelColumn(QWidget):
     def _ask_history(self) -> None:
         row = None if self._state is None else chosen(self._state)
         if row is not None:
-            self.asked.emit(m.ShowHistory(row.key))
+            self.requested.emit(m.ShowHistory(row.key))
             self.player.slider.setFocus()
 
     def _ask_where(self, state: AnalystState, film: m.Filmed | None) -> None:
@@ -242,7 +242,7 @@ class ModelColumn(QWidget):
         wanted = (row.key, state.version)
         if wanted != self._followed:
             self._followed = wanted
-            self.asked.emit(m.ShowHistory(row.key))
+            self.requested.emit(m.ShowHistory(row.key))
 
     def _name_saves(self) -> None:
         kind = "contact" if self.near.isChecked() else "finger"
@@ -251,7 +251,7 @@ class ModelColumn(QWidget):
         self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
 
     def _save(self, name: str, path: str) -> None:
-        self.asked.emit(m.Write(f"picture {name}", path))
+        self.requested.emit(m.Write(f"picture {name}", path))
 
     def _head(self) -> str:
         """Return what every picture of a field is marked with: whether simulated, the session, and its errors."""
@@ -301,7 +301,7 @@ class ModelColumn(QWidget):
     def _finger_page(self) -> QWidget:
         page = QWidget()
         bar = QHBoxLayout()
-        for part in (self.near, self.mesh, self.both, self.history):
+        for part in (self.near, self.mesh, self.together, self.history):
             bar.addWidget(part)
         bar.addWidget(self.save, 1)
         course = QHBoxLayout()

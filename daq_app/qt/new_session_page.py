@@ -114,20 +114,20 @@ class NewSessionPage(QFrame):
 
     def _either(self, *words: str) -> list[QRadioButton]:
         """Return buttons of which one is pressed, the first to begin with."""
-        group, made = QButtonGroup(self), [QRadioButton(one) for one in words]
-        for one in made:
+        group, buttons = QButtonGroup(self), [QRadioButton(one) for one in words]
+        for one in buttons:
             group.addButton(one)
             one.setAccessibleName(one.text())
             one.setMinimumHeight(TARGET - GRID)
-        made[0].setChecked(True)
-        return made
+        buttons[0].setChecked(True)
+        return buttons
 
     def _follow(self) -> None:
         """Let every field say that it has changed, and show what depends on it."""
         for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
             line.textChanged.connect(self.changed)
-        for made in (self.with_forces, self.scores_only, self.people_score, self.simulated):
-            made.toggled.connect(self.changed)
+        for widget in (self.with_forces, self.scores_only, self.people_score, self.simulated):
+            widget.toggled.connect(self.changed)
         for line in (self.subject, self.study, self.folder):
             line.textChanged.connect(self._show_study)
         self.protocol.currentTextChanged.connect(self._show_study)
@@ -230,15 +230,15 @@ class NewSessionPage(QFrame):
 
     def _show_study(self) -> None:
         """Show what the study says of the subject: its protocol and its orders were decided when it was made."""
-        found, before = enrolment(self.form()), offered(self.form())
+        known, before = enrolment(self.form()), offered(self.form())
         self.pre_evaluation.setVisible("pre-evaluation" in before)
         self.practice.setVisible("practice" in before)
-        self._enrol.setVisible(found is not None and found.may_enrol)
+        self._enrol.setVisible(known is not None and known.may_enrol)
         self.screen_fields.offer_languages(self.form())
         self._show_screen()
-        for made in (self.protocol, self.seed):
-            made.setEnabled(found is None)
-            made.setToolTip("" if found is None else tr("the study's own: {protocol}", protocol=found.protocol))
+        for widget in (self.protocol, self.seed):
+            widget.setEnabled(known is None)
+            widget.setToolTip("" if known is None else tr("the study's own: {protocol}", protocol=known.protocol))
 
     def _speak(self) -> None:
         """Let the subject's page speak the chosen language before there is a session."""
@@ -381,6 +381,6 @@ class NewSessionPage(QFrame):
 
 
 def _hands(name: str) -> QComboBox:
-    made = choice(name)
-    made.addItems([tr(words) for words, _ in HANDS])
-    return made
+    box = choice(name)
+    box.addItems([tr(words) for words, _ in HANDS])
+    return box

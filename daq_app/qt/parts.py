@@ -31,11 +31,11 @@ L = TypeVar("L", bound=QLayout)
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     """Return a label; `role` is one of the style sheet's."""
-    made = QLabel(text)
-    made.setProperty("role", role)
-    made.setWordWrap(wrap)
-    made.setTextFormat(Qt.TextFormat.PlainText)
-    return made
+    text_label = QLabel(text)
+    text_label.setProperty("role", role)
+    text_label.setWordWrap(wrap)
+    text_label.setTextFormat(Qt.TextFormat.PlainText)
+    return text_label
 
 
 class Wrapped(QLabel):
@@ -87,13 +87,13 @@ class Wrapped(QLabel):
 
 def button(text: str, name: str, does: Callable[[], object], role: str = "") -> QPushButton:
     """Return a button that says `name` to screen readers."""
-    made = QPushButton(text)
-    made.setAccessibleName(name)
+    push = QPushButton(text)
+    push.setAccessibleName(name)
     if role:
-        made.setProperty("role", role)
-    made.setAutoDefault(False)
-    made.clicked.connect(lambda: does())
-    return made
+        push.setProperty("role", role)
+    push.setAutoDefault(False)
+    push.clicked.connect(lambda: does())
+    return push
 
 
 class _Choice(QComboBox):
@@ -128,24 +128,24 @@ class _Choice(QComboBox):
 
 def choice(name: str) -> QComboBox:
     """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
-    made = _Choice(name)
-    made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
-    return made
+    box = _Choice(name)
+    box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+    return box
 
 
 class EntryLine(QLineEdit):
     """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
 
-    def __init__(self, given: Callable[[], None], left: Callable[[], None]) -> None:
-        """Call `given` at Enter and `left` at Esc."""
+    def __init__(self, keep: Callable[[], None], left: Callable[[], None]) -> None:
+        """Call `keep` at Enter and `left` at Esc."""
         super().__init__()
-        self._given = given
+        self._keep = keep
         self._left = left
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Take the two keys; type the others."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
-            self._given()
+            self._keep()
         elif event.key() == Qt.Key.Key_Escape:
             self._left()
         else:
@@ -211,7 +211,7 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
 
 
-def field(layout: QVBoxLayout, words: str, widget: QWidget, *beside: QWidget) -> None:
+def field(layout: QVBoxLayout, words: str, widget: QWidget, *more: QWidget) -> None:
     """Put words over the field that they ask for, and what stands beside it."""
     caption = label(words, "quiet", wrap=True)
     if not isinstance(widget, _Choice):  # it has a label of its own
@@ -219,21 +219,21 @@ def field(layout: QVBoxLayout, words: str, widget: QWidget, *beside: QWidget) ->
     layout.addWidget(caption)
     row = QHBoxLayout()
     row.addWidget(widget, 1)
-    for other in beside:
+    for other in more:
         row.addWidget(other)
     layout.addLayout(row)
 
 
 def tick(words: str, name: str) -> QCheckBox:
     """Return a box to tick that says `name` to screen readers."""
-    made = QCheckBox(words)
-    made.setAccessibleName(name)
-    made.setMinimumHeight(TARGET - GRID)
-    return made
+    box = QCheckBox(words)
+    box.setAccessibleName(name)
+    box.setMinimumHeight(TARGET - GRID)
+    return box
 
 
 def entry(name: str) -> QLineEdit:
     """Return a line to type in that says `name` to screen readers."""
-    made = QLineEdit()
-    made.setAccessibleName(name)
-    return made
+    line = QLineEdit()
+    line.setAccessibleName(name)
+    return line

@@ -27,15 +27,15 @@ class SaveButtons(QWidget):
             button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
             for kind in KINDS
         ]
-        for made in self.buttons:
-            layout.addWidget(made)
+        for widget in self.buttons:
+            layout.addWidget(widget)
         self.set_name("")
 
     def set_name(self, name: str) -> None:
         """Take the name of what is shown; "" for nothing."""
         self._name = name
-        for made in self.buttons:
-            made.setEnabled(bool(name))
+        for widget in self.buttons:
+            widget.setEnabled(bool(name))
 
     def _ask(self, kind: str) -> None:
         proposed = f"{self._name.replace(' ', '-')}.{kind.lower()}"

@@ -36,17 +36,17 @@ class Rail(QFrame):
             )
             for room in ROOMS
         }
-        for made in self.buttons.values():
-            made.setCheckable(True)
-            layout.addWidget(made)
+        for widget in self.buttons.values():
+            widget.setCheckable(True)
+            layout.addWidget(widget)
         layout.addStretch(1)
         self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
 
     def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
         """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
-        for name, made in self.buttons.items():
-            made.setChecked(name == room)
+        for name, widget in self.buttons.items():
+            widget.setChecked(name == room)
             closed = (name == "prepare" and in_hand and not over) or (name == "run" and not in_hand)
-            made.setEnabled(not closed)
-            made.setToolTip(tr(WHY_NOT[name]) if closed else "")
-            made.setAccessibleDescription(made.toolTip())
+            widget.setEnabled(not closed)
+            widget.setToolTip(tr(WHY_NOT[name]) if closed else "")
+            widget.setAccessibleDescription(widget.toolTip())

@@ -98,7 +98,7 @@ class ScoreLine(QAbstractSlider):
         self._ends, self._ticks = ends, ticks
         self._take(Answer())
 
-    def given(self, hand: Hand | None) -> Scored:
+    def answer_event(self, hand: Hand | None) -> Scored:
         """Return the answer."""
         return self._answer.released().scored(hand)
 

@@ -21,17 +21,17 @@ _TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part b
 def blank(widget: QWidget, colour: str) -> QPixmap:
     """Return a picture as large as a widget, in the pixels of its screen: never a pixel short where scaling is odd."""
     ratio = widget.devicePixelRatioF()
-    made = QPixmap(ceil(widget.width() * ratio), ceil(widget.height() * ratio))
-    made.setDevicePixelRatio(ratio)
-    made.fill(QColor(colour))
-    return made
+    pixmap = QPixmap(ceil(widget.width() * ratio), ceil(widget.height() * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(QColor(colour))
+    return pixmap
 
 
 def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
     """Return a pen one pixel of the screen wide, whatever the scaling."""
-    made = QPen(QColor(colour), 1, style)
-    made.setCosmetic(True)
-    return made
+    pen = QPen(QColor(colour), 1, style)
+    pen.setCosmetic(True)
+    return pen
 
 
 def draw_line(painter: QPainter, x: Array, y: Array) -> None:
@@ -60,11 +60,11 @@ def lines(x: Array, y: Array) -> list[QPolygonF]:
 
 def _polygon(points: Array) -> QPolygonF:
     """Return points (n, 2), n > 0, as Qt holds them: written into its own memory, as pyqtgraph does it."""
-    made = QPolygonF()
-    made.resize(len(points))
-    memory: Any = VoidPtr(made.data(), points.nbytes, True)  # pyright: ignore[reportCallIssue]  its stub knows none
+    polygon = QPolygonF()
+    polygon.resize(len(points))
+    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyright: ignore[reportCallIssue]  its stub knows none
     np.frombuffer(memory, np.float64).reshape(-1, 2)[:] = points
-    return made
+    return polygon
 
 
 def faces(corners: Array, shades: NDArray[np.int64]) -> Iterator[tuple[int, QPainterPath]]:
@@ -78,7 +78,7 @@ def faces(corners: Array, shades: NDArray[np.int64]) -> Iterator[tuple[int, QPai
     edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
     for begin, end in pairwise(edges):
         part = elements[begin:end]
-        made = QPainterPath()
+        path = QPainterPath()
         stream = QDataStream(QByteArray(part.size.to_bytes(4, "big") + part.tobytes() + _TAIL))
-        stream >> made  # pyright: ignore[reportUnusedExpression]  it reads into `made`
-        yield int(sorted_shades[begin]), made
+        stream >> path  # pyright: ignore[reportUnusedExpression]  it reads into `path`
+        yield int(sorted_shades[begin]), path

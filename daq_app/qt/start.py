@@ -141,7 +141,7 @@ def _tablet(address: str | None) -> "TabletScreen":
     return TabletScreen(address, PORT)
 
 
-def _shown(made: "Callable[[QApplication], QWidget]") -> int:
+def _shown(build: "Callable[[QApplication], QWidget]") -> int:
     """Show the window that is made until it is closed; return the exit code, or say what is missing."""
     if missing := what_is_missing():
         return _said(missing)
@@ -154,7 +154,7 @@ def _shown(made: "Callable[[QApplication], QWidget]") -> int:
     application = QApplication(sys.argv[:1])
     _speak(application)
     try:
-        window = made(application)
+        window = build(application)
     except NoTabletServer as error:
         return _said(str(error))
     window.show()

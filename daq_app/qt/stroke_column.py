@@ -22,9 +22,9 @@ NUMBERS, READINGS = range(2)  # tabs
 
 
 class StrokeColumn(QWidget):
-    """`asked` tells what the work is to do."""
+    """`requested` tells what the work is to do."""
 
-    asked = Signal(object)
+    requested = Signal(object)
     replayed = Signal()  # to the end of the trial
 
     def __init__(self, tokens: Tokens) -> None:
@@ -40,10 +40,10 @@ class StrokeColumn(QWidget):
         self.player.moved.connect(self._moved)
         self.player.ended.connect(self.replayed.emit)
         self.decisions = DecisionsBar()
-        self.decisions.asked.connect(self.asked.emit)
+        self.decisions.requested.connect(self.requested.emit)
         self.save = SaveButtons(tr("the stroke"), self._save)
         self._numbers = QGridLayout()
-        self._told: tuple[tuple[str, str], ...] = ()
+        self._lines: tuple[tuple[str, str], ...] = ()
         self.readings = ReadingsTable()
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("numbers and readings"))
@@ -51,7 +51,7 @@ class StrokeColumn(QWidget):
         self.tabs.addTab(self._scroll, tr("Numbers"))
         self.tabs.addTab(self.readings, tr("Readings"))
         self.friction = TextTable(tr("friction of every stroke"), [tr(words) for words in FRICTION_HEAD])
-        self.friction.told.connect(self._choose)
+        self.friction.chosen.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
         layout = bare(QVBoxLayout(self), GRID // 2)
@@ -78,9 +78,9 @@ class StrokeColumn(QWidget):
         self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()), state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
-        told = numbers(state)
-        if told != self._told:
-            self._told = told
+        lines = numbers(state)
+        if lines != self._lines:
+            self._lines = lines
             self._show_numbers()
 
     def go_to_window(self) -> None:
@@ -107,7 +107,7 @@ class StrokeColumn(QWidget):
     _play_next = False
 
     def _choose(self, row: int) -> None:
-        self.asked.emit(m.Choose(row))
+        self.requested.emit(m.Choose(row))
 
     def _show_readings(self, state: AnalystState) -> None:
         stroke, read = self._stroke, state.read
@@ -115,7 +115,7 @@ class StrokeColumn(QWidget):
         if wanted != self._wanted:
             self._wanted = wanted  # first, for asking comes back here
             if stroke is not None:
-                self.asked.emit(m.ShowReadings(stroke.number))
+                self.requested.emit(m.ShowReadings(stroke.number))
         if read is not None and (stroke is None or read.stroke != stroke.number):
             read = None
         if read is self._read and not (read is None and self.player.slider.maximum()):
@@ -137,17 +137,17 @@ class StrokeColumn(QWidget):
             if (old := item.widget()) is not None:
                 old.hide()
                 old.deleteLater()
-        for at, (name, value) in enumerate(self._told):
+        for at, (name, value) in enumerate(self._lines):
             self._numbers.addWidget(label(name, "quiet"), at, 0)
             self._numbers.addWidget(label(value, wrap=True), at, 1)
         for at in range(self._numbers.rowCount() + 1):
-            self._numbers.setRowStretch(at, int(at >= len(self._told)))
+            self._numbers.setRowStretch(at, int(at >= len(self._lines)))
 
     def _dragged(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
             self._moving = True
             by, why = self.decisions.who(), self.decisions.reason()
-            self.asked.emit(m.Move(self._stroke.number, edge, time, by, why))
+            self.requested.emit(m.Move(self._stroke.number, edge, time, by, why))
 
     def _moved(self, at: int) -> None:
         self.stroke.show_moment(at)
@@ -155,17 +155,17 @@ class StrokeColumn(QWidget):
             self.readings.go_to(at)
 
     def _save(self, name: str, path: str) -> None:
-        self.asked.emit(m.Write(f"picture {name}", path))
+        self.requested.emit(m.Write(f"picture {name}", path))
 
     def _scrolled(self) -> QScrollArea:
-        told = QWidget()
-        told.setLayout(self._numbers)
+        box = QWidget()
+        box.setLayout(self._numbers)
         self._numbers.setColumnStretch(1, 1)
         self._numbers.setContentsMargins(0, 0, 0, 0)
         scrolled = QScrollArea()  # where there is little room the numbers are scrolled, never cut
-        scrolled.setWidget(told)
+        scrolled.setWidget(box)
         scrolled.setWidgetResizable(True)
-        told.setObjectName("inside")
+        box.setObjectName("inside")
         scrolled.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
         scrolled.setAccessibleName(tr("numbers of the stroke and its prediction"))
         return scrolled

@@ -182,11 +182,11 @@ class StrokeView(QWidget):
 
     def _line(self, edge: Edge, plot: Any) -> Any:  # noqa: ANN401  pyqtgraph has no types
         first = plot is self._plots[0]
-        beside = 1.0 if edge in ("lift", "steady end") else 0.0  # on the side where there is room
+        side = 1.0 if edge in ("lift", "steady end") else 0.0  # on the side where there is room
         options = {
             "position": 0.92 if edge in ("onset", "lift") else 0.8,
             "color": QColor(self._tokens.act),
-            "anchors": [(beside, 0.5), (beside, 0.5)],
+            "anchors": [(side, 0.5), (side, 0.5)],
         }
         line: Any = pg.InfiniteLine(
             angle=90,

@@ -55,8 +55,8 @@ class SubjectPreview(QDialog):
         self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")
         row = QHBoxLayout()
-        for made in (self.back, self.on, self._count):
-            row.addWidget(made)
+        for widget in (self.back, self.on, self._count):
+            row.addWidget(widget)
         row.addStretch(1)
         row.addWidget(button(tr("Close  Esc"), tr("close the preview"), self.close))
         right = QVBoxLayout()

@@ -88,14 +88,14 @@ class SubjectSide(QObject):
     def _place(self, *, activating: bool) -> None:
         """Show the subject's window: on a second screen where there is one."""
         subject, here = self._subject, self._window.screen()
-        others = [screen for screen in QGuiApplication.screens() if screen is not here]
+        elsewhere = [screen for screen in QGuiApplication.screens() if screen is not here]
         subject.setAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating, not activating)
-        if others and not subject.isVisible():
-            subject.setGeometry(others[0].availableGeometry())
+        if elsewhere and not subject.isVisible():
+            subject.setGeometry(elsewhere[0].availableGeometry())
             subject.setWindowState(Qt.WindowState.WindowFullScreen)  # not showFullScreen: that takes the keyboard
-        elif not others and activating and subject.scoring:
+        elif not elsewhere and activating and subject.scoring:
             subject.setGeometry(self._window.geometry())
-        if others or activating:
+        if elsewhere or activating:
             subject.show()
 
     def _bring(self) -> None:

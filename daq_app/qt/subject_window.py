@@ -122,13 +122,13 @@ class SubjectWindow(QWidget):
         """Make the letters as large as they should be, or as small as lets all of the page be read."""
         layout = self._answer_layout if self.scoring else self._message_layout
         for part in SHRINKING:
-            for made, size in (
+            for widget, size in (
                 (self._title, LARGER),
                 (self._question, LARGER),
                 (self._text, LARGE),
                 (self._hint, LARGE),
             ):
-                _set_type(made, size * part, self._type, bold=size == LARGER)
+                _set_type(widget, size * part, self._type, bold=size == LARGER)
             self._scale.set_type(LARGE * part, self._type)
             layout.invalidate()
             layout.activate()  # a page that is not shown has not yet heard of its new texts
@@ -247,12 +247,12 @@ class SubjectWindow(QWidget):
         layout.addStretch(2)
         self._next_row = QHBoxLayout()
         self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
-        held = QWidget()  # keeps the button's place while there is none
-        held.setLayout(self._next_row)
-        held.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
-        held.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
-        held.setMaximumWidth(WIDEST)
-        layout.addLayout(_centred(held, 1000))
+        place = QWidget()  # keeps the button's place while there is none
+        place.setLayout(self._next_row)
+        place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
+        place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
+        place.setMaximumWidth(WIDEST)
+        layout.addLayout(_centred(place, 1000))
         self._place_next("right")
         return page
 
@@ -284,14 +284,14 @@ class SubjectWindow(QWidget):
         if not self.scoring or not self._way.answered:
             return
         self.given_with = key
-        given = self._way.given(self._stated_hand)
+        answer_event = self._way.answer_event(self._stated_hand)
         self.next.hide()  # nobody gives an answer twice
         self._view, self._answered = None, self._view
         say(self._title, translator(self._language)(Text.THANKS))
         say(self._text, "")
         self._fit_type()
         self._pages.setCurrentIndex(0)
-        self.answered.emit(given)
+        self.answered.emit(answer_event)
 
 
 class _Scale(QWidget):
@@ -338,10 +338,10 @@ class _Scale(QWidget):
         self.fit()
 
 
-def _set_type(made: QLabel, size: float, scale: float, *, bold: bool = False) -> None:
+def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) -> None:
     """Set a label in large type: the style sheet's sizes are those of the experimenter's window."""
-    made.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
-    made.setFont(font(round(size), scale, bold=bold))
+    widget.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
+    widget.setFont(font(round(size), scale, bold=bold))
 
 
 def _centred(widget: QWidget, weight: int) -> QHBoxLayout:

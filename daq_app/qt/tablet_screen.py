@@ -37,7 +37,7 @@ class TabletScreen(QObject):
         self.session_offset = 0.0  # session clock minus this machine's monotonic one [s]
         self._pixels: float | None = None  # in a millimetre, measured with a ruler
         self._part = 0.0
-        self._told = 0.0  # when the bar was told last [s]
+        self._last_sent = 0.0  # when the bar was told last [s]
         self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
         self._moved.connect(self.changed, Qt.ConnectionType.QueuedConnection)
         self.server = TabletServer(address or own_address(), port, self._arrived.emit, self._moved.emit)
@@ -78,8 +78,8 @@ class TabletScreen(QObject):
     def show_force(self, trace: LiveTrace) -> None:
         """Show how hard the finger presses."""
         part, now = min(max(newest_force(trace) / FULL, 0.0), 1.0), time.monotonic()
-        if now - self._told >= FORCE_EVERY and round(part * STEPS) != round(self._part * STEPS):
-            self._part, self._told = part, now
+        if now - self._last_sent >= FORCE_EVERY and round(part * STEPS) != round(self._part * STEPS):
+            self._part, self._last_sent = part, now
             self.server.send(Force(part))
 
     def line_settings(self) -> tuple[Setting, ...]:

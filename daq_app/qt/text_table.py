@@ -53,7 +53,7 @@ class _ByNumber(QSortFilterProxyModel):
 class TextTable(CopiedTable):
     """Lines of cells under a head; a click on the head sorts, and a line is told when somebody goes to it."""
 
-    told = Signal(int)  # its number before any sorting
+    chosen = Signal(int)  # its number before any sorting
 
     def __init__(self, name: str, head: Sequence[str]) -> None:
         """Show no line yet; screen readers say `name`."""
@@ -98,11 +98,11 @@ class TextTable(CopiedTable):
 
     def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():
-            self.told.emit(self._sorted.mapToSource(now).row())
+            self.chosen.emit(self._sorted.mapToSource(now).row())
 
 
 def _item(words: str) -> QStandardItem:
-    made = QStandardItem(words)
+    item = QStandardItem(words)
     if number_in(words) is not None or words == "–":
-        made.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-    return made
+        item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return item

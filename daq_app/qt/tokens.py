@@ -85,17 +85,17 @@ def font_scale() -> float:
 
 def font(size: int, scale: float, *, bold: bool = False) -> QFont:
     """Return the window's type at a size, with figures that all have the same width."""
-    made = QFont(QGuiApplication.font())
-    made.setPixelSize(round(size * scale))
-    made.setFeature(QFont.Tag.fromString("tnum"), 1)
+    typeface = QFont(QGuiApplication.font())
+    typeface.setPixelSize(round(size * scale))
+    typeface.setFeature(QFont.Tag.fromString("tnum"), 1)
     if bold:
-        made.setWeight(QFont.Weight.DemiBold)
-    return made
+        typeface.setWeight(QFont.Weight.DemiBold)
+    return typeface
 
 
 def palette(t: Tokens) -> QPalette:
     """Return the palette for what the style draws by itself: radio buttons, arrows of lists, focus."""
-    made = QPalette()
+    colours = QPalette()
     role = QPalette.ColorRole
     for name, colour in (
         (role.Window, t.ground),
@@ -113,10 +113,10 @@ def palette(t: Tokens) -> QPalette:
         (role.HighlightedText, t.on_act),
         (role.Mid, t.line),
     ):
-        made.setColor(name, QColor(colour))
+        colours.setColor(name, QColor(colour))
     for name in (role.Text, role.ButtonText, role.WindowText):
-        made.setColor(QPalette.ColorGroup.Disabled, name, QColor(t.quiet))
-    return made
+        colours.setColor(QPalette.ColorGroup.Disabled, name, QColor(t.quiet))
+    return colours
 
 
 def style_sheet(t: Tokens, scale: float) -> str:

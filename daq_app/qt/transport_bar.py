@@ -32,8 +32,8 @@ class TransportBar(QWidget):
         self.play = button("▶", tr("play {what}", what=what), self.toggle, "small")
         self.back = button("◀|", tr("one step back in {what}", what=what), lambda: self.step(-1), "small")
         self.forward = button("|▶", tr("one step forward in {what}", what=what), lambda: self.step(+1), "small")
-        for made in (self.play, self.back, self.forward):
-            made.setMinimumWidth(TARGET)
+        for widget in (self.play, self.back, self.forward):
+            widget.setMinimumWidth(TARGET)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName(tr("place in {what}", what=what))
         self.slider.setMinimumHeight(TARGET)

@@ -47,20 +47,20 @@ class TrialStrip(QScrollArea):
             gone.deleteLater()
         while len(self.tiles) < len(tiles):
             self._add()
-        for made, tile in zip(self.tiles, tiles, strict=True):
+        for tile_button, tile in zip(self.tiles, tiles, strict=True):
             text = f"{MARKS[tile.kind]} {tile.number}\n{tile.code}"
-            if made.text() != text:
-                made.setText(text)
-            made.setAccessibleName(tile.words)
-            made.setToolTip(tile.words)
-            regrade(made, GRADES.get(tile.kind, ""))
+            if tile_button.text() != text:
+                tile_button.setText(text)
+            tile_button.setAccessibleName(tile.words)
+            tile_button.setToolTip(tile.words)
+            regrade(tile_button, GRADES.get(tile.kind, ""))
         self._shown = tiles
         self._keep_in_sight()
 
     def show_inspected(self, number: int | None) -> None:
         """Show which trial is inspected; None: none is."""
-        for made, tile in zip(self.tiles, self._shown, strict=True):
-            made.setChecked(tile.number == number)
+        for tile_button, tile in zip(self.tiles, self._shown, strict=True):
+            tile_button.setChecked(tile.number == number)
 
     def _keep_in_sight(self) -> None:
         current = next((at for at, tile in enumerate(self._shown) if tile.kind == "current"), None)
@@ -69,8 +69,8 @@ class TrialStrip(QScrollArea):
 
     def _add(self) -> None:
         at = len(self.tiles)
-        made = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile")
-        made.setCheckable(True)
-        made.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
-        self.tiles.append(made)
-        self._row.insertWidget(at, made)
+        tile_button = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile")
+        tile_button.setCheckable(True)
+        tile_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
+        self.tiles.append(tile_button)
+        self._row.insertWidget(at, tile_button)

@@ -21,9 +21,9 @@ pg: Any = pyqtgraph  # it has no types
 
 
 class TrialsColumn(QWidget):
-    """`asked` tells which row was chosen, `responded` which quantity is held against the score."""
+    """`requested` tells which row was chosen, `responded` which quantity is held against the score."""
 
-    asked = Signal(object)
+    requested = Signal(object)
     responded = Signal(object)
 
     def __init__(self, tokens: Tokens) -> None:
@@ -61,9 +61,9 @@ class TrialsColumn(QWidget):
         self._listed = listed
         for at, row in enumerate(rows(state)):
             item = self.list.item(at)
-            told = marks_of(row)
-            item.setToolTip(told)
-            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {told}".rstrip())
+            marks = marks_of(row)
+            item.setToolTip(marks)
+            item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{listed[at]} {marks}".rstrip())
         self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
         self.list.blockSignals(False)
         self.errors.show_text(greatest_errors(state.report, state.response))
@@ -84,7 +84,7 @@ class TrialsColumn(QWidget):
 
     def _chosen(self, row: int) -> None:
         if row >= 0:
-            self.asked.emit(m.Choose(row))
+            self.requested.emit(m.Choose(row))
 
     def _respond(self) -> None:
         self.responded.emit(m.Respond(self.responses.currentData()))
@@ -93,11 +93,11 @@ class TrialsColumn(QWidget):
         plot = ZoomedPlot(self._tokens)
         plot.setAccessibleName(tr("prediction against score: a point chooses its trial"))
         plot.setLabel("bottom", tr("mean score"))
-        made = pg.ScatterPlotItem()
-        made.sigClicked.connect(self._point_clicked)
-        plot.addItem(made)
-        return plot, made
+        scatter = pg.ScatterPlotItem()
+        scatter.sigClicked.connect(self._point_clicked)
+        plot.addItem(scatter)
+        return plot, scatter
 
     def _point_clicked(self, _item: object, clicked: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
         if len(clicked) and clicked[0].data() is not None:
-            self.asked.emit(m.Choose(int(clicked[0].data())))
+            self.requested.emit(m.Choose(int(clicked[0].data())))

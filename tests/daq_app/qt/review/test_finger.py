@@ -287,7 +287,7 @@ def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(a
     assert first._look.range == second._look.range
     drag(application, first.viewport(), QPoint(60, 90), QPoint(90, 90), Qt.KeyboardModifier.ShiftModifier)
     assert second.sight.line == first.sight.line is not None
-    window.model.both.click()
+    window.model.together.click()
     assert not second.isVisible()
     first.sight.set_line(None)
     first.sight.look_at(None)
