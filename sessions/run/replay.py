@@ -109,7 +109,9 @@ class _Rewriter(FleetingWriter):
         kind: str,
         trial: int | None = None,
         data: Mapping[str, Any] | None = None,
-        **further: Any,  # noqa: ANN401
+        *,
+        time_ns: int | None = None,
+        commit: bool = True,
     ) -> LoggedEvent:
         """Write an event down. Raises _CutShort where the recording ends without an end."""
         if self._cut and (kind == "ended" or self._next_event == len(self._log)):
@@ -118,8 +120,8 @@ class _Rewriter(FleetingWriter):
         place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
         if place is not None:
             self._next_event = place + 1
-            further["time_ns"] = self._log[place].time_ns
-        self.log_written.append(super().event(kind, trial, data, **further))
+            time_ns = self._log[place].time_ns
+        self.log_written.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
         return self.log_written[-1]
 
     def commit(self) -> Acknowledged:
