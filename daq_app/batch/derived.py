@@ -183,7 +183,8 @@ def repeat(
     original = plan_of or recording
     plan = (original if blind else revealed(original)).plan
     analysis = analyse(recording, settings_of(stored), decisions)
-    return _with_firing(_predict(analysis, plan, options, lambda _: True), _afferent_of(stored))
+    prediction = _predict(analysis, plan, options, lambda _: True)
+    return with_present_names(_with_firing(prediction, _afferent_of(stored)))
 
 
 def changes(name: str, stored: Mapping[str, Any], fresh: Mapping[str, Any]) -> list[str]:

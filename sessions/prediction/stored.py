@@ -21,8 +21,7 @@ from solver.response.fields import Fields, fields_of
 _NOT_STORED = ("prediction", "opposite")  # of a row as plain data: all that the solver found
 _STORED_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")
 
-
-# Options of documents from before 2026-11-26, and what they are called now. Once no such document is read, this goes.
+# Options as they were called until 2026-11-26, and what they are called now. Documents hold both names for one release.
 _RENAMED = {"beside": "variants", "beside_intervals": "variant_intervals"}
 ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
@@ -121,6 +120,8 @@ class SessionPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, None where honesty allows no number."""
+        options = asdict(self.options)
+        origin = {f.name: "default" if options[f.name] == f.default else "set" for f in fields(self.options)}
         return {
             **({"simulated": "SIMULATED"} if self.simulated else {}),
             "trials": [trial.to_dict() for trial in self.trials],
@@ -130,11 +131,8 @@ class SessionPrediction:
             "bootstrap_seed": self.bootstrap_seed,
             "width": self.width,
             "width_origin": self.width_origin,
-            "options": asdict(self.options),
-            "options_origin": {
-                field.name: "default" if getattr(self.options, field.name) == field.default else "set"
-                for field in fields(self.options)
-            },
+            "options": _with_former_names(options),
+            "options_origin": _with_former_names(origin),
             "scene": asdict(template(self.options)),  # finger, materials and settings as used, defaults filled in
         }
 
@@ -164,8 +162,12 @@ class _Document(msgspec.Struct):
     decisions: tuple[Decision, ...]
 
 
+def _with_former_names(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {**options, **{former: options[name] for former, name in _RENAMED.items()}}
+
+
 def with_present_names(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a prediction with its options called as they are now."""
+    """Return a prediction with each of its options called as it is now, and by that name alone."""
     parts = {name: document.get(name) for name in ("options", "options_origin")}
     renamed = {
         name: {_RENAMED.get(key, key): value for key, value in cast("dict[str, Any]", part).items()}

@@ -215,10 +215,13 @@ def test_the_options_of_a_prediction_of_an_older_program_are_read_by_their_prese
     now = json.loads((folder / "prediction.json").read_bytes())
     older = {name: dict(now[name]) for name in ("options", "options_origin")}
     for part in older.values():
-        part["beside"], part["beside_intervals"] = part.pop("variants"), part.pop("variant_intervals")
+        assert (part["beside"], part["beside_intervals"]) == (part.pop("variants"), part.pop("variant_intervals"))
+    present = stored_document(folder, "prediction.json")
     (folder / "prediction.json").write_text(json.dumps({**now, **older}))
     stored = stored_document(folder, "prediction.json")
-    assert {name: stored[name] for name in older} == {name: now[name] for name in older}
+    assert {name: stored[name] for name in older} == {name: present[name] for name in older}
+    assert "variants" in stored["options"]
+    assert "beside" not in stored["options"]
 
 
 def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, capsys, tmp_path):

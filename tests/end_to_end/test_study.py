@@ -52,6 +52,8 @@ def test_the_damaged_session_is_named_and_stops_nothing(pool):
 
 def test_each_planted_flaw_stands_beside_whether_it_was_found(pool):
     assert [(flaw["session"], flaw["detected"]) for flaw in pool["flaws"]] == [("S02", True), ("S11", True)]
+    assert all(flaw["found"] == flaw["detected"] for flaw in pool["flaws"])  # the former name, for one release
+    assert all(effect["found"] == effect["estimate"] for effect in pool["effects"])
 
 
 def test_readings_lost_in_one_stroke_withhold_its_numbers_and_no_others(pool):

@@ -157,4 +157,12 @@ class StudyFindings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
+        document: dict[str, Any] = {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
+        # Names until 2026-11-26, which stay for one release
+        for effect in document["effects"]:
+            effect["found"] = effect["estimate"]
+        for flaw in document["flaws"]:
+            flaw["found"] = flaw["detected"]
+        for exponent in filter(None, (one["exponent"] for one in document["descriptors"])):
+            exponent["both"] = exponent["deming"]
+        return document
