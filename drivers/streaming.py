@@ -230,21 +230,23 @@ class StreamingTransducer(ThreadedTransducer):
 
     def _listen(self, link: Link, decoder: RecordDecoder, data: bytes | None) -> None:
         """Decode what comes. A pause of the device is waited out as long as it may be one."""
-        begun = time.monotonic()
         quiet = (_QUIET if self._ever else _FIRST) + 4.0 * self._period
+        silence, looked = 0.0, time.monotonic()
         while True:
             received_ns = self.clock.now_ns()
             records = decoder.feed(data) if data else None
             now = time.monotonic()
+            silence += min(now - looked, TICK + _GATHER)  # beyond that this computer was busy, and records may wait
+            looked = now
             if records is not None and len(records.status):
                 self._pending.append(_Arrived(records, received_ns))
                 self._heard, self._ever = now, True
-                quiet = _QUIET + 4.0 * self._period
+                silence, quiet = 0.0, _QUIET + 4.0 * self._period
                 if not self.news.is_set():
                     self.news.set()
             if self.stopping.is_set():
                 return
-            if now - max(self._heard, begun) > quiet:
+            if silence > quiet:
                 raise LinkLost(
                     f"{self.info.uri} has sent no reading for {now - self._heard:.1f} s; check its power and cable"
                 )
