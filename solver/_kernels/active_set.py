@@ -17,7 +17,7 @@ from solver._kernels.arguments import (
     Slack,
     StateChanges,
 )
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled, compiled_apart
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver._kernels.contact_system import (
     COLUMNS,
     STEEP,
@@ -193,7 +193,7 @@ def sum_forces(body: CondensedArrays, by_forces: bool, kind: int, sums: Array, l
                 sums[i % 2, c] += body.stiffness[i, c]
 
 
-@compiled_apart
+@compiled
 def solve_states(
     body: CondensedArrays,
     skin: Skin,

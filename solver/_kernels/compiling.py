@@ -165,22 +165,11 @@ def compiled(function: Loop) -> Loop:
 
     What a loop calls is copied into it before it is compiled. To compile that by itself too would take as long again
     for each level of calls; and of two versions of it in two loops, the one that a process loads first would serve
-    both, so that the last bits of a result would depend on what was called before. A division by zero makes infinity:
-    to raise would take a branch each time, and a sixth more time to compile.
+    both, so that the last bits of a result would depend on what was called before, and on whether this process compiled
+    or loaded them. A division by zero makes infinity: to raise would take a branch each time, and a sixth more time to
+    compile.
     """
-    return _loop(function, "always")
-
-
-def compiled_apart(function: Loop) -> Loop:
-    """Return `function` as a loop that the only loop which calls it does not copy.
-
-    It is for a large part of a large loop: to compile the two one by one takes a fifth less time than as one.
-    """
-    return _loop(function, "never")
-
-
-def _loop(function: Loop, inline: str) -> Loop:
-    loop = _numba.njit(fastmath=_FAST, inline=inline, error_model="numpy", no_cfunc_wrapper=True)(function)
+    loop = _numba.njit(fastmath=_FAST, inline="always", error_model="numpy", no_cfunc_wrapper=True)(function)
     loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
     return cast("Loop", loop)
 

@@ -27,10 +27,10 @@ class OneByteRecords:
 class PlainConversation:
     """Says nothing around a stream."""
 
-    def begin(self, link):
+    def begin(self, _):
         return b""
 
-    def end(self, link):
+    def end(self, _):
         pass
 
     def decoder(self):
