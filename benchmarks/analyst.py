@@ -76,7 +76,7 @@ def _painting(film) -> None:  # noqa: ANN001
     """Print what painting a state of the finger takes."""
     from PySide6.QtWidgets import QApplication
 
-    from daq_app.analyst.field_list import FIELD_CHOICES
+    from daq_app.analyst.frame import FIELD_CHOICES
     from daq_app.qt.finger_canvas import FingerCanvas, Look
     from daq_app.qt.tokens import LIGHT
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:  # multiprocessing takes a while to import, and most verbs sta
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.context import SpawnContext
 
+BELOW = 5  # on POSIX, nice's steps towards the end of the queue
+BELOW_NORMAL = 0x4000  # on Windows, its name for the same
 SAFE_PATH = "PYTHONSAFEPATH"  # a Python that finds this in its environment starts as with -P
 
 
@@ -69,3 +71,14 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)  # nobody is left to hand anything to
+
+
+def give_way() -> None:
+    """Let this process go behind recorder and window; where the system refuses, nothing happens."""
+    if sys.platform == "win32":
+        import ctypes
+
+        kernel = ctypes.windll.kernel32
+        kernel.SetPriorityClass(kernel.GetCurrentProcess(), BELOW_NORMAL)
+    else:
+        os.nice(BELOW)

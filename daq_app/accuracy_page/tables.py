@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from typing import TypeVar
 
@@ -12,6 +13,7 @@ from solver.verification.estimates import Estimate
 from solver.verification.hard_cases import HardCase
 from solver.verification.histories import Marched
 from solver.verification.machine import Machine
+from solver.verification.marked_page import filled
 from solver.verification.measuring import Measured
 from solver.verification.orders import Order
 from solver.verification.processes import Cold
@@ -24,6 +26,13 @@ from solver.verification.warm import Warm
 R = TypeVar("R")
 
 CELL_WORDS = 25  # the limit for a cell of the docs: tests/test_documents_prose.py
+PAGES: Mapping[str, tuple[str, ...]] = {
+    "benchmarks.md": ("targets", "estimates", "machine"),
+    "benchmarks/published-problems.md": ("problems",),
+    "benchmarks/convergence.md": ("orders",),
+    "benchmarks/hard-cases-small.md": ("hard-small",),
+    "benchmarks/hard-cases-finite.md": ("hard-finite",),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,3 +261,15 @@ def _ms(seconds: float | None) -> str:
 
 def _limit(value: float | None, unit: str) -> str:
     return "–" if value is None else f"{value:g} {unit}"
+
+
+
+
+def fill(docs: Path, tables: Mapping[str, Table]) -> None:
+    """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
+    for page, names in PAGES.items():
+        text = (docs / page).read_text(encoding="utf-8")
+        for name in names:
+            if name in tables:
+                text = filled(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
+        (docs / page).write_text(text, encoding="utf-8")

@@ -1,11 +1,14 @@
-"""One state of the model's finger as arrays, ready to be painted."""
+"""One state of the model's finger as arrays, the fields drawn over it, and where its places lie in a picture."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from daq_app.wording import tr, tr_noop
+from solver.quantities import FIELDS, SED
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -13,6 +16,12 @@ Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
 TOP = 0.97  # of the corners' values lies below the end of the colour scale
 STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+Box = tuple[float, float, float, float]  # left, right, below, above [mm]
+Range = tuple[float, float]
+FIELD_ERRORS = tr_noop(
+    "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
+)
+NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,3 +157,91 @@ def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, 
     a, b, c = triangles.T
     four = np.stack([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]).transpose(2, 0, 1).reshape(-1, 3)
     return np.concatenate([nodes, middles[0]]), np.concatenate([sed, middles[1]]), four
+
+
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A place in the world, where on the screen it lies, and the scale. Pixels count downwards."""
+
+    x: float  # [mm]
+    y: float  # [mm]
+    across: float  # [pixel]
+    down: float  # [pixel]
+    per_mm: float  # [pixel/mm]
+
+    @staticmethod
+    def fitted(box: Box, left: float, top: float, width: float, height: float) -> "View":
+        """Return the view that shows all of `box` at the foot of a rectangle of the screen [pixel]."""
+        per_mm = min(width / (box[1] - box[0]), height / (box[3] - box[2]))
+        middle = box[2] + height / per_mm / 2.0
+        return View((box[0] + box[1]) / 2.0, middle, left + width / 2.0, top + height / 2.0, per_mm)
+
+    def placed(self, points: Array) -> Array:
+        """Return where points (n, 2) [mm] lie on the screen (n, 2) [pixel]."""
+        return np.array([self.across, self.down]) + (points - [self.x, self.y]) * [self.per_mm, -self.per_mm]
+
+    def place(self, across: float, down: float) -> tuple[float, float]:
+        """Return the place [mm] at a pixel."""
+        return self.x + (across - self.across) / self.per_mm, self.y - (down - self.down) / self.per_mm
+
+    def visible(self, left: float, top: float, width: float, height: float) -> Box:
+        """Return what a rectangle of the screen shows."""
+        (x0, y1), (x1, y0) = self.place(left, top), self.place(left + width, top + height)
+        return x0, x1, y0, y1
+
+
+
+
+
+@dataclass(frozen=True, slots=True)
+class FieldChoice:
+    """A field as people read it."""
+
+    name: str  # among the values of a frame
+    label: str
+    unit: str  # "kPa", "mm", or "-" for a strain
+    factor: float  # from the solver's unit to this one
+    signed: bool
+
+    def of(self, frame: Frame) -> Array:
+        """Return the field at the nodes of a frame (n,), in its own unit; nan where the frame has none."""
+        values = frame.values.get(self.name)
+        return np.full(len(frame.nodes), np.nan) if values is None else self.factor * values
+
+    def words(self, value: float) -> str:
+        """Return a value with its unit."""
+        return f"{tr(self.label)} {value:.4g} {self.unit}".removesuffix(" -").replace(" -", " −")
+
+    @property
+    def axis(self) -> str:
+        """What an axis of it says."""
+        return f"{tr(self.label)} [{self.unit}]"
+
+
+FIELD_CHOICES = (
+    *(
+        FieldChoice(
+            one.name,
+            one.label,
+            "kPa" if one.unit == "MPa" else one.unit,
+            1000.0 if one.unit == "MPa" else 1.0,
+            one.name not in NEVER_NEGATIVE,
+        )
+        for one in FIELDS
+    ),
+    FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),
+)
+
+
+def automatic_range(field: FieldChoice, frames: Iterable[Frame]) -> Range:
+    """Return where the colours of frames begin and end: few nodes lie beyond; nought is the middle of signed ones."""
+    tops = [0.0]
+    for frame in frames:
+        values = np.abs(field.of(frame))
+        known = values[np.isfinite(values)]
+        if len(known):
+            tops.append(float(np.quantile(known, TOP)))
+    high = step_above(max(tops))
+    return (-high if field.signed else 0.0), high

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.analyst.field_list import FieldChoice
-from daq_app.analyst.frame import Frame, Parts
+from daq_app.analyst.frame import FieldChoice, Frame, Parts
 from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]

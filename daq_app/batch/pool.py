@@ -2,18 +2,20 @@
 
 import hashlib
 import json
+import multiprocessing
+import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from daq_app.batch.cluster import by_cluster
 from daq_app.batch.session_numbers import Answer, computed, content_of
-from daq_app.batch.workers import local_pool
+from daq_app.child_process import process_pool
 from daq_app.console import Console
 from sessions.atomic_file import write_whole
 from sessions.recording import RecordingError
@@ -21,6 +23,7 @@ from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions
 
 LOOK = 0.1  # between two looks whether something is done [s]
+KILLED = 0.1  # that a killed process may take to end [s]
 
 
 class Shelf:
@@ -138,3 +141,25 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int | None
             ready, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
             for future in ready:
                 yield future.result()
+
+
+
+
+@contextmanager
+def local_pool(work: int, workers: int | None = None) -> Generator[ProcessPoolExecutor]:
+    """Give a pool for so many pieces of work: `workers` processes, or as many as there are cores.
+
+    At the end the work is waited for. Where an exception leaves, as on Ctrl-C, the processes are killed.
+    """
+    pool = process_pool(workers or min(os.cpu_count() or 1, work))
+    try:
+        yield pool
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        children = multiprocessing.active_children()
+        for process in children:
+            process.kill()  # they hold nothing that is not computed again
+        for process in children:
+            process.join(KILLED)
+        raise

@@ -1,14 +1,16 @@
 """The analyst's window: trials, the stroke of the chosen one, and what the model says of it."""
 
+from html import escape
 from pathlib import Path
 from typing import Protocol
 
-from PySide6.QtCore import QSize, Qt, QTimer
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
     QHBoxLayout,
+    QLabel,
     QMainWindow,
     QProgressBar,
     QScrollArea,
@@ -19,12 +21,11 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.lineage import lineage
+from daq_app.analyst.lineage import Link, lineage
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.shown import progress_words
 from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
-from daq_app.qt.lineage_label import LineageLabel
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
 from daq_app.qt.parts import Wrapped, bare, button, choice, label, panel
 from daq_app.qt.remembered import type_scale
@@ -33,9 +34,50 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trials_column import TrialsColumn
 from daq_app.wording import tr
 from sessions.exchange import FORMATS
-
 LOOK = 30  # between two looks at the work [ms]
 LEAST = (480, 320)  # the window can be made as small as that [px]
+
+
+class LineageLabel(QLabel):
+    """Links in their order."""
+
+    followed = Signal(str)  # the place that a link leads to
+
+    def __init__(self, tokens: Tokens) -> None:
+        """Show no way yet."""
+        super().__init__()
+        self._tokens = tokens
+        self._links: tuple[Link, ...] = ()
+        self.setTextFormat(Qt.TextFormat.RichText)
+        self.setWordWrap(True)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
+        self.setTextInteractionFlags(Qt.TextInteractionFlag.LinksAccessibleByMouse)
+        self.setTextInteractionFlags(
+            Qt.TextInteractionFlag.LinksAccessibleByMouse | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
+        )
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.linkActivated.connect(self.followed.emit)
+        self.linkHovered.connect(self._tell)
+        self.setAccessibleName(tr("from the number back to its readings"))
+
+    def show_links(self, links: tuple[Link, ...]) -> None:
+        """Show a way."""
+        if links == self._links:
+            return
+        self._links = links
+        colour = self._tokens.act
+        self.setText(
+            " &nbsp;→&nbsp; ".join(
+                f'<a href="{link.place}" style="color: {colour}">{escape(link.words)}</a>' for link in links
+            )
+        )
+        whole = " → ".join(link.words for link in links)
+        self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=whole))
+
+    def _tell(self, place: str) -> None:
+        self.setToolTip(next((link.more for link in self._links if link.place == place), ""))
+
+
 
 
 class Work(Protocol):

@@ -19,8 +19,7 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
 from daq_app.window.messages import Message
-from daq_app.window.view_bench import BenchView
-from daq_app.window.view_life import NAMES
+from daq_app.window.view_bench import NAMES, BenchView
 from daq_app.wording import tr, tr_noop
 
 SHOWN_COUNTERS = tr_noop(

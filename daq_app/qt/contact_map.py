@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap
 
-from daq_app.qt.painted_widget import PaintedWidget
+from daq_app.qt.painted import PaintedWidget
 from daq_app.qt.shapes import blank, lines
 from daq_app.qt.tokens import MU, SMALL, Tokens, font
 from daq_app.wording import tr

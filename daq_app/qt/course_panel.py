@@ -16,8 +16,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt.mirror import Mirror
 from daq_app.qt.parts import EntryLine, bare, button, label, say
+from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET, Tokens
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow

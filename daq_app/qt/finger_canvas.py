@@ -9,10 +9,8 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, 
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.field_list import FIELD_CHOICES, FieldChoice
-from daq_app.analyst.frame import Frame, Parts
+from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Frame, Parts, View
 from daq_app.analyst.probe import Line, probe_words
-from daq_app.analyst.viewport import View
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
 from daq_app.qt.zoomed_plot import name_axis, style_axis

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.field_list import FieldChoice, Range
-from daq_app.analyst.frame import Frame, Parts, halved, seen
+from daq_app.analyst.frame import Box, FieldChoice, Frame, Parts, Range, View, halved, seen
 from daq_app.analyst.probe import Line
-from daq_app.analyst.viewport import Box, View
 from daq_app.qt.indicators import paint_lost
 from daq_app.qt.shapes import faces
 from daq_app.qt.tokens import Tokens

@@ -7,11 +7,10 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.contact_map import ContactMap
-from daq_app.qt.curve import Curve
 from daq_app.qt.drawer import Drawer
 from daq_app.qt.finger_view import FingerView
 from daq_app.qt.live_bar import LENGTHS, LiveBar
-from daq_app.qt.live_plot import LivePlot
+from daq_app.qt.live_plot import Curve, LivePlot
 from daq_app.qt.parts import bare, button
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens

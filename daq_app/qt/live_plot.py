@@ -5,14 +5,14 @@ a fraction of what a scene of items does (docs/decisions/2026-11-21-the-live-plo
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
-from daq_app.qt.curve import Curve
-from daq_app.qt.painted_widget import PaintedWidget
+from daq_app.qt.painted import PaintedWidget
 from daq_app.qt.shapes import blank, draw_line, fine
 from daq_app.qt.tokens import SMALL, Tokens, font
 from daq_app.window.course_state import Mark
@@ -27,6 +27,16 @@ LEAST = 36  # height that holds the name and the times under it, likewise
 SAMPLE = 14  # length of the piece of line before a curve's name, likewise
 DASHES = 45  # times two thirds of a dash in the stretch that is shown
 FAR = 1e4  # a value so many pixels away is as good as any beyond it
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One curve of a plot."""
+
+    channel: str
+    colour: str  # a token's name, or a colour
+    dashed: bool = False
+    named: bool = True  # in the plot, where it has several
 
 
 class LivePlot(PaintedWidget):

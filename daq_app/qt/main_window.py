@@ -22,15 +22,14 @@ from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
-from daq_app.qt.menus import Menus
+from daq_app.qt.menus import Menus, Rail, Room
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import bare, scrolled
-from daq_app.qt.rail import Rail, Room
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
 from daq_app.qt.screens import millimetres
-from daq_app.qt.subject_preview import open_preview
+from daq_app.qt.subject_picture import open_preview
 from daq_app.qt.subject_side import SubjectSide
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tablet_screen import TabletScreen

@@ -5,11 +5,10 @@ from collections.abc import Callable
 from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.inspected_trial import InspectedTrial
+from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.parts import Wrapped, bare, button, panel, regrade, scrolled
 from daq_app.qt.tokens import GRID, Tokens
-from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
 from daq_app.wording import tr

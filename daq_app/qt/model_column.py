@@ -7,11 +7,10 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.compared import compared
-from daq_app.analyst.field_list import FIELD_ERRORS, automatic_range
-from daq_app.analyst.frame import Finger
+from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
 from daq_app.analyst.seen import (
     common_range,
+    compared,
     film_words,
     finger_words,
     named_errors,
@@ -21,15 +20,13 @@ from daq_app.analyst.seen import (
 )
 from daq_app.analyst.shown import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
-from daq_app.qt.compared_view import PICTURE, ComparedView
-from daq_app.qt.field_bar import OWN, FieldBar
-from daq_app.qt.field_plot import LINE, FieldPlot
+from daq_app.qt.field_plot import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
 from daq_app.qt.parts import Wrapped, bare, button, choice
-from daq_app.qt.picture_view import PictureView, SaveButtons
-from daq_app.qt.text_table import TextTable
+from daq_app.qt.picture_view import PICTURE, ComparedView, PictureView, SaveButtons
+from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import Tokens
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr

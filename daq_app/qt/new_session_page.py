@@ -18,13 +18,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt.card import CardFrame
-from daq_app.qt.cut_short import CutShort
+from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
 from daq_app.qt.parts import bare, button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET, Tokens
-from daq_app.qt.transducer_row import TransducerRow
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import LanguageChosen, Message
 from daq_app.window.new_session import (

@@ -1,6 +1,8 @@
-"""A widget that paints itself in the colours of the theme."""
+"""Widgets that paint themselves in the colours of the theme, with or without a ground that is painted once."""
 
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPainter, QPixmap, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.qt.tokens import Tokens
 
@@ -17,3 +19,46 @@ class Painted(QWidget):
         """Follow another theme."""
         self.tokens = tokens
         self.update()
+
+
+class PaintedWidget(QWidget):
+    """Takes all the room there is; a subclass paints the ground, and in its `paintEvent` upon it."""
+
+    def __init__(self, tokens: Tokens) -> None:
+        """Begin without a ground."""
+        super().__init__()
+        self.tokens = tokens
+        self._ground: QPixmap | None = None  # what stands still
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+
+    def set_tokens(self, tokens: Tokens) -> None:
+        """Follow another theme."""
+        self.tokens = tokens
+        self.redraw()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Paint the ground for the new size."""
+        super().resizeEvent(event)
+        self.forget_ground()
+
+    def forget_ground(self) -> None:
+        """Draw what stands still once more when the widget is next painted."""
+        self._ground = None
+
+    def redraw(self) -> None:
+        """Paint everything anew, the ground too."""
+        self.forget_ground()
+        self.update()
+
+    def painter_on_ground(self) -> QPainter:
+        """Return a painter at work on the widget, the ground already there."""
+        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
+            self._ground = self.draw_ground()
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._ground)
+        return painter
+
+    def draw_ground(self) -> QPixmap:
+        """Return what stands still, as large as the widget."""
+        raise NotImplementedError

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import QStackedWidget
 
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.menus import Menus
-from daq_app.qt.rail import Rail, Room
+from daq_app.qt.menus import Menus, Rail, Room
 from daq_app.qt.remembered import remember_session
 from daq_app.qt.tokens import Tokens
 from daq_app.window.messages import NewSession

@@ -10,7 +10,7 @@ from daq_app.qt.languages import missing_glyphs, name_of, translator
 from daq_app.qt.parts import bare, button, choice, field
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
-from daq_app.qt.thumbnail import Thumbnail
+from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import Tokens
 from daq_app.window.new_session import SessionForm, subject_texts
 from daq_app.window.subject_texts import SubjectText

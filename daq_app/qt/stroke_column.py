@@ -10,9 +10,8 @@ from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.decisions_bar import DecisionsBar
 from daq_app.qt.parts import bare, label
 from daq_app.qt.picture_view import SaveButtons
-from daq_app.qt.readings_table import ReadingsTable
 from daq_app.qt.stroke_view import StrokeView
-from daq_app.qt.text_table import TextTable
+from daq_app.qt.tables import ReadingsTable, TextTable
 from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr

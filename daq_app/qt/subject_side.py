@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QMainWindow
 
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
-from daq_app.qt.keyboard import Keyboard
+from daq_app.qt.keys import Keyboard
 from daq_app.qt.screens import line_settings
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tablet_screen import TabletScreen

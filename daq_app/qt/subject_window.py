@@ -7,12 +7,11 @@ from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
+from daq_app.qt.indicators import PressBar
 from daq_app.qt.languages import direction, translator
 from daq_app.qt.parts import bare, button, label, say
-from daq_app.qt.press_bar import PressBar
-from daq_app.qt.ruler_check import RulerCheck
 from daq_app.qt.score_line import ScoreLine
-from daq_app.qt.screens import Millimetres, millimetres
+from daq_app.qt.screens import Millimetres, RulerCheck, millimetres
 from daq_app.qt.tokens import GRID, Tokens, font
 from daq_app.window.subject_texts import SubjectText as Text
 from daq_app.window.view_subject import Kind, SubjectView

@@ -6,8 +6,8 @@ from functools import partial
 
 from PySide6.QtCore import QObject, Qt, Signal
 
+from daq_app.qt.indicators import FULL, newest_force
 from daq_app.qt.languages import direction, translator
-from daq_app.qt.press_bar import FULL, newest_force
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import USUAL_DPI
 from daq_app.tablet.dialogue import Dialogue

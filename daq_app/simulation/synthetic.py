@@ -14,8 +14,7 @@ import numpy as np
 
 from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
-from daq_app.simulation.due_events import DueEvents
-from daq_app.simulation.wiring import planted_surface
+from daq_app.simulation.wiring import DueEvents, planted_surface
 from drivers.clock import Clock, SimulatedClock
 from sessions.atomic_file import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial

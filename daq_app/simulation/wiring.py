@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from daq_app.simulation.due_events import DueEvents
 from drivers.address import check_options, parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
@@ -24,6 +23,7 @@ from simulators.timetable import TimetableError
 
 __all__ = [
     "Connected",
+    "DueEvents",
     "SimulatedHand",
     "SimulatedPeople",
     "TimetableError",
@@ -139,6 +139,26 @@ class SimulatedHand:
 
     def _surface(self, trial: Trial) -> Surface:
         return planted_surface(self._known(trial), self._planted)
+
+
+class DueEvents:
+    """Events that come up when their time has come, in the order they were put in."""
+
+    def __init__(self, clock: Clock) -> None:
+        """Tell time by `clock`."""
+        self.clock = clock
+        self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
+
+    def put(self, event: steps.Event, after: float = 0.0) -> None:
+        """Let an event come up in `after` seconds of the clock."""
+        self._due.append((self.clock.now_ns() + int(after * 1e9), event))
+
+    def poll(self) -> tuple[steps.Event, ...]:
+        """Return what has come up by now, once."""
+        now_ns = self.clock.now_ns()
+        done = tuple(event for due, event in self._due if due <= now_ns)
+        self._due = [(due, event) for due, event in self._due if due > now_ns]
+        return done
 
 
 class SimulatedPeople(DueEvents):

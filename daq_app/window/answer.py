@@ -1,9 +1,10 @@
-"""One answer on the line from 0 to 100 as it is given: every position with its time, and its corrections."""
+"""One answer as it is given, with every position, time and correction; and whose a key is meanwhile. No Qt."""
 
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Literal
 
+from daq_app.window.view_subject import Kind
 from sessions.plan.plan import Hand
 from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
@@ -15,6 +16,17 @@ STEP = 1.0  # an arrow moves the mark by so much ...
 LEAP = 10.0  # ... and Page Up or Page Down by this
 PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
 DIGITS = 1  # of a score: a mark can be placed no finer
+Owner = Literal["text", "answer", "course"]
+GIVES = frozenset({"Enter", "Space"})  # the answer that stands
+PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
+TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
+CHOOSES = frozenset({"1", "2", "Left", "Right"})  # one of two
+ANSWERS: dict[Kind, frozenset[str]] = {
+    "read": frozenset(),
+    "line": PLACES | GIVES,
+    "number": TYPES | GIVES,
+    "choice": CHOOSES | GIVES,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,3 +105,20 @@ class Choice:
             return PairedChoice(self.value, self.first_touch, self.corrections, hand, self.device)
         number = self.value if isinstance(self.value, float) else None
         return MagnitudeEstimate(number, self.first_touch, self.corrections, hand, self.device)
+
+
+
+
+
+def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False) -> Owner:
+    """Return whose a key is while the subject is asked for `asks`, whichever window has the keyboard.
+
+    While the experimenter types, every key is the text's, also one that reached the subject's window; of those that
+    the text leaves to its own window, none is an answer.
+
+    >>> owner("1", "choice", typing=False), owner("1", "choice", typing=True), owner("1", "line", typing=False)
+    ('answer', 'text', 'course')
+    """
+    if typing and (from_subject or key in ANSWERS[asks]):
+        return "text"
+    return "answer" if key in ANSWERS[asks] else "course"

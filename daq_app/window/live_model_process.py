@@ -10,10 +10,9 @@ from contextlib import suppress
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from daq_app.child_process import fresh_processes
+from daq_app.child_process import fresh_processes, give_way
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
-from daq_app.window.priority import give_way
 from daq_app.wording import tr
 from sessions.plan.plan import Frame, SessionPlan
 

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.bench_state import BenchState
-from daq_app.window.sentences import sentence
-from daq_app.wording import tr
+from daq_app.wording import sentence, tr
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before

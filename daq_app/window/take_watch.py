@@ -4,11 +4,10 @@ from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from importlib import import_module
 
-from daq_app.child_process import process_pool
+from daq_app.child_process import give_way, process_pool
 from daq_app.recorder import messages as m
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.messages import DrawingFailed, Judged
-from daq_app.window.priority import give_way
 from daq_app.window.state import AppState
 from daq_app.window.stroke_quality import Quality, in_newtons, stroke_quality
 from daq_app.wording import tr

@@ -7,13 +7,12 @@ from daq_app.recorder import messages as m
 from daq_app.window import view_bench, view_course, view_subject
 from daq_app.window.course_state import SessionState
 from daq_app.window.messages import Dismissed, Message
-from daq_app.window.sentences import sentence
 from daq_app.window.state import AppState
 from daq_app.window.subject_texts import Translate
 from daq_app.window.view_bench import BenchView
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_subject import SubjectView
-from daq_app.wording import tr
+from daq_app.wording import sentence, tr
 
 SILENT = 3.0  # a recorder that was not heard for longer is said to be silent [s]
 UNSAVED = 3.0  # the recording lamp goes out when nothing became safe for longer [s]

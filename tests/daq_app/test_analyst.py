@@ -14,14 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.compared import compared
 from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, history, taken_back, within
-from daq_app.analyst.field_list import FIELD_ERRORS
-from daq_app.analyst.frame import Contact, Finger, Frame, Parts
+from daq_app.analyst.frame import FIELD_ERRORS, Contact, Finger, Frame, Parts
 from daq_app.analyst.lineage import lineage
 from daq_app.analyst.messages import EDGES
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.seen import finger_words
+from daq_app.analyst.seen import compared, finger_words
 from daq_app.analyst.shown import numbers, points, progress_words, row_words, session_pictures
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.analyst.transport import Transport

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from daq_app.analyst.field_list import FIELD_CHOICES, automatic_range
-from daq_app.analyst.frame import Contact, Frame, Parts, SkinLine
+from daq_app.analyst.frame import FIELD_CHOICES, Contact, Frame, Parts, SkinLine, View, automatic_range
 from daq_app.analyst.probe import along_line, along_skin, probe_words, value_at
-from daq_app.analyst.viewport import View
 
 NONE = np.empty(0)
 BY_NAME = {field.name: field for field in FIELD_CHOICES}

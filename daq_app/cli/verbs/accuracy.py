@@ -30,9 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Measure, write and tell."""
-    from daq_app.accuracy_page.docs_tables import fill
     from daq_app.accuracy_page.page import PAGE, write
-    from daq_app.accuracy_page.tables import tables
+    from daq_app.accuracy_page.tables import fill, tables
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.field_list import FIELD_CHOICES
+from daq_app.analyst.frame import FIELD_CHOICES
 from daq_app.analyst.state import chosen
 from daq_app.qt import remembered, tokens
 from daq_app.qt.analyst_window import AnalystWindow
@@ -28,7 +28,7 @@ from daq_app.qt.live_panel import PLOTS
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.main_window import MainWindow
 from daq_app.qt.menus import about_box
-from daq_app.qt.subject_preview import SubjectPreview
+from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.window.course_state import Mark

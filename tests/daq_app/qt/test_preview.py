@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QPushButton
 
 from daq_app.qt import tokens
 from daq_app.qt.languages import translator
-from daq_app.qt.subject_preview import SubjectPreview
+from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.window.new_session import SessionForm
 from daq_app.window.preview import PreviewPage, preview
 from daq_app.window.subject_texts import SubjectText

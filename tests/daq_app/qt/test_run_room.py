@@ -6,10 +6,9 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from daq_app.qt import screens, tokens
-from daq_app.qt.inspected_trial import InspectedTrial
+from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
-from daq_app.qt.trial_strip import TrialStrip
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.messages import NewSession

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QLabel
 
 from daq_app.qt import tokens
-from daq_app.qt.press_bar import FULL, PressBar
+from daq_app.qt.indicators import FULL, PressBar
 from daq_app.qt.subject_window import LARGER, SubjectWindow
 from daq_app.window.view_subject import SubjectView
 from tests.daq_app.qt.written_text import cut_off

@@ -19,9 +19,9 @@ from PySide6.QtWidgets import (
 )
 
 from daq_app.qt import score_line, screens, tokens
+from daq_app.qt.indicators import FULL, PressBar
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
-from daq_app.qt.press_bar import FULL, PressBar
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.view_course import Button
 

@@ -16,8 +16,7 @@ from daq_app.analyst.lineage import lineage
 from daq_app.analyst.seen import finger_words
 from daq_app.analyst.shown import condition, numbers, points
 from daq_app.analyst.state import chosen, rows
-from daq_app.qt.analyst_window import AnalystWindow
-from daq_app.qt.lineage_label import LineageLabel
+from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
 from daq_app.qt.tokens import LIGHT
 from sessions.report.contents import Fact
 from tests.daq_app.qt.review.examples import SESSION, film, raw, until

@@ -14,10 +14,9 @@ from PySide6.QtTest import QTest
 from qt_events import wheel
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.field_list import FIELD_CHOICES, FIELD_ERRORS
-from daq_app.analyst.frame import Finger
+from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import chosen, rows
-from daq_app.qt.field_bar import ALL_TRIALS, FIXED
+from daq_app.qt.field_plot import ALL_TRIALS, FIXED
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
 from tests.sessions.report_example import example
 

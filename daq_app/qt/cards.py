@@ -1,0 +1,136 @@
+"""Parts of the page of a new session: a card of its checklist, the transducer's row, and what was cut short."""
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
+
+from daq_app.qt.parts import bare, button, choice, label, regrade, say
+from daq_app.qt.tokens import GRID
+from daq_app.recorder.messages import ResumeSession
+from daq_app.window.checklist import Card
+from daq_app.window.messages import Message
+from daq_app.window.new_session import Unfinished, unfinished
+from daq_app.window.view_bench import BenchView, bench_summary
+from daq_app.wording import tr
+
+
+class CardFrame(QFrame):
+    """Holds the fields of a card in `body`."""
+
+    def __init__(self, name: str) -> None:
+        """Show a card that is not ready."""
+        super().__init__()
+        self._name = name
+        self._card: Card | None = None
+        self.setProperty("role", "card")
+        self._mark = label("○")
+        self.words = label("", "quiet", wrap=True)
+        head = QHBoxLayout()
+        head.setSpacing(GRID)
+        head.addWidget(self._mark)
+        head.addWidget(label(tr(name), "name", wrap=True), 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(GRID, GRID, GRID, GRID)
+        layout.setSpacing(4)
+        layout.addLayout(head)
+        layout.addWidget(self.words)
+        self.body = QVBoxLayout()
+        self.body.setSpacing(4)
+        layout.addLayout(self.body)
+
+    def show_card(self, card: Card) -> None:
+        """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""
+        if card == self._card:
+            return
+        self._card = card
+        say(self._mark, "✓" if card.ready else "○")
+        say(self.words, card.words)
+        self.words.setVisible(bool(card.words))
+        self.setAccessibleName(
+            f"{tr(self._name)}: {tr('ready') if card.ready else tr('not ready')}. {card.words}".strip()
+        )
+        regrade(self.words, "")
+
+    def insist(self) -> None:
+        """Mark the line as what keeps the session from beginning."""
+        regrade(self.words, "wrong")
+
+
+class CutShort(QFrame):
+    """Lists the sessions that can go on; without one it is not seen."""
+
+    def __init__(self, send: Callable[[Message], None]) -> None:
+        """Offer nothing; `send` takes what is asked for."""
+        super().__init__()
+        self._send = send
+        self._shown: tuple[Unfinished, ...] = ()
+        self.setProperty("role", "banner")
+        self.setProperty("grade", "look")
+        self._sessions = choice(tr("sessions that were cut short"))
+        self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
+        layout = QVBoxLayout(self)
+        for widget in (label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on):
+            layout.addWidget(widget)
+        self.show_sessions(())
+
+    def look_in(self, folder: Path) -> None:
+        """Look for such sessions in a folder, without holding up the window."""
+        results: list[tuple[Unfinished, ...]] = []
+        worker = threading.Thread(target=lambda: results.append(unfinished(folder)), daemon=True)
+        worker.start()
+        self._looking = timer = QTimer(self)
+        timer.setInterval(100)
+
+        def look() -> None:
+            if not worker.is_alive():
+                timer.stop()
+                self.show_sessions(results[0] if results else ())
+
+        timer.timeout.connect(look)
+        timer.start()
+
+    def show_sessions(self, sessions: tuple[Unfinished, ...]) -> None:
+        """Offer these sessions."""
+        if sessions != self._shown:
+            self._shown = sessions
+            self._sessions.clear()
+            for session in sessions:
+                self._sessions.addItem(session.words, str(session.folder))
+                at = self._sessions.count() - 1
+                self._sessions.setItemData(at, str(session.folder), Qt.ItemDataRole.ToolTipRole)
+        self.setVisible(bool(sessions))
+
+    def _resumed(self) -> None:
+        folder = self._sessions.currentData()
+        if folder:
+            self._send(ResumeSession(str(folder)))
+
+
+class TransducerRow(QWidget):
+    """Two buttons and a few lines of words; `act` does what a button stands for."""
+
+    def __init__(self, act: Callable[[str], None]) -> None:
+        """Show no transducer."""
+        super().__init__()
+        self.connect_button = button(tr("Connect"), tr("connect the transducer"), lambda: act("connect"))
+        self.zero = button(tr("Zero  T"), tr("measure the zero of the transducer"), lambda: act("tare"))
+        self.words = label("", "quiet", wrap=True)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.connect_button, 1)
+        buttons.addWidget(self.zero, 1)
+        layout = bare(QVBoxLayout(self), GRID // 2)
+        layout.addLayout(buttons)
+        layout.addWidget(self.words)
+
+    def show_view(self, view: BenchView) -> None:
+        """Show which transducer it is, its zero, noise and life, and what can be done with it."""
+        connected = view.lamp != "off"
+        act = tr("Disconnect") if connected else tr("Connect")
+        say(self.words, bench_summary(view))
+        self.connect_button.setText(act)
+        self.connect_button.setAccessibleName(tr("{act} the transducer", act=act))
+        self.connect_button.setEnabled(not connected or view.connect is not None)
+        self.zero.setEnabled(view.can_tare)

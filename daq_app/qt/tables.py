@@ -1,0 +1,266 @@
+"""Tables whose ranges are copied with Ctrl+C: of texts, sorted by a click on their head, and of raw readings."""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt, Signal
+from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent, QStandardItem, QStandardItemModel
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QVBoxLayout, QWidget
+
+from daq_app.analyst.raw import RawReadings
+from daq_app.qt.parts import Wrapped, bare
+from daq_app.qt.tokens import GRID
+from daq_app.wording import tr, tr_noop
+
+NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
+Index = QModelIndex | QPersistentModelIndex
+HEAD = (
+    tr_noop("window"),
+    tr_noop("sequence"),
+    tr_noop("counter"),
+    tr_noop("status"),
+    tr_noop("time [s]"),
+    tr_noop("received [ns]"),
+)
+
+
+class CopiedTable(QTableView):
+    """A table that is read; Ctrl+C copies the selected range as tab-separated values."""
+
+    def __init__(self, name: str) -> None:
+        """Show no line yet; screen readers say `name`."""
+        super().__init__()
+        self.setAccessibleName(name)
+        self.setTabKeyNavigation(False)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.verticalHeader().hide()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+        """Copy; leave every other key to the table."""
+        if event.matches(QKeySequence.StandardKey.Copy):
+            QGuiApplication.clipboard().setText(self.selected_text())
+        else:
+            super().keyPressEvent(event)
+
+    def selected_text(self) -> str:
+        """Return the least rectangle of cells that holds the selection; empty where a cell in it is not selected."""
+        chosen = {(at.row(), at.column()): str(at.data()) for at in self.selectedIndexes()}
+        if not chosen:
+            return ""
+        rows, columns = ({place[part] for place in chosen} for part in (0, 1))
+        return as_tsv(
+            [chosen.get((row, column), "") for column in range(min(columns), max(columns) + 1)]
+            for row in range(min(rows), max(rows) + 1)
+        )
+
+
+class _ByNumber(QSortFilterProxyModel):
+    """Sorts numbers by their value, whatever stands after them."""
+
+    def lessThan(self, left: Index, right: Index) -> bool:  # noqa: N802  Qt's name
+        """Say which of two cells comes first."""
+        return sort_key(str(left.data())) < sort_key(str(right.data()))
+
+
+class TextTable(CopiedTable):
+    """Lines of cells under a head; a click on the head sorts, and a line is told when somebody goes to it."""
+
+    chosen = Signal(int)  # its number before any sorting
+
+    def __init__(self, name: str, head: Sequence[str]) -> None:
+        """Show no line yet; screen readers say `name`."""
+        super().__init__(name)
+        self._shown: tuple[tuple[str, ...], ...] = ()
+        self._cells = QStandardItemModel(0, len(head), self)
+        self._cells.setHorizontalHeaderLabels(list(head))
+        self._sorted = _ByNumber(self)
+        self._sorted.setSourceModel(self._cells)
+        self.setModel(self._sorted)
+        self.horizontalHeader().setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # as the session has them
+        self.setSortingEnabled(True)
+        self.selectionModel().currentRowChanged.connect(self._went)
+
+    def show_lines(self, lines: tuple[tuple[str, ...], ...], at: int = -1) -> None:
+        """Show lines, and stand at one of them."""
+        self.selectionModel().blockSignals(True)
+        if lines != self._shown:
+            self._shown = lines
+            self._cells.setRowCount(0)
+            for cells in lines:
+                self._cells.appendRow([_item(words) for words in cells])
+            self.resizeColumnsToContents()
+        self.selectionModel().blockSignals(False)
+        now = self._sorted.mapToSource(self.currentIndex())
+        if 0 <= at < len(lines) and at != now.row():
+            self.blockSignals(True)
+            self.go_to(at, max(now.column(), 0))
+            self.blockSignals(False)
+
+    def go_to(self, line: int, column: int = 0) -> None:
+        """Stand at a cell of a line, which is numbered as before any sorting."""
+        self.setCurrentIndex(self._sorted.mapFromSource(self._cells.index(line, column)))
+
+    def texts(self) -> list[tuple[str, ...]]:
+        """Return the lines as they are sorted now."""
+        model = self._sorted
+        return [
+            tuple(str(model.index(row, column).data()) for column in range(model.columnCount()))
+            for row in range(model.rowCount())
+        ]
+
+    def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
+        if now.isValid():
+            self.chosen.emit(self._sorted.mapToSource(now).row())
+
+
+def _item(words: str) -> QStandardItem:
+    item = QStandardItem(words)
+    if number_in(words) is not None or words == "–":
+        item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return item
+
+
+
+
+class ReadingsTable(QWidget):
+    """A table with the place of its numbers above it."""
+
+    def __init__(self) -> None:
+        """Show nothing yet."""
+        super().__init__()
+        self.place = Wrapped("quiet")
+        self.table = CopiedTable(tr("raw readings"))  # in the order in which they came
+        self.table.setSelectionBehavior(QTableView.SelectionBehavior.SelectRows)
+        self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
+        self._model = _Model()
+        self.table.setModel(self._model)
+        layout = bare(QVBoxLayout(self))
+        layout.addWidget(self.place)
+        layout.addWidget(self.table, 1)
+
+    def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
+        """Show readings, those of the steady window marked by a word and by bold type."""
+        self._model.show_readings(readings, steady)
+        if readings is None:
+            self.place.show_text(tr("Not read yet."))
+            self._fit_columns()
+            return
+        self.place.show_text(
+            tr(
+                ("{place}. raw 1 to 6 as the device sent them [{unit}]; N and T unfiltered, zero taken off: {zero}."),
+                place=readings.place,
+                unit=readings.unit,
+                zero=readings.zero,
+            )
+        )
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
+        model, count = self._model, self._model.rowCount()
+        metrics, heads = self.table.fontMetrics(), self.table.horizontalHeader().fontMetrics()
+        for column in range(model.columnCount()):
+            head = heads.horizontalAdvance(str(model.headerData(column, Qt.Orientation.Horizontal)))
+            texts = [model.index(row, column).data() for row in (0, count // 2, count - 1) if 0 <= row < count]
+            widest = max(head, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
+            self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+        """Fit the columns to the type, which is known by now."""
+        super().showEvent(event)
+        self._fit_columns()
+
+    def go_to(self, row: int) -> None:
+        """Show one reading."""
+        if 0 <= row < self._model.rowCount():
+            self.table.selectRow(row)
+            self.table.scrollTo(self._model.index(row, 0), QTableView.ScrollHint.PositionAtCenter)
+
+
+class _Model(QAbstractTableModel):
+    """Readings as a table, read only where they are shown."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._readings: RawReadings | None = None
+        self._steady: tuple[float, float] | None = None
+        self._bold = QFont()
+        self._bold.setBold(True)
+
+    def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
+        """Take other readings."""
+        self.beginResetModel()
+        self._readings, self._steady = readings, steady
+        self.endResetModel()
+
+    def rowCount(self, parent: Index | None = None) -> int:  # noqa: ARG002, N802  Qt's name
+        """Return the number of readings."""
+        return 0 if self._readings is None else len(self._readings)
+
+    def columnCount(self, parent: Index | None = None) -> int:  # noqa: ARG002, N802  Qt's name
+        """Return the number of columns."""
+        return len(HEAD) + 8
+
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401, N802
+        """Return the name of a column."""
+        if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
+            return None
+        return (*map(tr, HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
+
+    def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
+        """Return a number as text."""
+        r = self._readings
+        if r is None:
+            return None
+        at, column = index.row(), index.column()
+        inside = self._steady is not None and self._steady[0] <= r.time[at] <= self._steady[1]
+        if role == Qt.ItemDataRole.FontRole:
+            return self._bold if inside else None
+        if role == Qt.ItemDataRole.TextAlignmentRole:
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        if role != Qt.ItemDataRole.DisplayRole:
+            return None
+        match column:
+            case 0:
+                return tr("steady") if inside else ""
+            case 1 | 2 | 3:
+                return str((r.sequence, r.counter, r.status)[column - 1][at])
+            case 5:
+                return str(r.received_ns[at])
+            case 4:
+                return f"{r.time[at]:.6f}"
+            case 12 | 13:
+                return f"{(r.normal, r.tangential)[column - 12][at]:.4f}"
+            case _:
+                return f"{r.raw[at, column - 6]:.10g}"
+
+
+def number_in(text: str) -> float | None:
+    """Return the number with which a text begins; None where it begins with none.
+
+    >>> number_in("0.440 to 0.453"), number_in("−3.5 %"), number_in("–"), number_in("stroke 3")
+    (0.44, -3.5, None, None)
+    """
+    match = NUMBER.match(text.strip())
+    return None if match is None else float(match[0].replace("−", "-"))
+
+
+def sort_key(text: str) -> tuple[bool, float, str]:
+    """Return what a cell is sorted by: numbers by their value, then words.
+
+    >>> sorted(["10", "9.5", "–", "−1"], key=sort_key)
+    ['−1', '9.5', '10', '–']
+    """
+    number = number_in(text)
+    return number is None, 0.0 if number is None else number, text.casefold()
+
+
+def as_tsv(lines: Iterable[Iterable[str]]) -> str:
+    r"""Return cells as tab-separated values; a tab or a new line within a cell becomes a space.
+
+    >>> as_tsv([["a", "b\tc"], ["1", "2"]])
+    'a\tb c\n1\t2'
+    """
+    return "\n".join("\t".join(re.sub(r"[\t\r\n]+", " ", cell) for cell in line) for line in lines)
