@@ -46,13 +46,12 @@ def _values(now: float, rows: int, columns: int):  # noqa: ANN202
 def _by_hand():  # noqa: ANN202
     from daq_app.qt.live_panel import AXES, PLOTS, SED
     from daq_app.qt.live_plot import LivePlot
-    from daq_app.qt.tokens import LIGHT
     from daq_app.window.course_state import Mark
     from daq_app.window.live_trace import CHANNELS, Columns
     from daq_app.window.view_model import CHANNELS as MODEL_CHANNELS
 
-    plots = [LivePlot(*plot, LIGHT, 1.0) for plot in PLOTS]
-    plots += [LivePlot(*SED, LIGHT, 1.0, MODEL_CHANNELS), *(LivePlot(*plot, LIGHT, 1.0) for plot in AXES)]
+    plots = [LivePlot(*plot, 1.0) for plot in PLOTS]
+    plots += [LivePlot(*SED, 1.0, MODEL_CHANNELS), *(LivePlot(*plot, 1.0) for plot in AXES)]
     _shown(plots)
 
     def draw(now: float) -> None:

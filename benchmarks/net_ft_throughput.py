@@ -155,12 +155,11 @@ def draw(rate: int, pipe: Connection) -> None:
 
     from daq_app.qt.live_panel import AXES
     from daq_app.qt.live_plot import LivePlot
-    from daq_app.qt.tokens import LIGHT
     from daq_app.window.live_trace import CHANNELS, LiveTrace
 
     application = QApplication([])
     trace = LiveTrace(float(rate))
-    plots = [LivePlot(*axis, LIGHT, 1.0) for axis in AXES]
+    plots = [LivePlot(*axis, 1.0) for axis in AXES]
     for plot in plots:
         plot.resize(1200, 500)
         plot.show()

@@ -263,8 +263,6 @@ def _limit(value: float | None, unit: str) -> str:
     return "–" if value is None else f"{value:g} {unit}"
 
 
-
-
 def fill(docs: Path, tables: Mapping[str, Table]) -> None:
     """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
     for page, names in PAGES.items():

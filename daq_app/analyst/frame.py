@@ -159,8 +159,6 @@ def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, 
     return np.concatenate([nodes, middles[0]]), np.concatenate([sed, middles[1]]), four
 
 
-
-
 @dataclass(frozen=True, slots=True)
 class View:
     """A place in the world, where on the screen it lies, and the scale. Pixels count downwards."""
@@ -190,9 +188,6 @@ class View:
         """Return what a rectangle of the screen shows."""
         (x0, y1), (x1, y0) = self.place(left, top), self.place(left + width, top + height)
         return x0, x1, y0, y1
-
-
-
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,8 +67,6 @@ def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:
     return {key: {name: sum(v) / len(v) for name, v in values.items()} for key, values in gathered.items()}
 
 
-
-
 def common_range(state: AnalystState | None, field: FieldChoice) -> Range:
     """Return where the colours of all trials of a session, and of one compared with it, begin and end."""
     known = [] if state is None else [state.fingers]

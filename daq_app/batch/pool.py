@@ -143,8 +143,6 @@ def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int | None
                 yield future.result()
 
 
-
-
 @contextmanager
 def local_pool(work: int, workers: int | None = None) -> Generator[ProcessPoolExecutor]:
     """Give a pool for so many pieces of work: `workers` processes, or as many as there are cores.

@@ -34,6 +34,7 @@ from daq_app.qt.tokens import GRID, Tokens
 from daq_app.qt.trials_column import TrialsColumn
 from daq_app.wording import tr
 from sessions.exchange import FORMATS
+
 LOOK = 30  # between two looks at the work [ms]
 LEAST = (480, 320)  # the window can be made as small as that [px]
 
@@ -76,8 +77,6 @@ class LineageLabel(QLabel):
 
     def _tell(self, place: str) -> None:
         self.setToolTip(next((link.more for link in self._links if link.place == place), ""))
-
-
 
 
 class Work(Protocol):

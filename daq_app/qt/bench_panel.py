@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.indicators import Lamp, LoadBar
 from daq_app.qt.parts import EntryLine, button, choice, label, regrade, say, scrolled
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
 from daq_app.window.messages import Message
@@ -36,23 +36,21 @@ SPOKEN = {
 class BenchPanel(QFrame):
     """The right of the experimenter's window."""
 
-    def __init__(
-        self, tokens: Tokens, scale: float, send: Callable[[Message], None], search: Callable[[], None]
-    ) -> None:
+    def __init__(self, scale: float, send: Callable[[Message], None], search: Callable[[], None]) -> None:
         """Show no transducer; `send` takes what is asked for, `search` looks for devices."""
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName(tr("bench"))
         self._send = send
         self._view: BenchView | None = None
-        self._lamp = Lamp(tokens, tr("transducer"))
+        self._lamp = Lamp(tr("transducer"))
         self._lamp_words = label(tr("not connected"), wrap=True)
         self._fields = {name: label("–", wrap=True) for name in FIELDS}
         self._fields["tare"].setProperty("role", "quiet")  # three lines that nobody reads from afar
         self._life = {name: label("–", wrap=True) for name in NAMES}
         self._name = label("", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
-        self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
+        self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(self._typed, self._leave))
@@ -107,12 +105,6 @@ class BenchPanel(QFrame):
         self._choice.setEnabled(view.lamp == "off")
         self.tare.setEnabled(view.can_tare)
         self.acknowledge.setEnabled(view.can_acknowledge)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._lamp.set_tokens(tokens)
-        for bar in self._bars.values():
-            bar.set_tokens(tokens)
 
     def connect_chosen(self) -> None:
         """Connect what is chosen or typed, or disconnect what is connected."""
@@ -190,13 +182,13 @@ class BenchPanel(QFrame):
 class BenchStrip(QFrame):
     """The bench folded: a lamp, and a short bar for each axis."""
 
-    def __init__(self, tokens: Tokens, scale: float, expand: Callable[[], None]) -> None:
+    def __init__(self, scale: float, expand: Callable[[], None]) -> None:
         """Show no transducer; `expand` shows the bench whole."""
         super().__init__()
         self.setProperty("role", "strip")
         self.setAccessibleName(tr("bench, folded"))
-        self._lamp = Lamp(tokens, tr("transducer"))
-        self._bars = {name: LoadBar(tokens, name, scale) for name in (*AXES, "combined")}
+        self._lamp = Lamp(tr("transducer"))
+        self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
         self.setFixedWidth(round(150 * scale))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
@@ -216,12 +208,6 @@ class BenchStrip(QFrame):
         say(self._words, view.lamp_words)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._lamp.set_tokens(tokens)
-        for bar in self._bars.values():
-            bar.set_tokens(tokens)
 
 
 def _rows(fields: list[tuple[str, QLabel]]) -> QGridLayout:

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QP
 
 from daq_app.qt.painted import PaintedWidget
 from daq_app.qt.shapes import blank, lines
-from daq_app.qt.tokens import MU, SMALL, Tokens, font
+from daq_app.qt.tokens import MU, SMALL, font
 from daq_app.wording import tr
 
 Array = NDArray[np.float64]
@@ -20,9 +20,9 @@ TOO_SMALL = 0.2  # a picture with fewer pixels to the millimetre is left out
 class ContactMap(PaintedWidget):
     """Where the finger presses now, and where it came from. The drawing is of the face's middle, not to its edges."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show an untouched sample."""
-        super().__init__(tokens)
+        super().__init__()
         self._scale = scale
         self._trail: Array = np.empty((0, 2))
         self._touching = False
@@ -63,7 +63,7 @@ class ContactMap(PaintedWidget):
         for piece in lines(x, y):
             painter.drawPolyline(piece)
         if self._touching:
-            painter.setPen(QPen(QColor(self.tokens.text), 2))
+            painter.setPen(QPen(QColor(self.theme.text), 2))
             painter.setBrush(QColor(MU))
             painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
 
@@ -83,7 +83,7 @@ class ContactMap(PaintedWidget):
 
     def draw_ground(self) -> QPixmap:
         """Return sample, grid, words and arrow."""
-        t = self.tokens
+        t = self.theme
         picture = blank(self, t.surface)
         per_mm = self._per_mm()
         if per_mm <= TOO_SMALL:
@@ -117,7 +117,7 @@ class ContactMap(PaintedWidget):
     def _paint_arrow(self, painter: QPainter, box: QRectF) -> None:
         if not self._direction:
             return
-        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
+        painter.setPen(QPen(QColor(self.theme.quiet), 2))
         x, half = box.right() - 10, box.height() * 0.3
         tip = box.center().y() - self._direction * half
         painter.drawLine(QPointF(x, box.center().y() + self._direction * half), QPointF(x, tip))

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.qt.parts import EntryLine, bare, button, label, say
 from daq_app.qt.subject_picture import Mirror
-from daq_app.qt.tokens import GRID, TARGET, Tokens
+from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr
@@ -30,7 +30,7 @@ ROOMY = 560  # at which a picture of the subject's page has room beneath the pla
 class CoursePanel(QFrame):
     """The left of the experimenter's window while a session is in hand."""
 
-    def __init__(self, tokens: Tokens, scale: float, send: Callable[[Message], None]) -> None:
+    def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
         """Show no plan; `send` takes what is done."""
         super().__init__()
         self.setProperty("role", "panel")
@@ -58,7 +58,7 @@ class CoursePanel(QFrame):
         self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
         self._bottom.addWidget(self._entry_row(scale))
         self._timer = label("", "quiet")
-        self.mirror = Mirror(tokens, scale)
+        self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
         head = QHBoxLayout()
         head.addWidget(label(tr("Plan"), "section"), 1)
@@ -181,10 +181,6 @@ class CoursePanel(QFrame):
             item.setFont(typeface)
             if row.kind == "current":
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme: the style sheet does the rest."""
-        self.mirror.set_tokens(tokens)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Fold the picture of the subject's page where the plan needs the room."""

@@ -12,6 +12,7 @@ from daq_app.qt.parts import Wrapped, bare, button, label
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID, TEXT, font
 from daq_app.wording import tr
+
 BY = "analyst/by"  # where the code is remembered
 NOBODY = "analyst"  # who decided, where nobody gave a code
 DRAGGED = "dragged by hand"
@@ -46,8 +47,6 @@ class _Decision(QUndoCommand):
 
     def redo(self) -> None:
         self._ask(True)
-
-
 
 
 class DecisionsBar(QWidget):

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QSplitter, QWidget
 from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
 from daq_app.qt.screens import settings
 from daq_app.wording import tr
+
 SHARES = (500, 300)  # of the width, before somebody moved the handle [-]
 
 
@@ -43,8 +44,6 @@ class Openness:
         else:
             self._instead = not self._instead
         self._place()
-
-
 
 
 class Drawer(QSplitter):

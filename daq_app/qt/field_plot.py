@@ -109,8 +109,6 @@ def _curve(finger: Finger | None, source: int, field: FieldChoice, line: Line | 
     return NOTHING if line is None else along_line(finger.frame, finger.parts, field, line)
 
 
-
-
 class FieldBar(QWidget):
     """Two lists and two numbers."""
 

@@ -4,12 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QSizePolicy
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from daq_app.qt.indicators import paint_lost
-from daq_app.qt.painted import Painted
 from daq_app.qt.shapes import draw_line, faces, fine
-from daq_app.qt.tokens import MODEL, SMALL, Tokens, font
+from daq_app.qt.tokens import MODEL, SMALL, font, theme_of
 from daq_app.window.live_model import Picture
 from daq_app.window.plot_scale import PlotScale
 from daq_app.window.view_model import ModelWords
@@ -28,12 +27,12 @@ EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
 
-class FingerView(Painted):
+class FingerView(QWidget):
     """A picture of the last state of a model."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show nothing yet."""
-        super().__init__(tokens)
+        super().__init__()
         self._scale = scale
         self._picture: Picture | None = None
         self._row: Array = np.empty(0)
@@ -63,12 +62,10 @@ class FingerView(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint words, finger and row."""
-        painter = QPainter(self)
-        painter.fillRect(self.rect(), QColor(self.tokens.surface))
+        painter, t = QPainter(self), theme_of(self)
+        painter.fillRect(self.rect(), QColor(t.surface))
         painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))
-        painter.setPen(
-            QColor(self.tokens.look if self._words.state in ("instead", "beyond", "failed") else self.tokens.quiet)
-        )
+        painter.setPen(QColor(t.look if self._words.state in ("instead", "beyond", "failed") else t.quiet))
         flags = int(Qt.TextFlag.TextWordWrap | Qt.AlignmentFlag.AlignTop)
         box = QRectF(4, 0, self.width() - 8, self.height())
         needed = painter.boundingRect(box, flags, self._words.words).height()
@@ -86,7 +83,7 @@ class FingerView(Painted):
             self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
-        left, right, below, above = SHOWN
+        (left, right, below, above), t = SHOWN, theme_of(self)
         per_mm = min(box.width() / (right - left), box.height() / (above - below))
         if per_mm < 1.0:
             return
@@ -97,19 +94,19 @@ class FingerView(Painted):
 
         painter.save()
         painter.setClipRect(box)
-        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
+        painter.setPen(QPen(QColor(t.quiet), 2))
         painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
         picture = self._picture
         if picture is not None:
             self._paint_faces(painter, picture, placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
-            painter.setPen(fine(self.tokens.text, style))
+            painter.setPen(fine(t.text, style))
             draw_line(painter, *placed(picture.outline).T)
             if picture.lost is not None:
                 x, y = placed(np.array([picture.lost]))[0].tolist()
-                paint_lost(painter, QPointF(x, y), self.tokens)
+                paint_lost(painter, QPointF(x, y), t)
         painter.restore()
-        painter.setPen(QColor(self.tokens.quiet))
+        painter.setPen(QColor(t.quiet))
         painter.drawText(
             box.adjusted(4, 0, -4, -2),
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
@@ -129,9 +126,9 @@ class FingerView(Painted):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
 
     def _paint_row(self, painter: QPainter, box: QRectF) -> None:
-        line = painter.fontMetrics().height()
+        line, t = painter.fontMetrics().height(), theme_of(self)
         plot = box.adjusted(6, 2, -6, -line)
-        painter.setPen(QColor(self.tokens.quiet))
+        painter.setPen(QColor(t.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, tr("  SED along the skin [kPa]"))
         painter.drawText(
             box.adjusted(0, 0, -6, 0),
@@ -141,11 +138,11 @@ class FingerView(Painted):
         ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), tr("{row:g} mm distal", row=ROW[-1]))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])
-        painter.setPen(QPen(QColor(self.tokens.line), 1))
+        painter.setPen(QPen(QColor(t.line), 1))
         painter.drawLine(plot.bottomLeft(), plot.bottomRight())
         across = (ROW - ROW[0]) / (ROW[-1] - ROW[0])
         here = plot.left() + plot.width() * float(-ROW[0] / (ROW[-1] - ROW[0]))
-        painter.setPen(QPen(QColor(self.tokens.quiet), 1, Qt.PenStyle.DotLine))
+        painter.setPen(QPen(QColor(t.quiet), 1, Qt.PenStyle.DotLine))
         painter.drawLine(QPointF(here, plot.top()), QPointF(here, plot.bottom()))
         if len(self._row) != len(ROW):
             return

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QFrame, QHBoxLayout, QSi
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.languages import name_of
 from daq_app.qt.parts import button, label, regrade, say
-from daq_app.qt.tokens import GRID, SMALL, Tokens, font
+from daq_app.qt.tokens import GRID, SMALL, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -21,7 +21,7 @@ ONE_ROW = 1100  # width in which subject and lamp stand beside each other, befor
 class Header(QWidget):
     """Whose session it is, by which device and in which language, and whether it is simulated and being recorded."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show no session."""
         super().__init__()
         self._heading, self._device = label("", "title", wrap=True), label("", "quiet", wrap=True)
@@ -32,7 +32,7 @@ class Header(QWidget):
             wrapped.setSizePolicy(policy)
         self._simulated = label(tr("SIMULATED"), "simulated")
         self._simulated.setVisible(False)
-        self._lamp = Lamp(tokens, tr("recording"))
+        self._lamp = Lamp(tr("recording"))
         self._words = label(tr("not recording"), "title")
         self._saved = label("", "quiet")
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
@@ -64,10 +64,6 @@ class Header(QWidget):
         say(self._words, view.lamp.words)
         regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
         say(self._saved, view.lamp.saved)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._lamp.set_tokens(tokens)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Put the lamp below the subject where the strip is too narrow for one row."""
@@ -136,13 +132,13 @@ class Notice(QFrame):
 class ToDo(QFrame):
     """What to do now, and the one button that does it."""
 
-    def __init__(self, tokens: Tokens, primary: Callable[[], None], review: Callable[[], None]) -> None:
+    def __init__(self, primary: Callable[[], None], review: Callable[[], None]) -> None:
         """Show nothing to do; `review` opens the session that has ended."""
         super().__init__()
         self.setProperty("role", "panel")
         self.setAccessibleName(tr("what to do now"))
         self._small = False
-        self._arrow = Arrow(tokens)
+        self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)
         self.sentence.setMinimumHeight(2 * GRID)
         self.primary = button("", tr("do it"), primary, "primary")
@@ -186,7 +182,3 @@ class ToDo(QFrame):
             self.sentence.style().unpolish(self.sentence)
             self.sentence.style().polish(self.sentence)
             self.setMinimumHeight(0)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._arrow.set_tokens(tokens)

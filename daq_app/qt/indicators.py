@@ -5,10 +5,9 @@ from typing import Literal
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
-from PySide6.QtWidgets import QSizePolicy
+from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.qt.painted import Painted
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, Tokens, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.subject_texts import SubjectText as Text
 from daq_app.window.view_bench import Bar
@@ -19,12 +18,12 @@ FULL = 5.0  # of the bar [N]
 OVER = 0.1  # the mean of so long is shown: an eye follows it, and noise does not move it [s]
 
 
-class Lamp(Painted):
+class Lamp(QWidget):
     """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
 
-    def __init__(self, tokens: Tokens, name: str) -> None:
+    def __init__(self, name: str) -> None:
         """Start switched off; `name` is said to screen readers."""
-        super().__init__(tokens)
+        super().__init__()
         self._grade: Grade = "off"
         self._name = name
         self.setFixedSize(2 * GRID + 4, 2 * GRID + 4)
@@ -40,7 +39,7 @@ class Lamp(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the shape of the state."""
-        t = self.tokens
+        t = theme_of(self)
         colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -60,14 +59,14 @@ class Lamp(Painted):
                 painter.drawEllipse(box)
 
 
-class LoadBar(Painted):
+class LoadBar(QWidget):
     """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
 
     NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
 
-    def __init__(self, tokens: Tokens, name: str, scale: float) -> None:
+    def __init__(self, name: str, scale: float) -> None:
         """Start empty."""
-        super().__init__(tokens)
+        super().__init__()
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
         self.setAccessibleName(tr("load on {name}", name=tr(name)))
@@ -104,7 +103,7 @@ class LoadBar(Painted):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint name, bar, peak and noise."""
-        t, bar = self.tokens, self._bar
+        t, bar = theme_of(self), self._bar
         painter = QPainter(self)
         left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
         if self.width() < left + right + 40:
@@ -131,12 +130,12 @@ class LoadBar(Painted):
             painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)
 
 
-class Arrow(Painted):
+class Arrow(QWidget):
     """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
 
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(self) -> None:
         """Start with no arrow."""
-        super().__init__(tokens)
+        super().__init__()
         self._direction = 0
         self.setFixedSize(5 * GRID, 7 * GRID)
         self.setAccessibleName(tr("no stroke asked for"))
@@ -162,7 +161,7 @@ class Arrow(Painted):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.translate(self.width() / 2, self.height() / 2)
         painter.scale(1, self._direction)
-        painter.setPen(QPen(QColor(self.tokens.text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        painter.setPen(QPen(QColor(theme_of(self).text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         half = self.height() / 2 - 6
         painter.drawLine(QPointF(0, half), QPointF(0, -half))
         painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))
@@ -179,8 +178,6 @@ def paint_lost(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
         painter.drawLine(at + QPointF(-7, 7), at + QPointF(7, -7))
 
 
-
-
 def newest_force(trace: LiveTrace) -> float:
     """Return the normal force of the last moment [N]; 0 where nothing is known."""
     newest = trace.newest
@@ -192,12 +189,12 @@ def newest_force(trace: LiveTrace) -> float:
     return float(known.mean()) if len(known) else 0.0
 
 
-class PressBar(Painted):
+class PressBar(QWidget):
     """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Start empty."""
-        super().__init__(tokens)
+        super().__init__()
         self._force = 0.0
         self.setAccessibleName(Text.PRESSING)
         self.setFixedHeight(round(6 * GRID * scale))
@@ -217,6 +214,6 @@ class PressBar(Painted):
         filled.setWidth(box.width() * min(max(self._force / FULL, 0.0), 1.0))
         if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
             filled.moveRight(box.right())
-        painter.fillRect(filled, QColor(self.tokens.act))
-        painter.setPen(QPen(QColor(self.tokens.quiet), 2))
+        painter.fillRect(filled, QColor(theme_of(self).act))
+        painter.setPen(QPen(QColor(theme_of(self).quiet), 2))
         painter.drawRect(box)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QSc
 from daq_app.qt.live_bar import short_name, spoken
 from daq_app.qt.live_plot import Curve, LivePlot
 from daq_app.qt.parts import bare, button, label, regrade, say
-from daq_app.qt.tokens import GRID, MU, SMALL, TARGET, N, T, Tokens
+from daq_app.qt.tokens import GRID, MU, SMALL, TARGET, N, T
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import Columns
 from daq_app.window.plot_scale import PlotScale
@@ -89,12 +89,10 @@ class TrialStrip(QScrollArea):
         self._row.insertWidget(at, tile_button)
 
 
-
-
 class InspectedTrial(QWidget):
     """Takes the place of the signals while a trial is inspected; readings go on behind it."""
 
-    def __init__(self, tokens: Tokens, scale: float, back: Callable[[], None]) -> None:
+    def __init__(self, scale: float, back: Callable[[], None]) -> None:
         """Show no trial; `back` returns to the signals."""
         super().__init__()
         self._shown: Inspection | None = None
@@ -102,7 +100,7 @@ class InspectedTrial(QWidget):
         self.verdict = label("", "title", wrap=True)
         self.details = label("", "quiet", wrap=True)
         self.cells: dict[str, QLabel] = {}
-        self._plots = [LivePlot(*plot, tokens, scale, PICTURE) for plot in PLOTS]
+        self._plots = [LivePlot(*plot, scale, PICTURE) for plot in PLOTS]
         head = QHBoxLayout()
         head.addWidget(self.heading, 1)
         head.addWidget(button(tr("Back  I"), tr("back to the signals of this moment"), back))
@@ -134,11 +132,6 @@ class InspectedTrial(QWidget):
             plot.setVisible(shown.picture is not None)
         if shown.picture is not None:
             self._show_picture(shown)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        for plot in self._plots:
-            plot.set_tokens(tokens)
 
     def _show_picture(self, shown: Inspection) -> None:
         picture = shown.picture

@@ -13,7 +13,7 @@ from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import Curve, LivePlot
 from daq_app.qt.parts import bare, button
 from daq_app.qt.screens import settings
-from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T, Tokens
+from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T
 from daq_app.window.course_state import Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.live_model_process import LiveModel
@@ -54,7 +54,7 @@ FINITE = "live model/finite strain"  # under which the choice is remembered
 class LivePanel(QFrame):
     """The middle of the experimenter's window."""
 
-    def __init__(self, feed: LiveFeed, model: LiveModel, tokens: Tokens, scale: float) -> None:
+    def __init__(self, feed: LiveFeed, model: LiveModel, scale: float) -> None:
         """Show what `feed` holds and what `model` says; nothing yet."""
         super().__init__()
         self.setProperty("role", "panel")
@@ -67,11 +67,11 @@ class LivePanel(QFrame):
         self._read_at = 0.0
         self._drawn: object = None  # what the picture was drawn of
         self._forces_shown = True
-        self.plots = [LivePlot(*plot, tokens, scale) for plot in (*PLOTS, *AXES)]
-        self._model_plot = LivePlot(*SED, tokens, scale, MODEL_CHANNELS)
+        self.plots = [LivePlot(*plot, scale) for plot in (*PLOTS, *AXES)]
+        self._model_plot = LivePlot(*SED, scale, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
-        self.finger = FingerView(tokens, scale)
-        self.map = ContactMap(tokens, scale)
+        self.finger = FingerView(scale)
+        self.map = ContactMap(scale)
         self.bar = LiveBar(scale, self.show_seconds, self._hold, self._finite)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
@@ -100,11 +100,6 @@ class LivePanel(QFrame):
     def seconds(self) -> int:
         """Return how many seconds are shown."""
         return self._seconds
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        for part in (*self.plots, self._model_plot, self.finger, self.map):
-            part.set_tokens(tokens)
 
     def set_room(self, room: bool) -> None:
         """Say whether there is room for the stroke and an open drawer beside each other."""

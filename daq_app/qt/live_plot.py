@@ -14,7 +14,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QP
 
 from daq_app.qt.painted import PaintedWidget
 from daq_app.qt.shapes import blank, draw_line, fine
-from daq_app.qt.tokens import SMALL, Tokens, font
+from daq_app.qt.tokens import SMALL, font
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.plot_scale import MARGIN, PlotScale, ticks, times
@@ -47,12 +47,11 @@ class LivePlot(PaintedWidget):
         name: str,
         curves: Sequence[Curve],
         scale: PlotScale,
-        tokens: Tokens,
         type_scale: float,
         channels: Sequence[str] = CHANNELS,
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
-        super().__init__(tokens)
+        super().__init__()
         self._name = tr(name)
         self._rows = tuple(tuple(channels).index(curve.channel) for curve in curves)
         self._curves = tuple(curves)
@@ -126,13 +125,13 @@ class LivePlot(PaintedWidget):
 
     def draw_ground(self) -> QPixmap:
         """Return axes, grid, numbers and names."""
-        picture = blank(self, self.tokens.surface)
+        picture = blank(self, self.theme.surface)
         painter = QPainter(picture)
         painter.setFont(font(SMALL, self._type_scale))
         inside = self._inside()
         self._paint_values(painter, inside)
         self._paint_times(painter, inside)
-        painter.setPen(fine(self.tokens.line))
+        painter.setPen(fine(self.theme.line))
         painter.drawLine(inside.topLeft(), inside.bottomLeft())
         painter.drawLine(inside.bottomLeft(), inside.bottomRight())
         self._paint_names(painter, inside)
@@ -148,11 +147,11 @@ class LivePlot(PaintedWidget):
         room = (inside.height() + above - below - 2.0 * moved) / line  # the numbers at the edges are moved inside
         for value in ticks(self._scale.low, self._scale.high, room):
             y = inside.bottom() - (value - low) * per_unit
-            faint = QColor(self.tokens.line)
+            faint = QColor(self.theme.line)
             faint.setAlpha(110)
             painter.setPen(fine(faint))
             painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
-            painter.setPen(QColor(self.tokens.quiet))
+            painter.setPen(QColor(self.theme.quiet))
             top = min(max(y - line / 2.0, 0.0), self.height() - line)
             box = QRectF(0, top, inside.left() - 5, line)
             painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, _number(value))
@@ -163,7 +162,7 @@ class LivePlot(PaintedWidget):
         end = inside.right() - metrics.horizontalAdvance(self._end)  # its words may begin so far left
         for value in times(self._seconds, inside.width() / widest):
             x = inside.right() + value * inside.width() / self._seconds
-            painter.setPen(fine(self.tokens.line))
+            painter.setPen(fine(self.theme.line))
             painter.drawLine(QPointF(x, inside.bottom()), QPointF(x, inside.bottom() - 4))
             if not self._times_shown:
                 continue
@@ -172,7 +171,7 @@ class LivePlot(PaintedWidget):
             left = min(max(x - width / 2.0, inside.left() - 3), self.width() - width - 1)
             if value and left + width > end:
                 continue
-            painter.setPen(QColor(self.tokens.quiet))
+            painter.setPen(QColor(self.theme.quiet))
             painter.drawText(QPointF(left, inside.bottom() + metrics.ascent() + 1), text)
 
     def _paint_names(self, painter: QPainter, inside: QRectF) -> None:
@@ -194,10 +193,10 @@ class LivePlot(PaintedWidget):
             end = x + sample
             middle = baseline - metrics.xHeight() / 2.0
             painter.drawLine(QPointF(x, middle), QPointF(end, middle))
-            painter.setPen(QColor(self.tokens.quiet))
+            painter.setPen(QColor(self.theme.quiet))
             painter.drawText(QPointF(end + 4, baseline), tr(curve.channel))
             x = end + 4 + metrics.horizontalAdvance(f"{tr(curve.channel)}  ")
-        painter.setPen(QColor(self.tokens.quiet))
+        painter.setPen(QColor(self.theme.quiet))
         painter.drawText(QPointF(x, baseline), unit)
 
     def _paint_marks(self, painter: QPainter, inside: QRectF) -> None:
@@ -209,15 +208,15 @@ class LivePlot(PaintedWidget):
         for mark in self._marks:
             start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
             if mark.kind == "steady":
-                fill = QColor(self.tokens.act)
+                fill = QColor(self.theme.act)
                 fill.setAlpha(36)
                 painter.fillRect(QRectF(start, inside.top(), stop - start, inside.height()), fill)
-                painter.setPen(fine(self.tokens.act, Qt.PenStyle.DotLine))
+                painter.setPen(fine(self.theme.act, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
                 painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))
                 continue
             onset = mark.kind == "onset"
-            painter.setPen(fine(self.tokens.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
+            painter.setPen(fine(self.theme.quiet, Qt.PenStyle.SolidLine if onset else Qt.PenStyle.DashLine))
             painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
             words = self._words[mark.kind]
             if inside.height() >= 5 * line:  # a lower plot has no room for words; the ones above it say them
@@ -228,7 +227,7 @@ class LivePlot(PaintedWidget):
                     free = left + width
 
     def _colour(self, name: str) -> str:
-        return name if name.startswith("#") else str(getattr(self.tokens, name))
+        return name if name.startswith("#") else str(getattr(self.theme, name))
 
 
 def _range(values: Array, rows: Sequence[int]) -> tuple[float, float]:

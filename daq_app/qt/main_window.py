@@ -33,7 +33,7 @@ from daq_app.qt.subject_picture import open_preview
 from daq_app.qt.subject_side import SubjectSide
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tablet_screen import TabletScreen
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
 from daq_app.window.messages import NewSession
@@ -59,7 +59,7 @@ class MainWindow(QMainWindow):
 
     theme_wanted = Signal(str)
 
-    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float, tablet: TabletScreen | None = None) -> None:
+    def __init__(self, bridge: Bridge, scale: float, tablet: TabletScreen | None = None) -> None:
         """Place the panels, and follow `bridge`; with a `tablet` the subject answers there."""
         super().__init__()
         self.setWindowTitle("daq-app")
@@ -67,25 +67,24 @@ class MainWindow(QMainWindow):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
         self._scale = scale
-        self._tokens = tokens
         self._close_asked = -LEAVING
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
-        self.header = Header(tokens, scale)
+        self.header = Header(scale)
         self.notice = Notice(scale, bridge.send)
-        self.to_do = ToDo(tokens, self._primary, lambda: self.act("go to review"))
+        self.to_do = ToDo(self._primary, lambda: self.act("go to review"))
         self.rail = Rail(scale, lambda room: self.act(f"go to {room}"))
-        self.page = NewSessionPage(tokens, scale, bridge.send, self.act)
-        self.course = CoursePanel(tokens, scale, bridge.send)
-        self.middle = Middle(bridge, tokens, scale, self.act)
+        self.page = NewSessionPage(scale, bridge.send, self.act)
+        self.course = CoursePanel(scale, bridge.send)
+        self.middle = Middle(bridge, scale, self.act)
         self.live = self.middle.live
-        self.bench = BenchPanel(tokens, scale, bridge.send, bridge.search)
-        self.strip = BenchStrip(tokens, scale, self._fold_bench)
-        self.subject = SubjectWindow(tokens, scale, bridge.session_now)
+        self.bench = BenchPanel(scale, bridge.send, bridge.search)
+        self.strip = BenchStrip(scale, self._fold_bench)
+        self.subject = SubjectWindow(scale, bridge.session_now)
         self.tablet = tablet
         self.side = SubjectSide(self, bridge, self.subject, tablet, self.course, self.act)
         self.side.line_changed.connect(self._line_changed)
         self.keyboard = self.side.keyboard
-        self.rooms = Rooms(bridge, tokens, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
+        self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
         self._acts = self._table()
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
@@ -125,22 +124,6 @@ class MainWindow(QMainWindow):
         self.to_do.second.setVisible(self.rooms.over)
         self.rooms.show_state()
         self.side.show_view(view)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        for part in (
-            self.header,
-            self.to_do,
-            self.page,
-            self.course,
-            self.middle,
-            self.bench,
-            self.strip,
-            self.subject,
-            self.rooms,
-        ):
-            part.set_tokens(tokens)
 
     def act(self, act: str) -> None:
         """Do what a key, a button or an entry of the menu stands for."""
@@ -268,7 +251,7 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
 
     def _preview(self) -> None:
-        refused = open_preview(self.page.form(), self.subject.size(), self._tokens, self._scale, self)
+        refused = open_preview(self.page.form(), self.subject.size(), self._scale, self)
         if refused:
             self.notice.warn(refused)
 

@@ -78,8 +78,6 @@ class Rail(QFrame):
             widget.setAccessibleDescription(widget.toolTip())
 
 
-
-
 class Menus:
     """Fills the menu bar of a window."""
 

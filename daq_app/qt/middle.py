@@ -8,7 +8,7 @@ from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.parts import Wrapped, bare, button, panel, regrade, scrolled
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
 from daq_app.wording import tr
@@ -20,15 +20,15 @@ AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose str
 class Middle(QWidget):
     """Shows the signals of this moment, until a trial is inspected; the next stroke brings the signals back."""
 
-    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float, act: Callable[[str], None]) -> None:
+    def __init__(self, bridge: Bridge, scale: float, act: Callable[[str], None]) -> None:
         """Show no session; `act` does what a button stands for."""
         super().__init__()
         self._bridge = bridge
         self._inspected: int | None = None  # number of the trial
         self._phase = ""  # of the session that was shown last
         self.strip = TrialStrip(scale, self.inspect)
-        self.live = LivePanel(bridge.feed, bridge.model, tokens, scale)
-        self.trial = InspectedTrial(tokens, scale, self.leave)
+        self.live = LivePanel(bridge.feed, bridge.model, scale)
+        self.trial = InspectedTrial(scale, self.leave)
         self.stroke = Wrapped("value")
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
@@ -104,11 +104,6 @@ class Middle(QWidget):
             self.leave()
         else:
             self.live.toggle_drawer()
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        for part in (self.live, self.trial):
-            part.set_tokens(tokens)
 
     def _show_inspected(self) -> None:
         session, number = self._bridge.state.session, self._inspected

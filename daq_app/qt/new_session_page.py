@@ -22,7 +22,7 @@ from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
 from daq_app.qt.parts import bare, button, choice, entry, field, label, say, scrolled, tick
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
-from daq_app.qt.tokens import GRID, TARGET, Tokens
+from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import LanguageChosen, Message
 from daq_app.window.new_session import (
@@ -52,9 +52,7 @@ class NewSessionPage(QFrame):
 
     changed = Signal()
 
-    def __init__(
-        self, tokens: Tokens, scale: float, send: Callable[[Message], None], act: Callable[[str], None]
-    ) -> None:
+    def __init__(self, scale: float, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
         """Show an empty form; `send` takes what is asked for, `act` what a button of the page stands for.
 
         Enter goes to the window, whose primary button begins.
@@ -94,7 +92,7 @@ class NewSessionPage(QFrame):
         self.people_score, self.simulated = self._either(tr("People"), tr("Rehearse, simulated"))
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
-        self.screen_fields = ScreenFields(tokens, scale, act)
+        self.screen_fields = ScreenFields(scale, act)
         self._pilot = button(
             tr("Pilot  F5"), tr("pilot this protocol with simulated hand and answers"), lambda: act("pilot")
         )
@@ -175,10 +173,6 @@ class NewSessionPage(QFrame):
         self.simulated.setEnabled(may)
         if not may and self.simulated.isChecked():
             self.people_score.setChecked(True)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self.screen_fields.thumbnail.set_tokens(tokens)
 
     def show_line(self, known: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""

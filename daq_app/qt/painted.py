@@ -1,41 +1,22 @@
-"""Widgets that paint themselves in the colours of the theme, with or without a ground that is painted once."""
+"""A widget painted by hand: what stands still is painted once, and copied under what moves."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QPainter, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.qt.tokens import Tokens
-
-
-class Painted(QWidget):
-    """A widget that paints itself, anew in another theme."""
-
-    def __init__(self, tokens: Tokens) -> None:
-        """Begin with a theme."""
-        super().__init__()
-        self.tokens = tokens
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self.tokens = tokens
-        self.update()
+from daq_app.qt.tokens import LIGHT, theme_of
 
 
 class PaintedWidget(QWidget):
     """Takes all the room there is; a subclass paints the ground, and in its `paintEvent` upon it."""
 
-    def __init__(self, tokens: Tokens) -> None:
+    def __init__(self) -> None:
         """Begin without a ground."""
         super().__init__()
-        self.tokens = tokens
-        self._ground: QPixmap | None = None  # what stands still
+        self._ground: QPixmap | None = None  # what stands still ...
+        self.theme = LIGHT  # ... and the theme in which it was painted
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self.tokens = tokens
-        self.redraw()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Paint the ground for the new size."""
@@ -53,7 +34,9 @@ class PaintedWidget(QWidget):
 
     def painter_on_ground(self) -> QPainter:
         """Return a painter at work on the widget, the ground already there."""
-        if self._ground is None or self._ground.devicePixelRatio() != self.devicePixelRatioF():
+        ratio, theme = self.devicePixelRatioF(), theme_of(self)
+        if self._ground is None or self._ground.devicePixelRatio() != ratio or theme is not self.theme:
+            self.theme = theme
             self._ground = self.draw_ground()
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._ground)

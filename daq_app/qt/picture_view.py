@@ -97,8 +97,6 @@ class _Canvas(QWidget):
         painter.drawImage(box, self._image)
 
 
-
-
 class ComparedView(QWidget):
     """Offers to open a second session, and shows what came of it."""
 

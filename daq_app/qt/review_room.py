@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QListWidget, QListWidget
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.parts import bare, button, label
 from daq_app.qt.remembered import recent_sessions, remember_session
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, theme_of
 from daq_app.wording import tr
 
 LIST_WIDTH = 200  # before the font's scale [px]
@@ -17,10 +17,9 @@ LIST_WIDTH = 200  # before the font's scale [px]
 class ReviewRoom(QWidget):
     """One session at a time; another takes its place."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show no session."""
         super().__init__()
-        self._tokens = tokens
         self.analyst: AnalystWindow | None = None
         self.recent = QListWidget()
         self.recent.setAccessibleName(tr("recent sessions"))
@@ -58,7 +57,7 @@ class ReviewRoom(QWidget):
         self.leave()
         remember_session(folder)
         self._list()
-        self.analyst = AnalystWindow(folder, self._tokens)
+        self.analyst = AnalystWindow(folder, theme_of(self))
         self.analyst.setWindowFlags(Qt.WindowType.Widget)
         self._none.hide()
         self._row.addWidget(self.analyst, 1)
@@ -72,10 +71,6 @@ class ReviewRoom(QWidget):
             self.analyst.deleteLater()
             self.analyst = None
             self._none.show()
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme, from the next session on that is opened."""
-        self._tokens = tokens
 
     def _list(self) -> None:
         self.recent.clear()

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QStackedWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.menus import Menus, Rail, Room
 from daq_app.qt.remembered import remember_session
-from daq_app.qt.tokens import Tokens
 from daq_app.window.messages import NewSession
 
 if TYPE_CHECKING:  # loaded when somebody looks at a session
@@ -19,11 +18,10 @@ if TYPE_CHECKING:  # loaded when somebody looks at a session
 class Rooms(QStackedWidget):
     """Shows one room; rail and menu say which, and which others can be entered."""
 
-    def __init__(self, bridge: Bridge, tokens: Tokens, scale: float, rail: Rail, menus: Menus) -> None:
+    def __init__(self, bridge: Bridge, scale: float, rail: Rail, menus: Menus) -> None:
         """Show nothing yet: the room of the session in hand is the first widget that is added."""
         super().__init__()
         self._bridge = bridge
-        self._tokens = tokens
         self._scale = scale
         self._rail = rail
         self._menus = menus
@@ -81,12 +79,6 @@ class Rooms(QStackedWidget):
         self._rail.show_room(self.room, in_hand=in_hand, over=self.over)
         self._menus.show_state(in_hand=in_hand, over=self.over, opened=self.analyst is not None)
 
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        if self.review is not None:
-            self.review.set_tokens(tokens)
-
     def leave(self) -> None:
         """End the work on the session that is looked at."""
         if self.review is not None:
@@ -97,7 +89,7 @@ class Rooms(QStackedWidget):
         if self.review is None:
             from daq_app.qt.review_room import ReviewRoom
 
-            self.review = ReviewRoom(self._tokens, self._scale)
+            self.review = ReviewRoom(self._scale)
             self.addWidget(self.review)
         self.setCurrentIndex(1)
         return self.review

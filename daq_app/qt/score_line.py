@@ -16,7 +16,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QAbstractSlider, QSizePolicy
 
-from daq_app.qt.tokens import Tokens
+from daq_app.qt.tokens import theme_of
 from daq_app.window.answer import LEAP, STEP, Answer, Device
 from daq_app.window.subject_texts import SubjectText as Text
 from daq_app.window.subject_texts import Translate
@@ -48,10 +48,9 @@ class ScoreLine(QAbstractSlider):
 
     changed = Signal()
 
-    def __init__(self, tokens: Tokens, now: Callable[[], float]) -> None:
+    def __init__(self, now: Callable[[], float]) -> None:
         """Show an empty line; `now` tells the session clock [s]."""
         super().__init__()
-        self.tokens = tokens
         self._now = now
         self._pixels_per_mm = 96 / 25.4
         self._answer = Answer()
@@ -66,11 +65,6 @@ class ScoreLine(QAbstractSlider):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._resize()
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self.tokens = tokens
-        self.update()
 
     @property
     def answer(self) -> Answer:
@@ -149,7 +143,7 @@ class ScoreLine(QAbstractSlider):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line, its two ends, and the mark where there is one."""
-        t, mm, line = self.tokens, self._pixels_per_mm, self._line()
+        t, mm, line = theme_of(self), self._pixels_per_mm, self._line()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self.hasFocus():

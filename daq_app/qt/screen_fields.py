@@ -11,7 +11,6 @@ from daq_app.qt.parts import bare, button, choice, field
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.subject_picture import Thumbnail
-from daq_app.qt.tokens import Tokens
 from daq_app.window.new_session import SessionForm, subject_texts
 from daq_app.window.subject_texts import SubjectText
 from daq_app.wording import tr
@@ -21,7 +20,7 @@ from sessions.plan.protocols.languages import ENGLISH
 class ScreenFields(QWidget):
     """What stands on the card of the subject's screen, be it a second screen or a tablet."""
 
-    def __init__(self, tokens: Tokens, scale: float, act: Callable[[str], None]) -> None:
+    def __init__(self, scale: float, act: Callable[[str], None]) -> None:
         """Show a screen of which nothing is known; `act` takes what a button stands for."""
         super().__init__()
         self.words = ""  # the length of the line, and characters that no font here has
@@ -29,7 +28,7 @@ class ScreenFields(QWidget):
         self._line_words = ""
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
-        self.thumbnail = Thumbnail(tokens, scale)
+        self.thumbnail = Thumbnail(scale)
         self._ruler = button(
             tr("Check with a ruler  Ctrl+M"), tr("check the subject's line with a ruler"), lambda: act("ruler")
         )

@@ -6,10 +6,9 @@ from PySide6.QtCore import QPointF, QRectF, QSettings, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QScreen
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
 
-from daq_app.qt.painted import Painted
 from daq_app.qt.parts import button, label, say
 from daq_app.qt.score_line import LENGTH
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, theme_of
 from daq_app.wording import tr
 from sessions.recording import Setting
 
@@ -88,11 +87,11 @@ class RulerCheck(QWidget):
 
     done = Signal()
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Build the page."""
         super().__init__()
         self._screen: QScreen | None = None
-        self._line = _Line(tokens)
+        self._line = _Line()
         self._sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
         self._measured = QLineEdit()
         self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
@@ -123,10 +122,6 @@ class RulerCheck(QWidget):
         self._measured.setFocus(Qt.FocusReason.OtherFocusReason)
         say(self._wrong, tr("Screen: {name}, {words}.", name=screen.name(), words=millimetres(screen).words))
 
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._line.set_tokens(tokens)
-
     def _keep(self) -> None:
         text = self._measured.text().strip().replace(",", ".")
         try:
@@ -147,9 +142,9 @@ class RulerCheck(QWidget):
         self.done.emit()
 
 
-class _Line(Painted):
-    def __init__(self, tokens: Tokens) -> None:
-        super().__init__(tokens)
+class _Line(QWidget):
+    def __init__(self) -> None:
+        super().__init__()
         self._length = 0.0
         self.setMinimumHeight(60)
         self.setAccessibleName(tr("line of 100 millimetres to be measured"))
@@ -163,7 +158,7 @@ class _Line(Painted):
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the line with its two ends."""
         painter = QPainter(self)
-        painter.setPen(QPen(QColor(self.tokens.text), 2))
+        painter.setPen(QPen(QColor(theme_of(self).text), 2))
         box = QRectF((self.width() - self._length) / 2, 10, self._length, 40)
         middle = box.center().y()
         painter.drawLine(QPointF(box.left(), middle), QPointF(box.right(), middle))

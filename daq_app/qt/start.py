@@ -121,12 +121,10 @@ def _opened(
     _dress(application, tokens, scale)
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
-    window = MainWindow(bridge, tokens, scale, tablet)
+    window = MainWindow(bridge, scale, tablet)
 
     def theme_changed() -> None:
-        chosen = remembered.chosen_tokens()
-        _dress(application, chosen, scale)
-        window.set_tokens(chosen)
+        _dress(application, remembered.chosen_tokens(), scale)
 
     def theme_chosen(name: str) -> None:
         remembered.choose_theme(name)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QSizePolicy, QVBoxLayout, QWidget
 
@@ -10,13 +10,14 @@ from daq_app.qt.drawer import Openness
 from daq_app.qt.languages import missing_glyphs, translator
 from daq_app.qt.parts import Wrapped, bare, button, label
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID
 from daq_app.window.new_session import Refused, SessionForm
 from daq_app.window.preview import PreviewPage, preview
 from daq_app.window.subject_texts import SubjectText
 from daq_app.window.view_subject import SubjectView
 from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH
+
 THUMBNAIL_HEIGHT = 110  # before the font's scale [px]
 MIRROR_HEIGHT = 150  # of the picture, before the font's scale [px]
 MIRROR = "panels/mirror"  # under which it is remembered whether it is open
@@ -30,10 +31,10 @@ class SubjectPicture(QWidget):
     The window that draws it is a second one that nobody sees, so that the subject's answer is never in the picture.
     """
 
-    def __init__(self, tokens: Tokens, scale: float, size: QSize) -> None:
+    def __init__(self, scale: float, size: QSize) -> None:
         """Show nothing yet; `size` is that of the subject's window."""
         super().__init__()
-        self._page = SubjectWindow(tokens, scale, lambda: 0.0)
+        self._page = SubjectWindow(scale, lambda: 0.0)
         self._page.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
         self._page.resize(size)
         self._view: SubjectView | None = None
@@ -50,22 +51,24 @@ class SubjectPicture(QWidget):
         """Show a page as it looks in a window of a size; where it asks, with the button that ends the answer."""
         if (view, size) == (self._view, self._page.size()):
             return
-        self._view = view
         self._page.resize(size)
+        self._draw(view)
+        self.setAccessibleName(tr("the subject's page: {title} {it}", title=view.title, it=view.text).strip())
+
+    def _draw(self, view: SubjectView) -> None:
+        self._view = view
         self._page.show()  # nowhere: it only makes Qt lay it out
         self._page.show_view(view, None)
         self._page.next.setVisible(view.asks)
         self._picture = self._page.grab()
         self._page.hide()
-        self.setAccessibleName(tr("the subject's page: {title} {it}", title=view.title, it=view.text).strip())
         self.update()
 
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._page.set_tokens(tokens)
-        if self._view is not None:
-            view, self._view = self._view, None
-            self.show_page(view, self._page.size())
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+        """Draw the page anew in another theme, once its window has it too."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange and (view := self._view) is not None:
+            QTimer.singleShot(0, self, lambda: self._draw(view))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Draw the picture anew at another size."""
@@ -90,14 +93,12 @@ class SubjectPicture(QWidget):
         painter.drawRect(at.x(), at.y(), size.width() - 1, size.height() - 1)
 
 
-
-
 class Thumbnail(SubjectPicture):
     """Shows the first page with a question; nothing while the form's protocol or study is refused."""
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show nothing yet."""
-        super().__init__(tokens, scale, QSize(1000, 640))
+        super().__init__(scale, QSize(1000, 640))
         self._drawn: object = None  # what the picture was drawn from
         self.setFixedHeight(round(THUMBNAIL_HEIGHT * min(scale, 1.4)))
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -114,18 +115,16 @@ class Thumbnail(SubjectPicture):
             self.show_page(next((page.view for page in pages if page.view.asks), pages[0].view), size)
 
 
-
-
 class Mirror(QWidget):
     """Shows the subject's page without any answer on it, so that it serves under every blinding.
 
     It begins folded where there is no room for it, and can be opened there all the same.
     """
 
-    def __init__(self, tokens: Tokens, scale: float) -> None:
+    def __init__(self, scale: float) -> None:
         """Show nothing yet."""
         super().__init__()
-        self._tokens, self._scale = tokens, scale
+        self._scale = scale
         self._view: SubjectView | None = None
         self._size = QSize(1000, 640)
         self.open = Openness(MIRROR, self._place)
@@ -139,40 +138,32 @@ class Mirror(QWidget):
     def show_view(self, view: SubjectView | None, size: QSize) -> None:
         """Show a page as it looks in the subject's window of a size; None before a session."""
         self._view, self._size = view, QSize(size)
-        self._draw()
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self._tokens = tokens
-        if self.picture is not None:
-            self.picture.set_tokens(tokens)
+        self._show_page()
 
     def _place(self) -> None:
         self.tab.setText(tr("The subject sees  V  {word}", word="▾" if self.open else "▸"))
         self.tab.setAccessibleName(tr("{word} the subject's page", word=tr("fold") if self.open else tr("show")))
         if self.picture is not None:
             self.picture.setVisible(bool(self.open))
-        self._draw()
+        self._show_page()
 
-    def _draw(self) -> None:
+    def _show_page(self) -> None:
         if self._view is None or not self.open:
             return
         if self.picture is None:
-            self.picture = SubjectPicture(self._tokens, self._scale, self._size)
+            self.picture = SubjectPicture(self._scale, self._size)
             self.picture.setFixedHeight(round(MIRROR_HEIGHT * min(self._scale, 1.4)))
             self.picture.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self.layout().addWidget(self.picture)  # pyright: ignore[reportOptionalMemberAccess]  it was set above
         self.picture.show_page(self._view, self._size)
 
 
-
-
-def open_preview(form: SessionForm, size: QSize, tokens: Tokens, scale: float, parent: QWidget) -> str:
+def open_preview(form: SessionForm, size: QSize, scale: float, parent: QWidget) -> str:
     """Show the pages of a form's protocol as they look in a window of a size; return why not, empty where they are."""
     pages = preview(form, translator(form.language or ENGLISH))
     if isinstance(pages, Refused):
         return " ".join(pages.sentences.values())
-    shown = SubjectPreview(pages, size, tokens, scale, parent)
+    shown = SubjectPreview(pages, size, scale, parent)
     shown.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     shown.show()
     return ""
@@ -181,16 +172,14 @@ def open_preview(form: SessionForm, size: QSize, tokens: Tokens, scale: float, p
 class SubjectPreview(QDialog):
     """The pages as a list, and the picture of the one that is chosen."""
 
-    def __init__(
-        self, pages: Sequence[PreviewPage], size: QSize, tokens: Tokens, scale: float, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, pages: Sequence[PreviewPage], size: QSize, scale: float, parent: QWidget | None = None) -> None:
         """Show the first page, as it looks in a subject's window of a size."""
         super().__init__(parent)
         self.setObjectName("window")
         self.setWindowTitle(tr("daq-app · preview of the subject's pages"))
         self.setAccessibleName(tr("preview of the subject's pages"))
         self._pages, self._size = tuple(pages), size
-        self.picture = SubjectPicture(tokens, scale, size)
+        self.picture = SubjectPicture(scale, size)
         self.list = _Pages()
         self.list.setAccessibleName(tr("pages that the subject will see"))
         self.list.addItems([page.name for page in self._pages])

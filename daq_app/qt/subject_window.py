@@ -12,7 +12,7 @@ from daq_app.qt.languages import direction, translator
 from daq_app.qt.parts import bare, button, label, say
 from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, RulerCheck, millimetres
-from daq_app.qt.tokens import GRID, Tokens, font
+from daq_app.qt.tokens import GRID, font
 from daq_app.window.subject_texts import SubjectText as Text
 from daq_app.window.view_subject import Kind, SubjectView
 from sessions.plan.plan import Hand
@@ -31,7 +31,7 @@ class SubjectWindow(QWidget):
     answered = Signal(object)  # Scored, MagnitudeEstimate or PairedChoice
     screen_changed = Signal()
 
-    def __init__(self, tokens: Tokens, scale: float, now: Callable[[], float]) -> None:
+    def __init__(self, scale: float, now: Callable[[], float]) -> None:
         """Show a welcome; `now` tells the session clock [s]."""
         super().__init__()
         self.setObjectName("window")
@@ -45,10 +45,10 @@ class SubjectWindow(QWidget):
         self._language = ENGLISH
         self._type = scale  # of the letters, by their size at 100 %
         self._title, self._text = label(role="title", wrap=True), label(wrap=True)
-        self.press = PressBar(tokens, scale)
+        self.press = PressBar(scale)
         self.press.hide()
         self._question, self._hint = label(role="title", wrap=True), label(wrap=True)
-        self.line = ScoreLine(tokens, now)
+        self.line = ScoreLine(now)
         self._scale = _Scale(self.line)
         self.number = NumberField(scale, now)
         self.choice = ChoiceOfTwo(scale, now)
@@ -57,7 +57,7 @@ class SubjectWindow(QWidget):
             self._ways.addWidget(way)
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
-        self.ruler = RulerCheck(tokens, scale)
+        self.ruler = RulerCheck(scale)
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
         self.ruler.done.connect(self._ruler_done)
         self._pages = QStackedWidget()
@@ -176,12 +176,6 @@ class SubjectWindow(QWidget):
         self.line.set_pixels_per_mm(known.pixels)
         self._scale.fit()
         return known
-
-    def set_tokens(self, tokens: Tokens) -> None:
-        """Follow another theme."""
-        self.line.set_tokens(tokens)
-        self.press.set_tokens(tokens)
-        self.ruler.set_tokens(tokens)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Let Enter be Next, and every other key of the line go to the line."""

@@ -122,8 +122,6 @@ def _item(words: str) -> QStandardItem:
     return item
 
 
-
-
 class ReadingsTable(QWidget):
     """A table with the place of its numbers above it."""
 

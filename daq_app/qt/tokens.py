@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetrics, QGuiApplication, QPalette
+from PySide6.QtWidgets import QWidget
 
 GRID = 8  # everything keeps to multiples of it [device-independent pixels]
 TARGET = 40  # least height of what is clicked or touched
@@ -75,6 +76,11 @@ def current_tokens() -> Tokens:
         window = QGuiApplication.palette().color(QPalette.ColorRole.Window)
         return DARK if window.lightness() < 128 else LIGHT
     return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
+
+
+def theme_of(widget: QWidget) -> Tokens:
+    """Return the theme in which a widget is shown: light text stands on dark grounds."""
+    return DARK if widget.palette().windowText().color().lightness() > 127 else LIGHT
 
 
 def font_scale() -> float:

@@ -107,9 +107,6 @@ class Choice:
         return MagnitudeEstimate(number, self.first_touch, self.corrections, hand, self.device)
 
 
-
-
-
 def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False) -> Owner:
     """Return whose a key is while the subject is asked for `asks`, whichever window has the keyboard.
 

@@ -61,8 +61,6 @@ def greatest(six: tuple[float, ...]) -> str:
     return f"{1000 * force:.2g} mN, {torque:.2g} N mm"
 
 
-
-
 @dataclass(frozen=True, slots=True)
 class DeviceRow:
     """A transducer that can be connected."""

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import QLabel
 
 from daq_app.qt import languages
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import LIGHT
 from daq_app.window.subject_texts import SubjectText
 from daq_app.window.view_subject import SubjectView
 from daq_app.wording import SUBJECT, translations
@@ -25,7 +24,7 @@ def shown(application):
     made = []
 
     def window(view, scale=1.0, size=(900, 560)):
-        page = SubjectWindow(LIGHT, scale, lambda: 0.0)
+        page = SubjectWindow(scale, lambda: 0.0)
         made.append(page)
         page.resize(*size)
         page.show()

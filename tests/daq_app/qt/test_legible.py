@@ -185,7 +185,7 @@ def windows(driver):
     made, bridge = [], driver.window.bridge
 
     def make(size, scale, theme):
-        window = MainWindow(bridge, theme, scale)
+        window = MainWindow(bridge, scale)
         made.append(window)
         window.setStyleSheet(tokens.style_sheet(theme, scale))
         window.resize(*size)
@@ -334,7 +334,7 @@ def cut_axes(window):
     ],
 )
 def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, language):
-    window = SubjectWindow(tokens.LIGHT, scale, lambda: 0.0)
+    window = SubjectWindow(scale, lambda: 0.0)
     window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
     window.resize(*size)
     window.show()
@@ -351,7 +351,7 @@ def test_no_text_that_the_subject_sees_is_cut_off(application, size, scale, lang
 
 @pytest.mark.usefixtures("application")
 def test_the_words_of_a_lift_and_of_the_next_onset_never_lie_on_each_other():
-    plot = LivePlot(*PLOTS[0], tokens.LIGHT, 1.0)
+    plot = LivePlot(*PLOTS[0], 1.0)
     plot.resize(220, 160)
     time = np.linspace(0.0, 10.0, 50)
     for gap in np.linspace(0.1, 4.0, 40):

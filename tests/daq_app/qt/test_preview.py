@@ -7,7 +7,6 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton
 
-from daq_app.qt import tokens
 from daq_app.qt.languages import translator
 from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.window.new_session import SessionForm
@@ -25,7 +24,7 @@ def opened(application):
     made = []
 
     def show(pages):
-        made.append(SubjectPreview(pages, QSize(1366, 768), tokens.LIGHT, 1.0))
+        made.append(SubjectPreview(pages, QSize(1366, 768), 1.0))
         made[-1].show()
         application.processEvents()
         return made[-1]

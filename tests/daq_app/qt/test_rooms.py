@@ -41,9 +41,13 @@ def entries(menu):
 def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
     window = driver.window
     found = entries(window.menuBar())
+    plot, page = window.live.plots[0], window.page.screen_fields.thumbnail
     try:
         found["Dark"].trigger()
-        assert window._tokens == tokens.DARK
+        assert tokens.theme_of(window) == tokens.DARK
+        assert plot.grab().toImage().pixelColor(1, 1).name() == tokens.DARK.surface  # what is painted by hand follows
+        driver.application.processEvents()
+        assert page._picture.toImage().pixelColor(2, 2).name() == tokens.DARK.ground
         assert remembered.chosen_tokens() == tokens.DARK
         found["150 %"].trigger()
         assert remembered.type_scale() == 1.5

@@ -75,7 +75,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         assert not live.map.isVisible()
         assert live.tab.accessibleName().startswith("open the drawer")
         assert screens.settings().value(DRAWER) == "no"
-        again = LivePanel(window.bridge.feed, window.bridge.model, tokens.LIGHT, 1.0)
+        again = LivePanel(window.bridge.feed, window.bridge.model, 1.0)
         assert not again.drawer.open
         click(live.tab)
         assert live.map.isVisible()
@@ -86,7 +86,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         QTest.mouseMove(handle, middle - QPoint(60, 0))
         QTest.mouseRelease(handle, LEFT, pos=middle - QPoint(60, 0))
         assert live.drawer.sizes()[1] == pytest.approx(before[1] + 60, abs=3)
-        again = LivePanel(window.bridge.feed, window.bridge.model, tokens.LIGHT, 1.0)
+        again = LivePanel(window.bridge.feed, window.bridge.model, 1.0)
         again.resize(live.size())
         again.show()
         driver.application.processEvents()
@@ -118,7 +118,7 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application, scale):
-    shown = InspectedTrial(tokens.LIGHT, scale, lambda: None)
+    shown = InspectedTrial(scale, lambda: None)
     shown.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
     picture = StrokePicture(np.linspace(0.0, 3.0, 50), np.ones((4, 50)), 0.5, 2.5, (1.2, 0.5, 0.41, 20.6))
     cells = (("N", "12.34 N"), ("T", "12.34 N"), ("mu", "0.41"), ("speed", "120 mm/s"))
@@ -169,7 +169,7 @@ def test_a_stroke_stays_drawn_however_long_its_score_is_awaited(driver):
     class Feed:
         trace = LiveTrace(100.0)
 
-    panel = LivePanel(Feed, driver.window.bridge.model, tokens.LIGHT, 1.0)
+    panel = LivePanel(Feed, driver.window.bridge.model, 1.0)
     panel.resize(800, 600)
     panel.show()
     driver.application.processEvents()

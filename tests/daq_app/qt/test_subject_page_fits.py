@@ -29,7 +29,7 @@ def page(application):
     made = []
 
     def shown(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
-        window = SubjectWindow(tokens.LIGHT, scale, lambda: 0.0)
+        window = SubjectWindow(scale, lambda: 0.0)
         made.append(window)
         window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
         window.setLayoutDirection(direction)
@@ -97,7 +97,7 @@ def test_both_choices_are_large_enough_for_a_finger_and_their_words_are_seen_who
 @pytest.mark.parametrize("direction", [LEFT_TO_RIGHT, RIGHT_TO_LEFT], ids=["to the right", "to the left"])
 @pytest.mark.usefixtures("application")
 def test_the_bar_of_the_force_fills_from_where_reading_begins(direction):
-    bar = PressBar(tokens.LIGHT, 1.0)
+    bar = PressBar(1.0)
     bar.setLayoutDirection(direction)
     bar.resize(400, 40)
     bar._force = 0.25 * FULL

@@ -24,11 +24,10 @@ QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, sys.arg
 application = QApplication([])
 from daq_app.qt import screens
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import LIGHT
 desk, tablet = application.screens()
 screens.checked(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
 screens.checked(tablet, 125.0)  # and 125 here
-subject = SubjectWindow(LIGHT, 1.0, lambda: 0.0)
+subject = SubjectWindow(1.0, lambda: 0.0)
 subject.show()
 told = []
 for screen in (desk, tablet, desk):

@@ -180,7 +180,7 @@ def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_rememb
         QTest.keyClick(window, Qt.Key.Key_M)
         assert model.kinematics == kinematics
         assert remembered().value(FINITE) == kept
-        again = LivePanel(window.bridge.feed, model, tokens.LIGHT, 1.0)
+        again = LivePanel(window.bridge.feed, model, 1.0)
         assert again.bar.finite.isChecked() == (kinematics == "finite")
 
 
@@ -313,7 +313,7 @@ def test_no_widget_of_the_subject_shows_a_number_or_a_tick(driver):
 
 @pytest.mark.usefixtures("application")
 def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_moment():
-    bar, trace = PressBar(tokens.LIGHT, 1.0), LiveTrace(100.0)
+    bar, trace = PressBar(1.0), LiveTrace(100.0)
     values = np.full((len(CHANNELS), 200), np.nan)
     values[CHANNELS.index("N"), :180], values[CHANNELS.index("N"), 180:] = 4.0, 2.5
     bar.resize(400, 40)
@@ -325,13 +325,13 @@ def test_the_bar_of_how_hard_the_finger_presses_shows_the_mean_of_the_last_momen
 
 
 def _filled(bar):
-    image, colour = bar.grab().toImage(), QColor(bar.tokens.act)
+    image, colour = bar.grab().toImage(), QColor(tokens.theme_of(bar).act)
     return sum(image.pixelColor(x, image.height() // 2) == colour for x in range(image.width()))
 
 
 @pytest.mark.usefixtures("application")
 def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
-    line = score_line.ScoreLine(tokens.LIGHT, lambda: 0.0)
+    line = score_line.ScoreLine(lambda: 0.0)
     line.begin(("not at all", "very"))
     told = QAccessible.queryAccessibleInterface(line)
     assert told.role() == QAccessible.Role.Slider
