@@ -27,6 +27,7 @@ class _Audience:
 
 
 _AUDIENCE: ContextVar[_Audience | None] = ContextVar("audience", default=None)
+_CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: None)
 
 
 @contextmanager
@@ -53,6 +54,21 @@ def report_progress(doing: str, part: float = 0.0) -> None:
     if audience is not None:
         audience.doing = doing
         audience.listener(doing, part)
+
+
+@contextmanager
+def interruptible(progress: Progress | None, part: Callable[[], float]) -> Generator[None]:
+    """Let `check_stop` call `progress` with the `part` done in this thread, until the block ends."""
+    before = _CHECK.set(lambda: report_part(progress, part()))
+    try:
+        yield
+    finally:
+        _CHECK.reset(before)
+
+
+def check_stop() -> None:
+    """Raise Cancelled where the caller asked to stop: called between any two steps that take long."""
+    _CHECK.get()()
 
 
 def report_part(progress: Progress | None, part: float) -> None:

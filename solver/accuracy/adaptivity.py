@@ -1,6 +1,5 @@
 """A settled state at finite strain on nested meshes: each begins where the coarser one ended, a few iterations away."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -63,7 +62,7 @@ class Meshes:
             self._fingers[sizing] = FiniteFinger.of(scene, sizing)
         return self._fingers[sizing]
 
-    def coarse(self, scene: Scene, sizing: Sizing, stop: Callable[[], bool]) -> MeshSolution:
+    def coarse(self, scene: Scene, sizing: Sizing) -> MeshSolution:
         """Return a state of a scene on a coarse mesh, sought first from the one found last there. Raises SolveFailure.
 
         It is the settled one, or the slide where a given drag nearly makes the finger slide.
@@ -74,7 +73,7 @@ class Meshes:
             setup = perf_counter() - begun
             near = None if self._last is None or self._last.finger is not finger else self._last.state
             try:
-                self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, stop, near), setup)
+                self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, near), setup)
                 self._coarse[scene, sizing] = self._last
             except SolveFailure as failure:
                 self._coarse[scene, sizing] = failure
@@ -84,9 +83,7 @@ class Meshes:
         return solution
 
 
-def coarse_solution(
-    scene: Scene, expected: float, fineness: float, stop: Callable[[], bool], meshes: Meshes
-) -> MeshSolution:
+def coarse_solution(scene: Scene, expected: float, fineness: float, meshes: Meshes) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which finer ones begin.
 
     `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
@@ -97,10 +94,10 @@ def coarse_solution(
     sizing = Sizing(min(COARSE, fineness), depth, margin=MARGIN)
     beyond = False
     try:
-        low = meshes.coarse(scene, sizing, stop)
+        low = meshes.coarse(scene, sizing)
         if low.state.reaches_end:
             sizing = replace(sizing, margin=WIDER)
-            low = meshes.coarse(scene, sizing, stop)
+            low = meshes.coarse(scene, sizing)
         if sound(low.finger, low.state):
             return low
         beyond = folded(low.finger, low.state)
@@ -112,56 +109,50 @@ def coarse_solution(
     except SolveFailure:
         pass
     if beyond and scene.normal_force is None and scene.loading.direction != 0:
-        refuse_far_beyond(scene, sliding_load(scene), stop)
+        refuse_far_beyond(scene, sliding_load(scene))
     sizing = replace(sizing, fineness=fineness)
     try:
-        return _plain(scene, sizing, stop, meshes)
+        return _plain(scene, sizing, meshes)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _plain(scene.undragged(), sizing, stop, meshes)
+        return _plain(scene.undragged(), sizing, meshes)
 
 
-def _plain(scene: Scene, sizing: Sizing, stop: Callable[[], bool], meshes: Meshes) -> MeshSolution:
+def _plain(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
     begun = perf_counter()
     finger = meshes.finger(scene, sizing)
     setup = perf_counter() - begun
-    state = settled(finger, scene, stop)
+    state = settled(finger, scene)
     if sizing.margin < WIDER and state.reaches_end:
-        return _plain(scene, replace(sizing, margin=WIDER), stop, meshes)
+        return _plain(scene, replace(sizing, margin=WIDER), meshes)
     return MeshSolution(finger, sizing, state, setup)
 
 
-def _on_coarse(
-    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: EquilibriumState | None
-) -> EquilibriumState:
+def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
     """Return the state on the coarse mesh, or the slide where a given drag nearly makes the finger slide there."""
     drag = scene.tangential_force
     if drag is None:
-        return roughly(finger, scene, stop, near)
+        return roughly(finger, scene, near)
     try:
-        slide = roughly(finger, scene.undragged(), stop, near)
+        slide = roughly(finger, scene.undragged(), near)
     except SolveFailure:
-        return march(scene, finger, stop=stop).last  # the drag may be met before sliding would fold the skin
-    return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger, stop=stop).last
+        return march(scene, finger).last  # the drag may be met before sliding would fold the skin
+    return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger).last
 
 
-def refine(
-    scene: Scene, fineness: float, low: MeshSolution, stop: Callable[[], bool], meshes: Meshes
-) -> NestedSolution:
+def refine(scene: Scene, fineness: float, low: MeshSolution, meshes: Meshes) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
-    steps = steps_asked(scene, low.finger, stop, low.state)
+    steps = steps_asked(scene, low.finger, low.state)
     sizing = replace(low.sizing, fineness=fineness)
-    top = solution_on(scene, sizing, low, stop, meshes, 1 if steps is None else steps.times)
+    top = solution_on(scene, sizing, low, meshes, 1 if steps is None else steps.times)
     if top.sizing.margin < WIDER and top.state.reaches_end:
         wider = replace(sizing, margin=WIDER)
-        top = solution_on(scene, wider, low, stop, meshes, 1 if steps is None else steps.times)
+        top = solution_on(scene, wider, low, meshes, 1 if steps is None else steps.times)
     return NestedSolution(low, top, steps)
 
 
-def solution_on(
-    scene: Scene, sizing: Sizing, below: MeshSolution, stop: Callable[[], bool], meshes: Meshes, times: int = 1
-) -> MeshSolution:
+def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, times: int = 1) -> MeshSolution:
     """Return the settled state on a mesh of `sizing`, begun at the state `below`.
 
     A course takes so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
@@ -169,12 +160,12 @@ def solution_on(
     """
     begun = _begun(scene, sizing, below, meshes)
     try:
-        return replace(begun, state=settled(begun.finger, scene, stop, begun.state, times))
+        return replace(begun, state=settled(begun.finger, scene, begun.state, times))
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
     begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, meshes)
-    return replace(begun, state=settled(begun.finger, scene, stop, begun.state, times))
+    return replace(begun, state=settled(begun.finger, scene, begun.state, times))
 
 
 def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
@@ -188,7 +179,7 @@ def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) ->
 
 
 def on_nested(
-    scene: Scene, top: MeshSolution, steps: Steps | None, stop: Callable[[], bool], meshes: Meshes
+    scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedNumbers | None, Steps | None]:
     """Return the numbers of a scene on the nested mesh of `top`, None where it has no state there, and its steps.
 
@@ -199,12 +190,12 @@ def on_nested(
     try:
         if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
-                judged = steps_asked(scene, top.finger, stop, top.state)
+                judged = steps_asked(scene, top.finger, top.state)
                 steps = None if judged is None else replace(judged, times=1)
-            state = end(scene, finger, stop=stop)
+            state = end(scene, finger)
         else:
             steps = None
-            state = nearby(finger, scene, begun.state, stop) or settled(finger, scene, stop, begun.state)
+            state = nearby(finger, scene, begun.state) or settled(finger, scene, begun.state)
     except SolveFailure:
         return None, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)

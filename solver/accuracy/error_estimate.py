@@ -25,7 +25,6 @@ from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import end
-from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
@@ -88,28 +87,26 @@ class Steps:
         return usual - (1.0 - 1.0 / self.times) * self.excess
 
 
-def steps_asked(
-    scene: Scene, finger: Finger[Patches], stop: Callable[[], bool] = never, settled: EquilibriumState | None = None
-) -> Steps | None:
+def steps_asked(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
     """Return the load steps that a scene asks for, judged on one mesh, whose `settled` state may be known.
 
     None where that does not depend on its way. Raises SolveFailure, Cancelled.
     """
     if settled is not None and not settled.load.path_dependent:
         return None
-    ends = [end(scene, finger, 1.0, stop) if settled is None or scene.viscoelastic else settled]
-    usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part, stop) for part in PARTS.tolist()])
+    ends = [end(scene, finger, 1.0) if settled is None or scene.viscoelastic else settled]
+    usual, *fewer = finger.all_numbers(ends + [end(scene, finger, part) for part in PARTS.tolist()])
     return Steps.of(usual, np.array(fewer), scene.solve.tolerance)
 
 
-def steps_of_press(scene: Scene, finger: Finger[Patches], stop: Callable[[], bool] = never) -> int:
+def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
     """Return how many times the usual load steps a history takes whose end does not depend on them.
 
     Those that a tolerance asks for at the end of its press. Raises as `steps_asked`.
     """
     if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
         return 1
-    steps = steps_asked(scene.pressed_only(), finger, stop)
+    steps = steps_asked(scene.pressed_only(), finger)
     return 1 if steps is None else steps.times
 
 

@@ -4,7 +4,6 @@ The course is marched, on a rough mesh and in few steps: the press, then a slide
 sideways, by when all of an elastic finger slips. A step is exact for a strain that grows evenly, so that few will do.
 """
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -25,7 +24,7 @@ from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.scene.scene import Scene
-from solver.scene.tables import Finger, Friction, Loading, Materials, Receptor, Relaxation
+from solver.scene.tables import Relaxation
 
 ROUGH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
 STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide
@@ -59,15 +58,12 @@ def relaxing(scene: Scene) -> Scene | None:
     return replace(scene, materials=replace(scene.materials, **soft))
 
 
-def with_viscosity(prediction: Prediction, stop: Callable[[], bool] = lambda: False) -> Prediction:
-    """Return `prediction` with the evidence on viscosity marched, where that can be.
-
-    Raises Cancelled as `stop` says.
-    """
+def with_viscosity(prediction: Prediction) -> Prediction:
+    """Return `prediction` with the evidence on viscosity marched, where that can be. Raises Cancelled."""
     scene, begun = prediction.scene, perf_counter()
     if scene.materials.relax and scene.solve.course == "history":
         return prediction
-    still = residual_overstress(prediction, stop)
+    still = residual_overstress(prediction)
     if still is None:
         return replace(prediction, evidence_s=perf_counter() - begun)
     whose = "with the scene's own series"
@@ -85,10 +81,10 @@ def with_viscosity(prediction: Prediction, stop: Callable[[], bool] = lambda: Fa
     return with_left_out(prediction, {**before, "viscosity": entry}, begun)
 
 
-def residual_overstress(prediction: Prediction, stop: Callable[[], bool] = lambda: False) -> ResidualOverstress | None:
+def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     """Return what tissues would still hold in the scene of `prediction`, whose skin says how long the slide lasts.
 
-    None where the rough mesh has no such course. Raises Cancelled where `stop` says so.
+    None where the rough mesh has no such course. Raises Cancelled.
     """
     scene = relaxing(prediction.scene.driven(prediction.indentation))
     if scene is None or not prediction.sed_ending > 0.0:
@@ -107,8 +103,8 @@ def residual_overstress(prediction: Prediction, stop: Callable[[], bool] = lambd
             way, at_last = _small(scene)
         else:
             finger = FiniteFinger.of(scene, Sizing(ROUGH[kind], depth, margin=MARGIN))
-            at_last = finger.sed_ending(roughly(finger, scene, stop).u)
-            way = way_of(scene, finger, relaxing=True, stop=stop)
+            at_last = finger.sed_ending(roughly(finger, scene).u)
+            way = way_of(scene, finger, relaxing=True)
         for aim in aims:
             way.go(aim)
     except SolveFailure:
@@ -119,7 +115,7 @@ def residual_overstress(prediction: Prediction, stop: Callable[[], bool] = lambd
 
 def _small(scene: Scene) -> tuple[Way, float]:
     """Return the untouched finger of a scene at the beginning of its course, and the settled SED [MPa]."""
-    finger, body = _rough(scene.finger, scene.materials, scene.receptor, scene.loading.depth)
+    finger, body = _rough(scene.unloaded(scene.loading.depth))
     body = copy(body)  # each course has a past of its own
     body.rest()
     tissue = LinearTissue(body, (finger.ending.endings,))
@@ -128,10 +124,9 @@ def _small(scene: Scene) -> tuple[Way, float]:
 
 
 @lru_cache(maxsize=1)
-def _rough(finger: Finger, materials: Materials, receptor: Receptor, depth: float) -> tuple[LinearFinger, RelaxingBody]:
+def _rough(scene: Scene) -> tuple[LinearFinger, RelaxingBody]:
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
-    scene = Scene(finger=finger, materials=materials, friction=Friction(0.0), loading=Loading(depth), receptor=receptor)
-    coarse = LinearFinger.of(scene, Sizing(ROUGH["small"], depth, margin=4.0))
-    body = RelaxingBody(coarse.geometry.mesh, relaxing_laws(materials), checked=True)
+    coarse = LinearFinger.of(scene, Sizing(ROUGH["small"], scene.loading.depth, margin=4.0))
+    body = RelaxingBody(coarse.geometry.mesh, relaxing_laws(scene.materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return coarse, body

@@ -11,7 +11,6 @@ free surface lose their meaning, and finer meshes end ever nearer to it. The the
 is that of Dowaikh and Ogden (1990, IMA J. Appl. Math. 44, 261), here with any law and plane strain.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol
@@ -24,7 +23,7 @@ from solver.constitutive.hyperelastic import Law, stress, tangent
 from solver.contact import SkinCompression
 from solver.equilibrium.newton import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import NotConverged
-from solver.progress import Cancelled, report_progress
+from solver.progress import check_stop, report_progress
 
 LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
 
@@ -93,15 +92,14 @@ def continue_branch(
     by: int,
     target: float,
     folds: float,
-    stop: Callable[[], bool] = lambda: False,
 ) -> Branch:
     """Do as `follow`, and go on where the branch only turns back for a moment."""
-    branch = follow(finger, start, by, target, folds, stop)
+    branch = follow(finger, start, by, target, folds)
     for _ in range(BRANCH.hops):
         beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
         if beyond is None:
             break
-        more = follow(finger, beyond, by, target, folds, stop)
+        more = follow(finger, beyond, by, target, folds)
         branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
     return branch
 
@@ -137,12 +135,11 @@ def follow(
     by: int,
     target: float,
     folds: float,
-    stop: Callable[[], bool] = lambda: False,
 ) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
     It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
-    (`folding.folds_at`). Raises Cancelled where `stop` says so.
+    (`folding.folds_at`). Raises Cancelled.
     """
     way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
     if way[0].value >= target * (1.0 - 1e-12):
@@ -153,8 +150,7 @@ def follow(
     direction, rate = _tangent(finger.newton, start, by)
     doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
     for _ in range(BRANCH.most):
-        if stop():
-            raise Cancelled
+        check_stop()
         report_progress(doing, abs(way[best].value - way[0].value) / reach)
         step = _further(finger, way[-1], by, direction, rate, length, target, BRANCH.shortest * reach)
         if step is None:

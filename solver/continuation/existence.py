@@ -7,7 +7,7 @@ there the branch is followed on. What that mesh is good to is measured.
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -22,7 +22,7 @@ from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, L
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene.scene import Scene
-from solver.scene.tables import Finger, Materials, Receptor
+from solver.tolerances import SHALLOW
 
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
@@ -62,32 +62,20 @@ class Reach:
         return self.least < self.folds + PROOF.nearly
 
 
-@dataclass(frozen=True, slots=True)
-class _Question:
-    finger: Finger
-    materials: Materials
-    receptor: Receptor
-    load: LoadState
-    by: int
-    target: float
-    scene: Scene = field(compare=False)
-    stop: Callable[[], bool] = field(compare=False)
-
-
-def of_friction(scene: Scene, load: LoadState, target: float, stop: Callable[[], bool] = lambda: False) -> Reach:
+def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
     """Return how far sliding at the depth and bound of `load` goes from mu = 0 towards `target`.
 
-    Raises NotConverged where not even the frictionless state is found, Cancelled where `stop` says so.
+    Raises NotConverged where not even the frictionless state is found, Cancelled.
     """
-    return _reach(_question(scene, load._replace(mu=0.0), BY_FRICTION, target, stop))
+    return _reach(_Search(scene.unloaded(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target))
 
 
-def of_depth(scene: Scene, load: LoadState, stop: Callable[[], bool] = lambda: False) -> Reach:
+def of_depth(scene: Scene, load: LoadState) -> Reach:
     """Return how far sliding at the friction of `load` goes from a small depth towards that of `load`.
 
-    Raises NotConverged where there is none even at a hundredth of it, Cancelled where `stop` says so.
+    Raises NotConverged where there is none even at a hundredth of it, Cancelled.
     """
-    return _reach(_question(scene, load, BY_DEPTH, load.depth, stop))
+    return _reach(_Search(scene.unloaded(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
 
 
 def sound(finger: FiniteFinger, state: EquilibriumState, least: float = PROOF.sound) -> bool:
@@ -101,97 +89,87 @@ def folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
     return finger.skin_compression(state).kink > BRANCH.crease or finger.crosses(state)
 
 
-def _question(scene: Scene, load: LoadState, by: int, target: float, stop: Callable[[], bool]) -> _Question:
-    return _Question(scene.finger, scene.materials, scene.receptor, load._replace(travel=0.0), by, target, scene, stop)
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """A branch of settled sliding, to be followed on meshes made for it."""
+
+    scene: Scene  # unloaded
+    load: LoadState  # of the branch, whose friction is 0 at first where that grows
+    by: int  # BY_FRICTION or BY_DEPTH: what grows
+    target: float  # of it
+
+    @property
+    def folds(self) -> float:
+        """The stretch at which the skin folds [-]."""
+        return folds_at(finite_laws(self.scene.materials)[EPIDERMIS])
+
+    def finger(self, fold: float | None = None) -> FiniteFinger:
+        """Return the finger on a rough mesh, or on one that is fine at the arc position of a `fold` [mm]."""
+        return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=MARGIN, fold=fold))
+
+    def followed(self, finger: FiniteFinger, start: EquilibriumState) -> Branch:
+        """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and the target is a step away."""
+        target = self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
+        branch = continue_branch(finger, start, self.by, target, self.folds)
+        if branch.limited or target == self.target:
+            return branch
+        load = branch.last.load._replace(mu=self.target)
+        last = settled(finger.newton, load, branch.last, BRANCH.tolerance)
+        return Branch((*branch.states, last), self.target, limited=False)
+
+    def followed_finely(
+        self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
+    ) -> tuple[FiniteFinger, Branch, float]:
+        """Follow the branch on a mesh that is fine where the last of `states` is squeezed most; return that place."""
+        place = _squeezed(finger, states[-1])
+        fine = self.finger(place)
+        return fine, self.followed(fine, self._begun(fine, finger, states)), place
+
+    def start(self, finger: FiniteFinger) -> EquilibriumState:
+        """Return the state at which the branch begins. Raises NotConverged."""
+        if self.by == BY_FRICTION:
+            return settled(finger.newton, self.load, None, BRANCH.tolerance)
+        for part in PROOF.starts:
+            with suppress(NotConverged):
+                load = self.load._replace(depth=part * self.target)
+                start = settled(finger.newton, load, None, BRANCH.tolerance)
+                if sound(finger, start):
+                    return start
+        raise NotConverged(
+            f"no sliding state was found at mu = {self.load.mu:.3g} even at {PROOF.starts[-1] * self.target:.3g} "
+            "mm: ask for less friction"
+        )
+
+    def _begun(self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]) -> EquilibriumState:
+        """Return the state on the `fine` mesh of the last of `states` that the rough mesh has as well as that."""
+        for state in reversed(states):
+            if rough.skin_compression(state).lowest < PROOF.smooth:
+                continue
+            with suppress(NotConverged):
+                start = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
+                if sound(fine, start) or state is states[0]:
+                    return start
+        return self.start(fine)
 
 
 @lru_cache(maxsize=32)
-def _reach(question: _Question) -> Reach:
+def _reach(search: _Search) -> Reach:
     """Answer, and keep what was answered: all meshes of a scene ask the same."""
-    folds = folds_at(finite_laws(question.materials)[EPIDERMIS])
-    sizing = Sizing(FINENESS, question.load.depth, margin=MARGIN)
-    rough = FiniteFinger.of(question.scene, sizing)
-    branch = _followed(rough, _start(rough, question), question, folds)
-    if not branch.limited and sound(rough, branch.last, PROOF.plain):
-        return _reach_of(rough, branch, folds)
-    fine, branch, place = _finely(rough, branch.states, question, folds)
-    if abs(_squeezed(fine, branch.last) - place) > PROOF.astray:
-        fine, branch, _ = _finely(fine, branch.states, question, folds)
-    return _reach_of(fine, branch, folds)
-
-
-def _finely(
-    finger: FiniteFinger, states: tuple[EquilibriumState, ...], question: _Question, folds: float
-) -> tuple[FiniteFinger, Branch, float]:
-    """Follow the branch on a mesh that is fine where the last of these `states` is squeezed most; return that place."""
-    place = _squeezed(finger, states[-1])
-    fine = FiniteFinger.of(question.scene, Sizing(FINENESS, question.load.depth, margin=MARGIN, fold=place))
-    return fine, _followed(fine, _begun(fine, finger, states, question), question, folds), place
-
-
-def _followed(finger: FiniteFinger, start: EquilibriumState, question: _Question, folds: float) -> Branch:
-    """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and what is asked for is a step away."""
-    target = question.target if question.by == BY_DEPTH else min(question.target, LARGEST_MU)
-    branch = continue_branch(finger, start, question.by, target, folds, question.stop)
-    if branch.limited or target == question.target:
-        return branch
-    last = settled(
-        finger.newton, branch.last.load._replace(mu=question.target), branch.last, BRANCH.tolerance, question.stop
-    )
-    return Branch((*branch.states, last), question.target, limited=False)
-
-
-def _reach_of(finger: FiniteFinger, branch: Branch, folds: float) -> Reach:
+    finger = search.finger()
+    branch = search.followed(finger, search.start(finger))
+    if branch.limited or not sound(finger, branch.last, PROOF.plain):
+        finger, branch, place = search.followed_finely(finger, branch.states)
+        if abs(_squeezed(finger, branch.last) - place) > PROOF.astray:
+            finger, branch, _ = search.followed_finely(finger, branch.states)
     least = finger.skin_compression(branch.last).least
-    return Reach(float(branch.value), branch.limited, branch.lost, least, folds, finger.numbers([branch.last])[0])
+    numbers = finger.numbers([branch.last])[0]
+    return Reach(float(branch.value), branch.limited, branch.lost, least, search.folds, numbers)
 
 
 def _squeezed(finger: FiniteFinger, state: EquilibriumState) -> float:
     """Return the arc position where the skin is squeezed most [mm]."""
     place = finger.skin_compression(state).place
     return float(finger.geometry.arcs[place : place + 2].mean())
-
-
-def _start(finger: FiniteFinger, question: _Question) -> EquilibriumState:
-    """Return the state at which the branch begins. Raises NotConverged."""
-    if question.by == BY_FRICTION:
-        return settled(finger.newton, question.load, None, BRANCH.tolerance, question.stop)
-    for part in PROOF.starts:
-        try:
-            start = settled(
-                finger.newton,
-                question.load._replace(depth=part * question.target),
-                None,
-                BRANCH.tolerance,
-                question.stop,
-            )
-        except NotConverged:
-            continue
-        if sound(finger, start):
-            return start
-    raise NotConverged(
-        f"no sliding state was found at mu = {question.load.mu:.3g} even at {PROOF.starts[-1] * question.target:.3g} "
-        "mm: ask for less friction"
-    )
-
-
-def _begun(
-    fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...], question: _Question
-) -> EquilibriumState:
-    """Return a state of the branch on the `fine` mesh from which to go on: the last that is as good on the rough one.
-
-    Raises NotConverged.
-    """
-    for state in reversed(states):
-        if rough.skin_compression(state).lowest < PROOF.smooth:
-            continue
-        try:
-            fine_state = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance, question.stop)
-        except NotConverged:
-            continue
-        if sound(fine, fine_state) or state is states[0]:
-            return fine_state
-    return _start(fine, question)
 
 
 APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]
@@ -202,24 +180,23 @@ def steady(
     load: LoadState,
     tolerance: float = 1e-10,
     start: EquilibriumState | None = None,
-    stop: Callable[[], bool] = lambda: False,
 ) -> EquilibriumState:
     """Return the settled sliding state under `load`, proven to lie on the branch that begins without friction.
 
     A state, sought from `start` first, whose skin is squeezed so far that it might have folded, or that is not found
     directly, is proven by following the branch on meshes made for it. Raises NoSteadyState with both
-    limits where the branch ends before, NotConverged where it cannot be begun, Cancelled where `stop` says so.
+    limits where the branch ends before, NotConverged where it cannot be begun, Cancelled.
     """
     candidates: list[EquilibriumState] = []
-    for state in _tried(finger.newton, load, tolerance, start, stop):
+    for state in _tried(finger.newton, load, tolerance, start):
         if sound(finger, state, PROOF.plain):
             return state
         candidates.append(state)
-    proof = _reach_towards(finger.scene, load, stop)
+    proof = _reach_towards(finger.scene, load)
     if proof.lost:
         raise _not_known(load, proof.value)
     if proof.limited:
-        raise _refused(finger.scene, load, proof, stop)
+        raise _refused(finger.scene, load, proof)
     for state in candidates:
         if _proven(finger, state, proof):
             return state
@@ -228,10 +205,10 @@ def steady(
             f"At {load.depth:.3g} mm of indentation there is settled sliding at mu = {load.mu:.3g}, nearly all of the "
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
-    begin = settled(finger.newton, load._replace(mu=0.0), None, tolerance, stop)
-    branch = follow(finger, begin, BY_FRICTION, load.mu, 0.0, stop)
+    begin = settled(finger.newton, load._replace(mu=0.0), None, tolerance)
+    branch = follow(finger, begin, BY_FRICTION, load.mu, 0.0)
     if not branch.limited:
-        state = settled(finger.newton, load, branch.last, tolerance, stop)
+        state = settled(finger.newton, load, branch.last, tolerance)
         if _proven(finger, state, proof):
             return state
     raise NotConverged(
@@ -240,13 +217,13 @@ def steady(
     )
 
 
-def stands(finger: FiniteFinger, state: EquilibriumState, stop: Callable[[], bool]) -> bool:
+def stands(finger: FiniteFinger, state: EquilibriumState) -> bool:
     """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
     if sound(finger, state, PROOF.plain):
         return True
     if not sound(finger, state):
         return False
-    proof = _reach_towards(finger.scene, state.load, stop)
+    proof = _reach_towards(finger.scene, state.load)
     return not proof.limited and _proven(finger, state, proof)
 
 
@@ -255,7 +232,7 @@ def steep(load: LoadState) -> bool:
     return load.mu > STEEP and load.tau < np.inf
 
 
-def refuse_far_beyond(scene: Scene, load: LoadState, stop: Callable[[], bool]) -> None:
+def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     """Raise NoSteadyState where the branch ends far below the friction of `load`.
 
     Asked where a rough mesh finds nothing, or skin that has folded: to see a fine mesh fail takes longer than to follow
@@ -265,13 +242,13 @@ def refuse_far_beyond(scene: Scene, load: LoadState, stop: Callable[[], bool]) -
     if load.mu > STEEP:
         return
     with suppress(NotConverged):
-        proof = _reach_towards(scene, load, stop)
+        proof = _reach_towards(scene, load)
         if proof.limited and not proof.lost and proof.value < PROOF.far * load.mu:
-            raise _refused(scene, load, proof, stop)
+            raise _refused(scene, load, proof)
 
 
 def _tried(
-    newton: Newton, load: LoadState, tolerance: float, start: EquilibriumState | None, stop: Callable[[], bool]
+    newton: Newton, load: LoadState, tolerance: float, start: EquilibriumState | None
 ) -> Iterator[EquilibriumState]:
     """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
 
@@ -279,21 +256,21 @@ def _tried(
     """
     ways: list[Callable[[], EquilibriumState]] = []
     if not steep(load):
-        ways.append(lambda: settled(newton, load, None, tolerance, stop))
+        ways.append(lambda: settled(newton, load, None, tolerance))
     if load.tau < np.inf:
-        ways.append(lambda: all_at_the_bound(newton, load, tolerance, stop))
+        ways.append(lambda: all_at_the_bound(newton, load, tolerance))
     if start is not None:
-        ways.insert(0, lambda: settled(newton, load, start, tolerance, stop))
+        ways.insert(0, lambda: settled(newton, load, start, tolerance))
     for way in ways:
         with suppress(NotConverged):
             yield way()
 
 
-def doubts(finger: FiniteFinger, state: EquilibriumState, stop: Callable[[], bool] = lambda: False) -> tuple[str, ...]:
+def doubts(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
     """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
     if state.load.sense == 0 or sound(finger, state, PROOF.plain):
         return ()
-    proof = of_friction(finger.scene, state.load, state.load.mu, stop)
+    proof = of_friction(finger.scene, state.load, state.load.mu)
     if not proof.near:
         return ()
     return (
@@ -303,23 +280,23 @@ def doubts(finger: FiniteFinger, state: EquilibriumState, stop: Callable[[], boo
     )
 
 
-def _reach_towards(scene: Scene, load: LoadState, stop: Callable[[], bool]) -> Reach:
+def _reach_towards(scene: Scene, load: LoadState) -> Reach:
     """Return how far the branch goes as friction grows, or as depth does where that alone leads to what `load` asks.
 
     Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is hardly known.
     """
-    proof = of_friction(scene, load, load.mu, stop)
+    proof = of_friction(scene, load, load.mu)
     if proof.limited:
         with suppress(NotConverged):
-            deepest = of_depth(scene, load, stop)
+            deepest = of_depth(scene, load)
             return proof if deepest.limited else deepest
     return proof
 
 
-def _refused(scene: Scene, load: LoadState, proof: Reach, stop: Callable[[], bool]) -> NoSteadyState | NotConverged:
+def _refused(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
     """Return why there is no state: with both limits, each only where no state lies a little beyond it."""
     largest, depth = proof.value, None
-    if not _none_at(scene, load._replace(mu=(1.0 + APART) * largest), load, stop):
+    if not _none_at(scene, load._replace(mu=(1.0 + APART) * largest), load):
         return _not_known(load, largest)
     ends = (
         "the skin behind the contact folds"
@@ -328,9 +305,9 @@ def _refused(scene: Scene, load: LoadState, proof: Reach, stop: Callable[[], boo
     )
     beyond = ""
     with suppress(NotConverged):
-        deepest = of_depth(scene, load, stop)
+        deepest = of_depth(scene, load)
         further = load._replace(depth=(1.0 + APART) * deepest.value)
-        if deepest.limited and not deepest.lost and _none_at(scene, further, load, stop):
+        if deepest.limited and not deepest.lost and _none_at(scene, further, load):
             depth = deepest.value
             beyond = f", and with this friction up to {depth:.4g} mm"
     return NoSteadyState(
@@ -348,7 +325,7 @@ def _not_known(load: LoadState, largest: float) -> NotConverged:
     )
 
 
-def _none_at(scene: Scene, further: LoadState, load: LoadState, stop: Callable[[], bool]) -> bool:
+def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
     """Return whether `further`, a little beyond a limit, has no state by the path that did not find the limit.
 
     A limit of depth is looked at along friction, one of friction along depth. Beyond `load` nothing is looked at: it is
@@ -357,7 +334,7 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState, stop: Callable[[
     if further.depth >= load.depth and further.mu >= load.mu:
         return True
     shallower = further.depth < load.depth
-    proof = of_friction(scene, further, load.mu, stop) if shallower else of_depth(scene, further, stop)
+    proof = of_friction(scene, further, load.mu) if shallower else of_depth(scene, further)
     return proof.limited and not proof.lost
 
 
@@ -368,12 +345,12 @@ def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool
     return bool(np.all(np.abs(finger.numbers([state])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
 
 
-def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float, stop: Callable[[], bool]) -> EquilibriumState:
+def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
     """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
 
     A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.
     Raises NotConverged.
     """
-    bare = settled(newton, load._replace(mu=0.0), None, tolerance, stop)
+    bare = settled(newton, load._replace(mu=0.0), None, tolerance)
     state = np.where(bare.touching, SHEAR_LIMITED, OPEN).astype(bare.state.dtype)
-    return settled(newton, load, replace(bare, state=state, load=load._replace(tau=0.0)), tolerance, stop)
+    return settled(newton, load, replace(bare, state=state, load=load._replace(tau=0.0)), tolerance)

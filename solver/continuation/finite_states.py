@@ -1,6 +1,6 @@
 """Settled states and courses of a scene at finite strain, on one mesh: driven by depth, or under given forces."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -42,7 +42,6 @@ FORCE_SEARCH = ForceSearch()
 def settled(
     finger: FiniteFinger,
     scene: Scene,
-    stop: Callable[[], bool],
     start: EquilibriumState | None = None,
     times: float = 1.0,
 ) -> EquilibriumState:
@@ -52,19 +51,14 @@ def settled(
     NoSteadyState, NotConverged, Cancelled.
     """
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
-        return march(scene, finger, times, stop=stop).last
+        return march(scene, finger, times).last
     if scene.normal_force is not None:
-        return _settled_under(finger, scene, scene.normal_force, stop, start, times)
-    return steady(finger, sliding_load(scene), start=start, stop=stop)
+        return _settled_under(finger, scene, scene.normal_force, start, times)
+    return steady(finger, sliding_load(scene), start=start)
 
 
-def nearby(
-    finger: FiniteFinger, scene: Scene, start: EquilibriumState, stop: Callable[[], bool] = lambda: False
-) -> EquilibriumState | None:
-    """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near.
-
-    Raises Cancelled where `stop` says so.
-    """
+def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
+    """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near."""
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
@@ -73,14 +67,12 @@ def nearby(
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
             state = balanced(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.few)
             state = newton.settle(state, state.load, limit=FORCE_SEARCH.few)
-        return state if stands(finger, state, stop) else None
+        return state if stands(finger, state) else None
     except NotConverged:
         return None
 
 
-def roughly(
-    finger: FiniteFinger, scene: Scene, stop: Callable[[], bool], near: EquilibriumState | None = None
-) -> EquilibriumState:
+def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
     """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`.
 
     It is sought first from `near`, the settled state of a surface that slides the same way.
@@ -89,11 +81,11 @@ def roughly(
         alike = near.load.sense == -(scene.loading.direction or 1)
         near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
-        return settled(finger, scene, stop, near)
+        return settled(finger, scene, near)
     load = sliding_load(scene)
     for begin in dict.fromkeys((near, None)):
         try:
-            return sliding.settled(finger.newton, load, begin, FORCE_SEARCH.leading, stop)
+            return sliding.settled(finger.newton, load, begin, FORCE_SEARCH.leading)
         except NotConverged:
             if begin is None:
                 raise
@@ -104,21 +96,20 @@ def _settled_under(
     finger: FiniteFinger,
     scene: Scene,
     force: float,
-    stop: Callable[[], bool],
     start: EquilibriumState | None,
     times: float,
 ) -> EquilibriumState:
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
 
     def hold() -> EquilibriumState:
-        return march(scene, finger, times, stop=stop).last
+        return march(scene, finger, times).last
 
     if start is not None and start.load.sense == 0:  # the end of a course, and no slide to start from
         start = None
         with suppress(NotConverged):
             return hold()
     try:
-        return slide_or_hold(scene, lambda: _sliding_under(finger, scene, force, stop, start), hold)
+        return slide_or_hold(scene, lambda: _sliding_under(finger, scene, force, start), hold)
     except NoSteadyState as failure:
         raise failure if scene.loading.dragged else _under_force(scene, force, failure) from failure
 
@@ -138,7 +129,7 @@ def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteady
 
 
 def _sliding_under(
-    finger: FiniteFinger, scene: Scene, force: float, stop: Callable[[], bool], start: EquilibriumState | None
+    finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None
 ) -> EquilibriumState:
     """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
     newton = finger.newton
@@ -147,38 +138,38 @@ def _sliding_under(
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
-            state = _at_force(newton, near, force, stop) if capped else balanced(newton, near, ForceLoad(force, None))
-            return steady(finger, state.load, start=state, stop=stop)
+            state = _at_force(newton, near, force) if capped else balanced(newton, near, ForceLoad(force, None))
+            return steady(finger, state.load, start=state)
     if capped:
         with suppress(NotConverged):
-            *_, bare = _grown(newton, load._replace(mu=0.0), force, stop)
-            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading, stop)
-            state = _at_force(newton, begin, force, stop)
-            return steady(finger, state.load, start=state, stop=stop)
+            *_, bare = _grown(newton, load._replace(mu=0.0), force)
+            begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
+            state = _at_force(newton, begin, force)
+            return steady(finger, state.load, start=state)
     last: EquilibriumState | None = None
     try:
-        for reached in _grown(newton, load, force, stop):
+        for reached in _grown(newton, load, force):
             last = reached
     except NotConverged:
         if last is None:
             raise
-        return _deeper(finger, last, force, stop)
+        return _deeper(finger, last, force)
     assert last is not None
-    return steady(finger, last.load, start=last, stop=stop)
+    return steady(finger, last.load, start=last)
 
 
-def _grown(newton: Newton, load: LoadState, force: float, stop: Callable[[], bool]) -> Iterator[EquilibriumState]:
+def _grown(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
     """Yield slides with the friction of `load` as the normal force grows to `force`. Raises NotConverged."""
     begin = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, load.mu, load.tau, load.sense))
     grows = [ForceLoad(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
-    return load_stepping.march(newton, grows, begin, stop=stop)
+    return load_stepping.march(newton, grows, begin)
 
 
-def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
+def _at_force(newton: Newton, start: EquilibriumState, force: float) -> EquilibriumState:
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
-        state = sliding.settled(newton, state.load._replace(depth=depth), state, stop=stop)
+        state = sliding.settled(newton, state.load._replace(depth=depth), state)
         if abs(state.force[1] / force - 1.0) < FORCE_MET:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
@@ -192,22 +183,20 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float, stop: Calla
     raise NotConverged(f"No depth was found at which the finger presses with {force:.4g} N/mm: give a depth instead.")
 
 
-def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float, stop: Callable[[], bool]) -> EquilibriumState:
+def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
     """Return settled sliding under `force` [N/mm] deeper than `state`, from where it did not grow on.
 
     How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
     deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
     """
-    proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth), stop)
+    proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        state = _risen_to(finger, state, proof, force, stop)
-    state = _at_force(finger.newton, state, force, stop)
-    return steady(finger, state.load, start=state, stop=stop)
+        state = _risen_to(finger, state, proof, force)
+    state = _at_force(finger.newton, state, force)
+    return steady(finger, state.load, start=state)
 
 
-def _risen_to(
-    finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float, stop: Callable[[], bool]
-) -> EquilibriumState:
+def _risen_to(finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float) -> EquilibriumState:
     """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
 
     Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
@@ -217,7 +206,7 @@ def _risen_to(
     while most < force:
         report_progress("trying whether the finger slides deeper than it was followed to", most / force)
         try:
-            state = steady(finger, state.load._replace(depth=(1.0 + APART) * depth), start=state, stop=stop)
+            state = steady(finger, state.load._replace(depth=(1.0 + APART) * depth), start=state)
         except NoSteadyState as failure:
             raise NoSteadyState("There is none so deep.", limit_indentation=depth, limit_normal_force=most) from failure
         depth, most = state.load.depth, float(state.force[1])
@@ -229,7 +218,6 @@ def steady_body(
     load: LoadState,
     skin: Law,
     start: EquilibriumState | None = None,
-    stop: Callable[[], bool] = lambda: False,
 ) -> EquilibriumState:
     """Return the settled sliding state under `load`, followed on this mesh from the one without friction.
 
@@ -240,14 +228,14 @@ def steady_body(
     """
     newton = Newton(whole.condensed)
     body = _OwnBody(whole, newton)
-    bare = sliding.settled(newton, load._replace(mu=0.0), start, stop=stop)
-    branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin), stop)
+    bare = sliding.settled(newton, load._replace(mu=0.0), start)
+    branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.limited and (branch.lost or body.spoilt(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
-    state = sliding.settled(newton, load, branch.last, stop=stop)
+    state = sliding.settled(newton, load, branch.last)
     if jumped_branch(body, branch.last, state):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return state

@@ -11,7 +11,7 @@ from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
-from solver.scene.tables import Friction, Loading, SceneError, Solve
+from solver.scene.tables import Friction, SceneError
 from solver.tolerances import SHALLOW
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
@@ -29,7 +29,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = _finger(_bare(scenes[0], deepest))
+    finger = _finger(scenes[0].unloaded(deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in pressed)
 
@@ -41,7 +41,7 @@ def expected_depth(scene: Scene) -> float:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        finger = _finger(_bare(scene, deepest))
+        finger = _finger(scene.unloaded(deepest))
     except (SceneError, NotConverged):  # who makes the meshes that count will tell
         return deepest
     state = _pressed(finger, scene, force, deepest)
@@ -81,12 +81,6 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
         f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
         "ask for less."
     )
-
-
-def _bare(scene: Scene, deepest: float) -> Scene:
-    """Return the scene without all that its mesh does not depend on."""
-    bare = replace(scene, title="", friction=Friction(0.0), loading=Loading(deepest))
-    return replace(bare, solve=Solve(scene.solve.kinematics))
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,5 @@
 """The settled sliding state directly: every touching point slips, so nothing is left of how it came there."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -37,12 +36,11 @@ def settled(
     load: LoadState,
     start: EquilibriumState | None = None,
     tolerance: float = 1e-10,
-    stop: Callable[[], bool] = lambda: False,
 ) -> EquilibriumState:
     """Return the sliding state under `load` (sense +1 or -1), from undeformed or from `start`, in one step.
 
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
-    Cancelled where `stop` says so, ValueError for a load state that is none.
+    Cancelled, ValueError for a load state that is none.
     """
     load = load.checked()
     if newton.condensed.constant:
@@ -65,7 +63,7 @@ def settled(
         )
 
     control = StepControl(smallest=1.0 if begin == load else CONTROL.smallest)
-    advance(step, refusal, control, stop, exhausted=lambda: newton.systems > most)
+    advance(step, refusal, control, exhausted=lambda: newton.systems > most)
     return state
 
 

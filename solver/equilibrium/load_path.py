@@ -13,7 +13,7 @@ import numpy as np
 from solver._kernels.compiling import OPEN, STICK
 from solver.body.receptor import Patches
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
-from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of, never
+from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of
 from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, SolveFailure, beyond_friction, followed_to
@@ -105,13 +105,12 @@ class Way:
         friction: LoadState,
         loading: Loading,
         tolerance: float = SMALL.tolerance,
-        stop: Callable[[], bool] = never,
     ) -> None:
         """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found.
 
         Displacements are found to a `tolerance` [mm] where depth and travel are given.
         """
-        self.newton, self._tolerance, self._stop = newton, tolerance, stop
+        self.newton, self._tolerance = newton, tolerance
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
         # without friction there is no drag to speak of, and nothing that it could hold
@@ -139,7 +138,7 @@ class Way:
             self.instants.append(Instant(there.time, self.solve_step(self.last, there)))
             self.aim = there
 
-        advance(step, self._refusal, CONTROL, self._stop)
+        advance(step, self._refusal, CONTROL)
 
     def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
         return followed_to(self.last.load.depth, self.last.load.travel, reason)
@@ -162,10 +161,9 @@ class RelaxingWay(Way):
         friction: LoadState,
         loading: Loading,
         tolerance: float = SMALL.tolerance,
-        stop: Callable[[], bool] = never,
     ) -> None:
         """Start at rest, as `Way`."""
-        super().__init__(newton, friction, loading, tolerance, stop)
+        super().__init__(newton, friction, loading, tolerance)
         self.tissue = tissue
         self.energies: list[tuple[float, ...]] = []
         self.sense = 0  # of the friction force on all that touches, whatever comes to touch; 0: it is found
@@ -185,28 +183,25 @@ def march(
     times: float = 1.0,
     *,
     relaxing: bool = False,
-    stop: Callable[[], bool] = never,
     report: Report = report_progress,
 ) -> Way:
     """Drive the finger of a scene down and along, step by step (backward Euler), until every slide has settled.
 
     So many `times` the usual steps are taken. With `relaxing` the tissues relax, and are waited for at last; else they
     have relaxed from the start. A given drag must be less than what friction carries. Raises NotConverged where a step
-    cannot be made or sliding does not settle, Cancelled where `stop` or `report` says so.
+    cannot be made or sliding does not settle, Cancelled.
     """
     steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
-    way = way_of(scene, finger, relaxing=relaxing, stop=stop)
+    way = way_of(scene, finger, relaxing=relaxing)
     follow(way, finger, loading, steps, times, report)
     if isinstance(way, RelaxingWay):
         _wait(way, loading, scene.materials.longest_creep, times, report)
     return way
 
 
-def end(
-    scene: Scene, finger: Finger[Patches], times: float = 1.0, stop: Callable[[], bool] = never
-) -> EquilibriumState:
+def end(scene: Scene, finger: Finger[Patches], times: float = 1.0) -> EquilibriumState:
     """Return the end of the course of a scene, in so many `times` the usual load steps. Raises as `march`."""
-    return march(scene, finger, times, relaxing=scene.viscoelastic, stop=stop).last
+    return march(scene, finger, times, relaxing=scene.viscoelastic).last
 
 
 def slide_or_hold(
@@ -237,15 +232,15 @@ def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
     return SMALL if isinstance(finger, LinearFinger) else RELAXING if relaxing else FINITE
 
 
-def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False, stop: Callable[[], bool] = never) -> Way:
+def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> Way:
     """Return the untouched finger of a scene, at the beginning of its course."""
     steps, loading = steps_of(finger, relaxing=relaxing), scene.loading_per_mm
     good = steps.tolerance
     if loading.normal_force is None:
         good = min(good, steps.by_depth * loading.depth)
     if not relaxing:
-        return Way(finger.newton, load_of(scene), loading, good, stop)
-    return RelaxingWay(tissue_of(scene, finger), finger.newton, load_of(scene), loading, good, stop)
+        return Way(finger.newton, load_of(scene), loading, good)
+    return RelaxingWay(tissue_of(scene, finger), finger.newton, load_of(scene), loading, good)
 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:

@@ -18,7 +18,7 @@ from solver.body.finite import FiniteBody
 from solver.body.validation import check_loads
 from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.failures import ContactLost, NotConverged, followed_to
-from solver.progress import Cancelled, report_progress
+from solver.progress import check_stop, report_progress
 from solver.scene.scene import Scene
 from solver.tolerances import UNMET
 
@@ -37,28 +37,21 @@ Refusal = Callable[[float, float, NotConverged], NotConverged]
 WHOLE = StepControl()
 
 
-def never() -> bool:
-    """Return False: nothing asks the work to stop."""
-    return False
-
-
 def advance(
     step: Step,
     refusal: Refusal,
     control: StepControl = WHOLE,
-    stop: Callable[[], bool] = never,
-    exhausted: Callable[[], bool] = never,
+    exhausted: Callable[[], bool] = lambda: False,
 ) -> None:
     """Call `step` with growing fractions of the path up to 1, each the last that succeeded plus a step.
 
     `step` raises NotConverged where it fails, and leaves the state as it was. Where the next is too
     short, or the work is `exhausted`, this raises what `refusal` makes of the fraction reached, that step and the
-    reason. Raises Cancelled where `stop` says so.
+    reason. Raises Cancelled.
     """
     done, part = 0.0, control.first
     while done < 1.0:
-        if stop():
-            raise Cancelled
+        check_stop()
         aim = min(done + part, 1.0)
         try:
             step(aim)
@@ -111,12 +104,11 @@ def march(
     course: Iterable[LoadState | ForceLoad],
     start: EquilibriumState | None = None,
     tolerance: float = 1e-7,
-    stop: Callable[[], bool] = never,
 ) -> Iterator[EquilibriumState]:
     """Yield the equilibrium at each aim of `course`, from undeformed or `start`; a failing step is cut in two.
 
     An aim is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
-    it was or slips from there. Raises NotConverged, saying where, Cancelled where `stop` says so, and ValueError for a
+    it was or slips from there. Raises NotConverged, saying where, Cancelled, and ValueError for a
     load state or forces that are none.
     """
     state = EquilibriumState.undeformed(newton.condensed) if start is None else start
@@ -133,7 +125,7 @@ def march(
             else:
                 state = newton.settle(state, between(begin.load, aim, part), tolerance)
 
-        advance(step, lambda _done, _part, why: followed_to(state.load.depth, state.load.travel, why), stop=stop)
+        advance(step, lambda _done, _part, why: followed_to(state.load.depth, state.load.travel, why))
         yield state
 
 

@@ -28,7 +28,7 @@ from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
-from solver.progress import Cancelled, Progress, report_part, report_progress
+from solver.progress import Progress, check_stop, interruptible, report_part, report_progress
 from solver.response.answer import Solved, prediction
 from solver.scene.scene import Scene
 
@@ -241,22 +241,18 @@ class FiniteMeshing(Meshing):
     def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
         done: dict[int, Answer] = {}
-
-        def stop() -> bool:
-            return self.progress is not None and not self.progress(len(done) / len(scenes))
-
-        for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
-            if stop():
-                raise Cancelled
-            begun, scene = perf_counter(), scenes[number]
-            report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
-            meshes = self._meshes.setdefault(scene.pressed, Meshes())
-            meshes.keep(fineness)
-            try:
-                low = coarse_solution(scene, self.depth, fineness, stop, meshes)
-                done[number] = _predicted(scene, refine(scene, fineness, low, stop, meshes), stop, meshes, begun)
-            except SolveFailure as failure:
-                done[number] = failure
+        with interruptible(self.progress, lambda: len(done) / len(scenes)):
+            for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
+                check_stop()
+                begun, scene = perf_counter(), scenes[number]
+                report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
+                meshes = self._meshes.setdefault(scene.pressed, Meshes())
+                meshes.keep(fineness)
+                try:
+                    low = coarse_solution(scene, self.depth, fineness, meshes)
+                    done[number] = _predicted(scene, refine(scene, fineness, low, meshes), meshes, begun)
+                except SolveFailure as failure:
+                    done[number] = failure
         return [done[number] for number in range(len(scenes))]
 
 
@@ -265,18 +261,16 @@ def alike(scene: Scene) -> tuple[Pressed, float]:
     return scene.pressed, float(scene.friction.mu)
 
 
-def _predicted(
-    scene: Scene, nested: NestedSolution, stop: Callable[[], bool], meshes: Meshes, begun: float
-) -> Prediction:
+def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: float) -> Prediction:
     """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
     top, steps = nested.top, nested.steps
     finger, state, way = top.finger, top.state, None
     setup = nested.coarse.setup_s + top.setup_s
     if scene.solve.course == "history":
-        times = steps_of_press(scene, nested.coarse.finger, stop) if steps is None else steps.times
+        times = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.times
         for leg in scene.earlier_slides():  # one that never settles is refused with its limits
-            settled(finger, leg, stop)
-        way = march(scene, finger, times, relaxing=scene.materials.relax, stop=stop)
+            settled(finger, leg)
+        way = march(scene, finger, times, relaxing=scene.materials.relax)
         state = way.last
     if not state.touching.any():
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
@@ -288,10 +282,10 @@ def _predicted(
     numbers = finger.all_numbers([state])[0]
     before_estimate = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    finer, steps = on_nested(scene, top, steps, stop, meshes)
+    finer, steps = on_nested(scene, top, steps, meshes)
     row = finger.row.average(state.u)
     took = perf_counter() - before_estimate
-    warnings, wall = doubts(finger, state, stop), before_estimate - begun - setup
+    warnings, wall = doubts(finger, state), before_estimate - begun - setup
     solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
     return prediction(solved, finger, numbers, row, finer, took)
 

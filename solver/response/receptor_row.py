@@ -20,7 +20,7 @@ from solver.continuation.small_states import WIDE, direct, nearest
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
-from solver.equilibrium.load_stepping import forces_of, never
+from solver.equilibrium.load_stepping import forces_of
 from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
@@ -89,8 +89,8 @@ def _nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], Equili
     if scene.solve.kinematics == "small":
         finger = LinearFinger.of(scene, sizing)
         return finger, nearest(scene, finger), LinearFinger.on(scene, prediction.geometry)
-    low = coarse_solution(scene, expected_depth(scene), sizing.fineness, never, meshes)
-    top = solution_on(scene, sizing, low, never, meshes)
+    low = coarse_solution(scene, expected_depth(scene), sizing.fineness, meshes)
+    top = solution_on(scene, sizing, low, meshes)
     return top.finger, top.state, low.finger
 
 
@@ -136,7 +136,7 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
 def _rough_state(finger: Finger[Any], scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
     """Return the settled slide, at finite strain sought from `near`. Raises SolveFailure, also where it is unsound."""
     if isinstance(finger, FiniteFinger):
-        state = roughly(finger, scene, never, near)
+        state = roughly(finger, scene, near)
         good = sound(finger, state)
     else:
         assert isinstance(finger, LinearFinger)

@@ -13,7 +13,7 @@ from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
-from solver.progress import Progress, report_progress
+from solver.progress import Progress, interruptible, report_progress
 from solver.response.answers import MESHINGS, Answer, Meshing, Watch
 from solver.scene.scene import Scene
 
@@ -92,7 +92,8 @@ def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
     if not isinstance(prediction, Prediction) or prediction.scene.solve.evidence == "quick":
         return prediction
     report_progress("estimating what the model leaves out")
-    prediction = with_viscosity(prediction, lambda: progress is not None and not progress(1.0))
+    with interruptible(progress, lambda: 1.0):
+        prediction = with_viscosity(prediction)
     prediction = _with_earlier_slides(prediction, lambda scenes: _answers(scenes, progress))
     if prediction.scene.solve.evidence == "estimated":
         return prediction

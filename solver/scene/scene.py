@@ -106,6 +106,11 @@ class Scene:
         forces = {"normal_force": self.normal_force, "tangential_force": self.tangential_force}
         return replace(self.loading, **forces, force_unit="N/mm")
 
+    def unloaded(self, depth: float) -> "Scene":
+        """Return the same finger pressed to a `depth` [mm] without friction: meshes depend on nothing more."""
+        bare = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
+        return replace(bare, solve=Solve(self.solve.kinematics))
+
     def undragged(self) -> "Scene":
         """Return the scene that slides on, where a drag was asked for."""
         return replace(self, loading=replace(self.loading, tangential_force=None))

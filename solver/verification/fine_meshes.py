@@ -12,7 +12,6 @@ from solver.continuation.small_states import WIDE, settled
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end
-from solver.equilibrium.load_stepping import never
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.scene.scene import Scene
@@ -67,13 +66,13 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) ->
 def _finite(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) -> Iterator[Array]:
     meshes, depth = Meshes(), max(expected_depth(scene) for scene in scenes)
     for scene in scenes:
-        low = coarse_solution(scene, depth, COARSE, never, meshes)
+        low = coarse_solution(scene, depth, COARSE, meshes)
         sizing = replace(low.sizing, fineness=fineness, shift=shift)
         if scene.viscoelastic and depends_on_way(scene):
             finger = meshes.finger(scene, replace(sizing, margin=WIDER))
             yield np.abs(finger.numbers([end(scene, finger, times)])[0])
             continue
-        top = solution_on(scene, sizing, low, never, meshes, times)
+        top = solution_on(scene, sizing, low, meshes, times)
         if top.state.reaches_end:
-            top = solution_on(scene, replace(sizing, margin=WIDER), low, never, meshes, times)
+            top = solution_on(scene, replace(sizing, margin=WIDER), low, meshes, times)
         yield np.abs(top.finger.numbers([top.state])[0])

@@ -15,7 +15,7 @@ from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
-from solver.equilibrium.load_stepping import never, sliding_load
+from solver.equilibrium.load_stepping import sliding_load
 from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
@@ -96,7 +96,7 @@ class FiniteMeshed(Meshed[FiniteFinger]):
         """Do as `Meshed` says."""
         if before is None:
             with suppress(SolveFailure):  # a steep slide may fold the skin of a coarse mesh alone
-                before = self.finger.transfer(roughly(self._coarse, scene, never), self._coarse)
+                before = self.finger.transfer(roughly(self._coarse, scene), self._coarse)
         return steady(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:

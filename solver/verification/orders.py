@@ -111,7 +111,7 @@ def finite_finger(quick: bool) -> Iterator[Order]:
 
     def sed(fineness: float, shift: bool) -> float:
         finger = FiniteFinger.of(case, Sizing(fineness, case.loading.depth, shift, margin=3.0))
-        return finger.sed_ending(finite_settled(finger, case, lambda: False).u)
+        return finger.sed_ending(finite_settled(finger, case).u)
 
     finenesses = (3.0, 4.0, 5.0) if quick else (3.0, 4.0, 5.0, 7.0)
     yield _finger(case.title, "finite", sed, 10.0 if quick else 15.0, finenesses, 1.3)

@@ -7,7 +7,6 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.continuation.existence import steady
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import never
 from solver.equilibrium.newton import LoadState
 from tests.solver.finite_examples import published
 
@@ -20,7 +19,7 @@ SLOW = pytest.mark.slow
 def refined(scene, depth, fineness):
     """Return the state of a scene on a mesh of `fineness`, begun on a coarse one."""
     meshes = Meshes()
-    return refine(scene, fineness, coarse_solution(scene, depth, fineness, never, meshes), never, meshes).top
+    return refine(scene, fineness, coarse_solution(scene, depth, fineness, meshes), meshes).top
 
 
 @pytest.mark.parametrize(

@@ -111,13 +111,10 @@ def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves
 def test_a_surface_begun_at_anothers_state_ends_where_one_begun_at_the_undeformed_finger_does():
     one, other = finite(SLIPPERINESS[0]), finite(SLIPPERINESS[1])
     alone, after_one = Meshes(), Meshes()
-    coarse_solution(one, 1.5, 4.0, lambda: False, after_one)
-    lows = [coarse_solution(other, 1.5, 4.0, lambda: False, meshes) for meshes in (after_one, alone)]
+    coarse_solution(one, 1.5, 4.0, after_one)
+    lows = [coarse_solution(other, 1.5, 4.0, meshes) for meshes in (after_one, alone)]
     assert lows[0].state.iterations < lows[1].state.iterations
-    tops = [
-        refine(other, 6.0, low, lambda: False, meshes).top.state
-        for low, meshes in zip(lows, (after_one, alone), strict=True)
-    ]
+    tops = [refine(other, 6.0, low, meshes).top.state for low, meshes in zip(lows, (after_one, alone), strict=True)]
     np.testing.assert_allclose(tops[0].u, tops[1].u, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(tops[0].reaction, tops[1].reaction, rtol=0.0, atol=1e-11)
 

@@ -284,12 +284,12 @@ def test_a_largest_depth_that_has_a_slide_beyond_it_is_no_limit_under_a_force(mo
     given = Scene(friction=Friction(0.3), loading=Loading(normal_force=0.1), solve=Solve("finite", tolerance=COARSE))
     whole, followed, grown = solve(given), reach.of_depth, load_stepping.march
 
-    def ends_too_early(scene, load, stop=lambda: False):
+    def ends_too_early(scene, load):
         depth = whole.indentation / 1.5
-        return replace(followed(scene, load._replace(depth=depth), stop), value=depth, limited=True, lost=False)
+        return replace(followed(scene, load._replace(depth=depth)), value=depth, limited=True, lost=False)
 
-    def lost_on_its_way(newton, course, start, stop):
-        yield from grown(newton, course[:3], start, stop=stop)
+    def lost_on_its_way(newton, course, start):
+        yield from grown(newton, course[:3], start)
         raise NotConverged("lost")
 
     monkeypatch.setattr(reach, "of_depth", ends_too_early)

@@ -135,7 +135,7 @@ def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monk
     load = LoadState(2.0, 0.6, np.inf, TOWARDS_TIP)
     ends = reach.Reach(0.373, limited=True, lost=False, least=0.55, folds=0.54, numbers=np.ones(3))
 
-    def by_depth(_scene, asked, _stop):
+    def by_depth(_scene, asked):
         return replace(ends, value=1.5, limited=asked.mu == load.mu)  # with a little less friction 2 mm are reached
 
     monkeypatch.setattr(existence, "_tried", lambda *_: iter(()))
