@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from solver.failures import ContactLost, NoSteadyState, NotConverged, SolveFailure
 from solver.progress import Cancelled
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import (
     Finger,
     Friction,

@@ -16,7 +16,7 @@ from solver._kernels import multifrontal
 from solver._kernels.arguments import Factors, SymbolicFactorization
 from solver._kernels.compiling import bind_arguments
 from solver.arrays import Array, Indices, Narrow
-from solver.mesh.mesh import Mesh, distinct
+from solver.mesh import Mesh, distinct
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solver.arrays import Array
-from solver.mesh.mesh import Mesh
+from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import NAMES, QUANTITIES, SED
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 FORCES_AND_PLACES = 7  # numbers with an estimate beside the quantities: `all_numbers` begins with them
 COUNT = FORCES_AND_PLACES + len(NAMES)

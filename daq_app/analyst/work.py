@@ -28,7 +28,7 @@ from sessions.report.predictions import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DecisionError, append, read
 from solver import Cancelled, Prediction, Scene, SceneError
-from solver.mesh.mesh import Mesh
+from solver.mesh import Mesh
 from solver.response.fields import Sketch
 
 if TYPE_CHECKING:

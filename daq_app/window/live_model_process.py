@@ -27,7 +27,7 @@ def run(connection: Connection) -> None:
     # Loaded in the process alone: the window has no need of the solver, and opens sooner without it.
     from daq_app.window.live_follower import Follower
     from solver import SceneError
-    from solver.mesh.mesh import MeshError
+    from solver.mesh import MeshError
 
     follower: Follower | None = None
     speaking = threading.Lock()

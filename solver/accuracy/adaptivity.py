@@ -6,14 +6,14 @@ from time import perf_counter
 from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import nearby, roughly, settled
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
-from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import NestedNumbers
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 COARSE = (
     4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again

@@ -9,10 +9,10 @@ from solver._kernels.contact_system import bounded_length
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import FrictionLaw
+from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger
-from solver.equilibrium.newton import EquilibriumState, Newton
 from solver.failures import MIXED, NoSteadyState, NotConverged
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 MISSED = 1e-5  # of forces that are given, by which a state may miss them
 UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]

@@ -23,12 +23,12 @@ import numpy as np
 from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
 from solver.body.receptor import Patches
+from solver.equilibrium import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import end
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction, Response, percent
 from solver.quantities import NAMES
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
 FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node
@@ -321,7 +321,7 @@ def estimated(
 ) -> Estimated:
     """Return the `numbers` (n,) of a state and how far each may be off.
 
-    `nested` is the same state on the halved mesh (`solver.mesh.mesh`), `forces` the forces it is under, if any. Where
+    `nested` is the same state on the halved mesh (`solver.mesh`), `forces` the forces it is under, if any. Where
     the state is the end of a load path on which skin sticks, `fewer` are its ends on the same mesh after `PARTS` of
     the load steps. Errors are infinite where contact with a moved edge has no equilibrium.
     """

@@ -15,11 +15,11 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.receptor import Patches
 from solver.constitutive.hyperelastic import HUMAN_SKIN
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
-from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NoSteadyState, SolveFailure
 from solver.prediction import Prediction, percent
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Material, Materials, Solve
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]

@@ -23,7 +23,7 @@ from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Relaxation
 
 ROUGH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes

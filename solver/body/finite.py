@@ -14,9 +14,8 @@ from solver._kernels.compiling import HELD_X, HELD_Y, bind_arguments
 from solver.arrays import Array, Indices, Narrow
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive.hyperelastic import Law, log1p, shape, slopes
-from solver.element import Q2P1
 from solver.linalg import Elimination, symbolic_factorization
-from solver.mesh.mesh import Mesh
+from solver.mesh import Q2P1, Mesh
 from solver.tolerances import IMAGINARY
 
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)

@@ -17,10 +17,9 @@ from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import Array, Indices, Narrow
 from solver.body.stiffness import Elastic, Probes, condensed_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
-from solver.constitutive.linear import Elasticity
-from solver.element import GAUSS_4, Q2P1, line
+from solver.constitutive import Elasticity
 from solver.linalg import factors_of, symbolic_factorization
-from solver.mesh.mesh import Mesh
+from solver.mesh import GAUSS_4, Q2P1, Mesh, line
 from solver.tolerances import UNHELD
 
 _ALONE = Lock()  # held while the memory of `_memory` is in use

@@ -12,8 +12,7 @@ from solver.arrays import Array, Indices, Narrow
 from solver.body.finite import FiniteBody
 from solver.body.stiffness import Centred, Elastic, Probes
 from solver.constitutive.hyperelastic import log1p
-from solver.element import GAUSS_3
-from solver.mesh.mesh import Mesh, distinct
+from solver.mesh import GAUSS_3, Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import QUANTITIES, LocalState
 from solver.scene.tables import Receptor

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from solver._kernels import hooke
 from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.arrays import Array, Indices
+from solver.constitutive import Elasticity
 from solver.constitutive.hyperelastic import PLAIN
-from solver.constitutive.linear import Elasticity
-from solver.element import Q2P1
-from solver.mesh.mesh import Mesh
+from solver.mesh import Q2P1, Mesh
 from solver.quantities import SED, LocalState
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)

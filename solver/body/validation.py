@@ -6,10 +6,9 @@ from math import isfinite
 import numpy as np
 
 from solver.arrays import Array
+from solver.constitutive import Elasticity, Prony
 from solver.constitutive.hyperelastic import Law
-from solver.constitutive.linear import Elasticity, Prony
-from solver.element import Q2P1
-from solver.mesh.mesh import Mesh, jacobians
+from solver.mesh import Q2P1, Mesh, jacobians
 from solver.scene.tables import STIFFENING
 from solver.tolerances import CUT
 

@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol, cast
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.linear import Elasticity, Isotropic
+from solver.constitutive import Elasticity, Isotropic
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.linear import kept
+from solver.constitutive import kept
 
 
 def unstrained(F: Array) -> Array:

@@ -1,1 +1,328 @@
-"""Branches of settled slides, followed to the limit where they end."""
+"""A branch of settled sliding states, followed by its arc length to where it ends.
+
+Pressed hard and dragged against its tip, the skin behind the contact folds: the friction coefficient (or the depth)
+passes a maximum along the branch, or the skin is squeezed at one place until its surface loses stability; beyond, there
+is no settled state. Riks 1979, Int. J. Solids Struct. 15, 529; Crisfield 1981, Comput. Struct. 13, 55, with the plane
+of Riks.
+
+A squeezed half-space wrinkles at once at all wavelengths (Biot 1963, Appl. Sci. Res. A 12, 168): of wrinkles
+exp(i k X) the impedance of the surface, tractions by displacements, has a determinant of zero. There the equations of a
+free surface lose their meaning, and finer meshes end ever nearer to it. The theory of small motions on a large strain
+is that of Dowaikh and Ogden (1990, IMA J. Appl. Math. 44, 261), here with any law and plane strain.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.arrays import Array
+from solver.constitutive.hyperelastic import Law, stress, tangent
+from solver.contact import SkinCompression
+from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
+from solver.failures import NotConverged
+from solver.progress import check_stop, report_progress
+
+LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
+
+
+@dataclass(frozen=True, slots=True)
+class BranchControl:
+    """How a branch is followed, and what counts as its end; steps by what is looked through."""
+
+    tolerance: float = 1e-6  # of a point on the branch [mm]
+    first: float = 0.1  # step along the branch
+    shortest: float = 1e-3
+    growth: float = 1.5  # of the step after a point that was easily found
+    easy: int = 5  # iterations of such a point, at most
+    corrections: int = 12  # of a point
+    most: int = 400  # points
+    turn: float = 0.7  # least cosine between the directions of the branch and of a step along it
+    squeeze: float = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a fold has less
+    crease: float = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
+    steep: float = 0.1  # part of the value in the branch's direction, from which a limit point is far
+    hops: int = 3  # tries to go on where a branch ends
+    hop: tuple[float, ...] = (0.01, 0.03)  # by how much of its value
+    force_change: float = 0.05  # of forces then, at most
+    apart: float = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+
+
+BRANCH = BranchControl()
+
+
+class Followed(Protocol):
+    """What a branch is followed on: the finger, or a body handed in."""
+
+    @property
+    def newton(self) -> Newton:
+        """The iterations on its body."""
+        ...
+
+    def skin_compression(self, state: EquilibriumState) -> SkinCompression:
+        """Return how far the skin is squeezed, and whether it has a crease."""
+        ...
+
+    def crosses(self, state: EquilibriumState) -> bool:
+        """Return whether the skin crosses itself."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Branch:
+    """A branch of settled sliding states."""
+
+    states: tuple[
+        EquilibriumState, ...
+    ]  # on the way, that at the value asked for or the last one before the limit being last
+    value: float  # of the coefficient or the depth [mm] at its end: the largest one met
+    limited: bool  # whether the branch ends there, short of what was asked for
+    lost: bool = False  # whether it ends there for want of a next point only, far from a limit point and from a fold
+
+    @property
+    def last(self) -> EquilibriumState:
+        """The last state."""
+        return self.states[-1]
+
+
+def continue_branch(
+    finger: Followed,
+    start: EquilibriumState,
+    by: int,
+    target: float,
+    folds: float,
+) -> Branch:
+    """Do as `follow`, and go on where the branch only turns back for a moment."""
+    branch = follow(finger, start, by, target, folds)
+    for _ in range(BRANCH.hops):
+        beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
+        if beyond is None:
+            break
+        more = follow(finger, beyond, by, target, folds)
+        branch = Branch((*branch.states, *more.states), more.value, more.limited, more.lost)
+    return branch
+
+
+def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
+    """Return a state of the branch a little beyond its end, None where it ends there indeed.
+
+    Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
+    """
+    last = branch.last
+    compression = finger.skin_compression(last)
+    if compression.least < folds + BRANCH.apart:
+        return None
+    for part in BRANCH.hop:
+        value = min((1.0 + part) * branch.value, target)
+        try:
+            there = finger.newton.settle(last, with_value(last.load, by, value), BRANCH.tolerance)
+        except NotConverged:
+            continue
+        near = abs(there.force - last.force).max() <= BRANCH.force_change * abs(last.force).max()
+        if (
+            near
+            and finger.skin_compression(there).least > compression.least - BRANCH.apart
+            and not jumped_branch(finger, last, there)
+        ):
+            return there
+    return None
+
+
+def follow(
+    finger: Followed,
+    start: EquilibriumState,
+    by: int,
+    target: float,
+    folds: float,
+) -> Branch:
+    """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
+
+    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
+    (`folding.folds_at`). Raises Cancelled.
+    """
+    way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
+    if way[0].value >= target * (1.0 - 1e-12):
+        return Branch((start,), way[0].value, limited=False)
+    best = 0  # of them, by value
+    reach = min(abs(target - way[0].value), LARGEST_MU)
+    length = BRANCH.first * reach
+    direction, rate = _tangent(finger.newton, start, by)
+    doing = f"following sliding to its {'largest friction' if by == BY_FRICTION else 'largest depth'}"
+    for _ in range(BRANCH.most):
+        check_stop()
+        report_progress(doing, abs(way[best].value - way[0].value) / reach)
+        step = _further(finger, way[-1], by, direction, rate, length, target, BRANCH.shortest * reach)
+        if step is None:
+            lost = rate > BRANCH.steep and way[-1].compression.least > folds + BRANCH.apart
+            return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True, lost=lost)
+        point, length = step
+        if point.compression.least < folds:
+            last = way[-1]
+            part = min(
+                max((last.compression.least - folds) / (last.compression.least - point.compression.least), 0.0), 1.0
+            )
+            value = max(way[best].value, last.value + part * (point.value - last.value))
+            return Branch(tuple(point.state for point in way[: best + 1]), value, limited=True)
+        easy = point.state.iterations - way[-1].state.iterations <= BRANCH.easy
+        way.append(point)
+        if point.value > way[best].value:
+            best = len(way) - 1
+        if point.value >= target * (1.0 - 1e-12):
+            return Branch(tuple(point.state for point in way), point.value, limited=False)
+        length *= BRANCH.growth if easy else 1.0
+        before = direction, rate
+        direction, rate = _tangent(finger.newton, point.state, by)
+        if direction @ before[0] + rate * before[1] < 0.0:
+            direction, rate = -direction, -rate
+        if rate <= 0.0:
+            break
+    return Branch(tuple(point.state for point in way[: best + 1]), way[best].value, limited=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Point:
+    state: EquilibriumState
+    compression: SkinCompression
+    value: float
+
+
+def _further(
+    finger: Followed,
+    last: _Point,
+    by: int,
+    direction: Array,
+    rate: float,
+    length: float,
+    target: float,
+    shortest: float,
+) -> tuple[_Point, float] | None:
+    """Return the next point of the branch and how long the step was that led to it; None where no step does."""
+    while length >= shortest:
+        state = _next(finger.newton, last.state, by, direction, rate, length, target)
+        if state is not None:
+            compression = finger.skin_compression(state)
+            if compression.least >= last.compression.least - BRANCH.apart and not jumped_branch(
+                finger, last.state, state
+            ):
+                return _Point(state, compression, value_of(state.load, by)), length
+        length /= 2.0
+    return None
+
+
+def value_of(load: LoadState, by: int) -> float:
+    """Return the coefficient of friction or the depth [mm]."""
+    return load.mu if by == BY_FRICTION else load.depth
+
+
+def with_value(load: LoadState, by: int, value: float) -> LoadState:
+    """Return `load` with another coefficient of friction or depth [mm]."""
+    return load._replace(mu=value) if by == BY_FRICTION else load._replace(depth=value)
+
+
+def jumped_branch(finger: Followed, before: EquilibriumState, after: EquilibriumState) -> bool:
+    """Return whether a step went to another branch, where the skin is folded."""
+    one, other = finger.skin_compression(before), finger.skin_compression(after)
+    return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
+
+
+def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, float]:
+    """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
+    newton.linearise(state, state.load, newton.skin_x)
+    direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
+    size = np.sqrt(direction @ direction + 1.0)
+    return direction / size, 1.0 / size
+
+
+def _next(
+    newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float, target: float
+) -> EquilibriumState | None:
+    """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
+    root = np.sqrt(len(newton.steps))
+    value = value_of(start.load, by)
+    to_target = rate * length >= target - value
+    state, load = start, start.load
+    gone = np.zeros(len(newton.steps))
+    for _ in range(BRANCH.corrections):
+        if not newton.linearise(state, load, newton.skin_x):
+            return None
+        to, along = newton.steps[:, EQUILIBRIUM] / root, newton.steps[:, by] / root
+        now = value_of(load, by)
+        if to_target:
+            change = target - now
+        else:
+            ahead = direction @ along + rate
+            if ahead == 0.0:
+                return None
+            change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
+        step = to + change * along
+        load = with_value(load, by, now + change)
+        state, largest, changed = newton.moved(state, load, step * root, newton.skin_x)
+        gone = gone + step
+        if not largest < 10.0:
+            return None
+        if largest < BRANCH.tolerance and not changed:
+            way = np.sqrt(gone @ gone + (value_of(load, by) - value) ** 2)
+            straight = direction @ gone + rate * (value_of(load, by) - value)
+            return state if straight > BRANCH.turn * way else None
+    return None
+
+
+Waves = NDArray[np.complex128]
+STEP = 0.01  # of the stretch, between two looks
+LEAST = 0.05  # stretch down to which they are taken
+HALVINGS = 40
+
+
+@lru_cache(maxsize=16)
+def folds_at(law: Law) -> float:
+    """Return the stretch along a free surface at which it loses stability in plane strain; LEAST where it never does.
+
+    Biot's root for neo-Hookean tissue that keeps its volume, 0.5437:
+
+    >>> from solver.constitutive.hyperelastic import NeoHooke
+    >>> round(folds_at(NeoHooke(1.0, 0.4999999)), 4)
+    0.5437
+    """
+    high = 1.0 - 5.0 * STEP
+    while high > LEAST and _stable(law, high - STEP):
+        high -= STEP
+    if high <= LEAST:
+        return LEAST
+    low = high - STEP
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if _stable(law, middle) else (middle, high)
+    return high
+
+
+def _stable(law: Law, stretch: float) -> bool:
+    """Return whether the surface's impedance is positive at this stretch along it, its other side being free."""
+    across = 1.0 / stretch
+    for _ in range(50):
+        F = np.diag([stretch, across])
+        step = float(stress(law, F)[1, 1] / tangent(law, F)[1, 1, 1, 1])
+        across -= step
+        if abs(step) < 1e-14 * across:
+            break
+    moduli = tangent(law, np.diag([stretch, across]))
+    impedance = _impedance(moduli[:, 0, :, 0], moduli[:, 0, :, 1], moduli[:, 1, :, 1])
+    return impedance is not None and float(np.linalg.det(impedance).real) > 0.0
+
+
+def _impedance(along: Array, mixed: Array, across: Array) -> Waves | None:
+    """Return the impedance (2, 2) of waves exp(i (X + p Y)) that decay with depth; None where two do not.
+
+    `along`, `mixed`, `across` (2, 2) are the moduli dP_aA/dF_bB with A, B = X, X; X, Y; Y, Y.
+    """
+    inverse = np.linalg.inv(across)
+    system = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ along, -inverse @ (mixed + mixed.T)]])
+    eigen = np.linalg.eig(system.astype(np.complex128))
+    p: Waves = np.asarray(eigen[0], np.complex128)
+    waves: Waves = np.asarray(eigen[1], np.complex128)
+    decay = p.imag > 0.0
+    if decay.sum() != 2:
+        return None
+    shapes = waves[:2, decay]
+    tractions = mixed.T @ shapes + across @ shapes * p[decay]
+    return -1j * tractions @ np.linalg.inv(shapes)

@@ -15,13 +15,13 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED
 from solver._kernels.contact_system import STEEP
 from solver.arrays import Array
-from solver.continuation.arc_length import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
+from solver.continuation import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.tolerances import SHALLOW
 
 FINENESS = 7.0  # of both meshes, but where the skin folds

@@ -10,17 +10,16 @@ from solver._kernels import skin as skin_loops
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import Law
 from solver.contact import SkinCompression
-from solver.continuation.arc_length import LARGEST_MU, continue_branch, folds_at, jumped_branch
+from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import balanced, sliding_load
-from solver.equilibrium.newton import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton
 from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.tolerances import FORCE_MET
 
 

@@ -1,1 +1,367 @@
-"""Equilibria: Newton, load stepping, full slip, force control and relaxation."""
+"""One load step of a body at finite strain: Newton, contact states and displacements updated together.
+
+Unknown are the displacements; the states of the skin's nodes (open, stick, slip, slip at the bound) change with every
+iteration (primal-dual active set: Alart and Curnier 1991; Hüeber and Wohlmuth 2005). Nothing is left of a penalty. The
+pressure in the geometric stiffness is the linearised prediction of the iteration before (mixed integration points:
+Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver._kernels import active_set
+from solver._kernels.active_set import DEPTH_GIVEN, DRAG_GIVEN, PUSH_GIVEN, SINGULAR, UNSETTLED
+from solver._kernels.arguments import (
+    CondensedArrays,
+    ContactStates,
+    ContactSystem,
+    ForceControl,
+    LoadArguments,
+    Skin,
+    SkinPosition,
+)
+from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
+from solver.arrays import Array
+from solver.body import CondensedBody
+from solver.body.validation import finite
+from solver.contact import FrictionLaw
+from solver.failures import ContactLost, NotConverged
+
+States = NDArray[np.int32]
+EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.steps
+
+
+@dataclass(frozen=True, slots=True)
+class NewtonControl:
+    """When the iterations halve a step, keep a tangent and give up.
+
+    Measured on eighteen slides, pushes and courses of a finger at finite strain: to halve or double any of these
+    changes no state by more than 6e-10 and the number of tangents by 3 % at most. With no tangent kept there are 5 %
+    more.
+    """
+
+    shortest: float = 1.0 / 16.0  # part of a step below which a body that turns inside out is given up
+    stride: float = 0.3  # largest change of depth or travel in one iteration where forces are given [mm]
+    rounds: int = 12  # of changes of contact states within one linear system: dense, of the skin alone, and so cheap
+    near: float = 0.1  # step below which the tangent of the state before is tried again [mm]
+    fast: float = 0.02  # fall of the steps' size, below which a new tangent is kept
+    slow: float = 0.5  # the same, above which a kept one is given up
+    turned: float = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
+    patience: int = 20  # systems, and four for each node, after which contact states of a linear body are given up
+    margin: float = 0.5  # part of the tolerance that the step still missing, as judged, may take
+    same: float = 1e-3  # relative difference of steps that are the same
+    again: int = 4  # so many in a row are a circle
+    unbounded: float = 1e3  # displacement that no body bears [mm]
+
+
+CONTROL = NewtonControl()
+
+
+class LoadState(NamedTuple):
+    """What the surface does: how far it has risen, how far it has moved, and its friction."""
+
+    depth: float  # of the bone's travel towards the surface [mm]
+    mu: float  # [-]
+    tau: float = np.inf  # traction bound [MPa]
+    sense: int = (
+        0  # +1, -1: the settled sliding state whose friction force on the skin points there; 0: sticks or slips
+    )
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    @property
+    def frictionless(self) -> bool:
+        """Whether no tangential force is possible."""
+        return self.mu == 0.0 or self.tau == 0.0
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether a state depends on the way to it: friction on each node then opposes how that node moved last."""
+        return self.sense == 0 and not self.frictionless
+
+    def checked(self) -> "LoadState":
+        """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
+        law = FrictionLaw(float(self.mu), float(self.tau))
+        if self.sense not in (-1, 0, 1):
+            raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
+        depth, travel = finite("depth", self.depth), finite("travel", self.travel)
+        return LoadState(depth, law.mu, law.tau_max, int(self.sense), travel)
+
+
+UNLOADED = LoadState(0.0, 0.0)
+
+
+class ForceLoad(NamedTuple):
+    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
+
+    normal: float  # [N/mm]
+    tangential: float | None  # [N/mm]; None: `travel` is given instead
+    travel: float = 0.0  # of the surface along +x relative to the bone [mm]
+
+    def checked(self) -> "ForceLoad":
+        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
+        drag = None if self.tangential is None else finite("tangential", self.tangential)
+        return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
+
+    def towards(self, other: "ForceLoad", part: float) -> "ForceLoad":
+        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
+        tangential = other.tangential
+        if tangential is not None:
+            begun = 0.0 if self.tangential is None else self.tangential
+            tangential = begun + part * (tangential - begun)
+        normal = self.normal + part * (other.normal - self.normal)
+        return ForceLoad(normal, tangential, self.travel + part * (other.travel - self.travel))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EquilibriumState:
+    """A state of the body; never changed once made. k nodes of skin, e elements."""
+
+    u: Array  # (nodes, 2) displacements relative to the bone [mm]
+    pressure: Array  # (e, 3) modes of the pressure as the next tangent sees them
+    state: States  # (k,)
+    sense: States  # (k,) direction of the friction force on the skin where it slips
+    reaction: Array  # (k, 2) forces of the surface on the skin [N/mm]
+    load: LoadState
+    iterations: int  # linear systems solved on the way here, from undeformed
+
+    @staticmethod
+    def undeformed(body: CondensedBody, load: LoadState = UNLOADED) -> "EquilibriumState":
+        """Return the body before anything touches it, under a surface with the friction of `load`."""
+        u, pressure = body.undeformed()
+        zero = np.zeros(len(body.held), np.int32)
+        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.checked(), 0)
+
+    def place(self, body: CondensedBody) -> Array:
+        """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
+        return body.place(self.u)
+
+    @property
+    def touching(self) -> NDArray[np.bool_]:
+        """Which nodes touch, (k,)."""
+        return self.state != OPEN
+
+    @property
+    def reaches_end(self) -> bool:
+        """Whether contact reaches an end of the skin that may touch, beyond which nothing is looked at."""
+        return bool(self.touching[[0, -1]].any())
+
+    @property
+    def sticking(self) -> float:
+        """Part of the touching nodes that stick [-]."""
+        return float(np.sum(self.state == STICK) / max(int(self.touching.sum()), 1))
+
+    @property
+    def normal(self) -> Array:
+        """Push of the surface on each node along +y, (k,) [N/mm]."""
+        return self.reaction[:, 1]
+
+    @property
+    def tangential(self) -> Array:
+        """Pull of the surface on each node along +x, (k,) [N/mm]."""
+        return self.reaction[:, 0]
+
+    @property
+    def force(self) -> Array:
+        """Force of the surface on the body along x and y (2,) [N/mm]."""
+        return self.reaction.sum(axis=0)
+
+
+class Newton:
+    """The iterations on one body, with the memory they need."""
+
+    def __init__(self, condensed: CondensedBody) -> None:
+        """Set memory aside for the skin of a body."""
+        skin = len(condensed.held)
+        self.condensed = condensed
+        self.systems = 0  # tangents assembled, or tried
+        unknowns = 2 * skin + 3
+        self.system = ContactSystem(
+            np.zeros(skin), np.zeros(unknowns, np.int32), np.zeros(unknowns**2), np.zeros((unknowns, 4)),
+            np.zeros((2 * skin, 4)), np.zeros(2),
+        )  # fmt: skip
+        self.steps = self.system.steps  # (2 k, 4) of the skin, as the loops fill them
+        self.bulk = condensed.bulk
+        self.skin = Skin(condensed.held, condensed.middle, condensed.fixed_length)
+        self._rest = condensed.undeformed()[0]
+        self.skin_x = condensed.place(self._rest)[:, 0].copy()
+        zero = np.zeros(skin, np.int32)
+        self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
+        self._active_set = bind_arguments(active_set.solve_active_set, self.system)
+        self._meet = bind_arguments(active_set.meet, self.skin, self.system.length)
+
+    def linearise(
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, forces: ForceLoad | None = None
+    ) -> bool:
+        """Set up the system at `state` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
+
+        `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
+        times until none contradicts the linearised body. Where there are `forces`, the first step meets them too.
+        """
+        self.systems += 1
+        if not self.condensed.linearise(state.u, state.pressure):
+            return False
+        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
+
+    def relinearise(
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
+    ) -> bool:
+        """Do the same with the forces at `state`, but the tangent and its factors that are there already."""
+        if not self.condensed.relinearise(state.u):
+            return False
+        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
+
+    def solve_contact(
+        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
+    ) -> int:
+        """Solve the contact of the linearised body at `state`; return what `solve_active_set` does."""
+        body = self.condensed
+        self._states.state[:], self._states.sense[:] = state.state, state.sense
+        kind, drag, push = DEPTH_GIVEN, 0.0, 0.0
+        if forces is not None:
+            kind = PUSH_GIVEN if forces.tangential is None else DRAG_GIVEN
+            drag, push = forces.tangential or 0.0, forces.normal
+        return self._active_set(
+            self.arrays(), self.skin, self._states, load_arguments(load), self._position(state.u, load, anchor),
+            ForceControl(kind, float(drag), float(push), np.inf if body.constant else CONTROL.stride), rounds,
+        )  # fmt: skip
+
+    def arrays(self) -> CondensedArrays:
+        """Return the linearised body as loops take it."""
+        body = self.condensed
+        return CondensedArrays(body.stiffness, body.force, body.compliance, body.motions)
+
+    def _position(self, u: Array, load: LoadState, anchor: Array) -> SkinPosition:
+        """Return where the skin lies for displacements `u`, relative to the surface."""
+        place = self.condensed.place(u)
+        return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
+
+    def follows(self, steps: Array) -> Array:
+        """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
+        return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
+
+    def moved(
+        self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
+    ) -> tuple[EquilibriumState, float, int]:
+        """Return the state after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
+        body, skin = self.condensed, np.ascontiguousarray(skin)
+        reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
+        u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
+        states = ContactStates(self._states.state.copy(), self._states.sense.copy(), reaction)
+        changed = self._meet(states, self._position(u, load, anchor), load_arguments(load))
+        return EquilibriumState(u, pressure, *states, load, state.iterations + 1), largest, changed
+
+    def settle(
+        self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
+    ) -> EquilibriumState:
+        """Return the equilibrium under `load`, from `start`, its displacements good to `tolerance` [mm].
+
+        Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
+        the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
+        `limit` iterations do not do it or the body would turn inside out.
+        """
+        x = start.place(self.condensed)[:, 0].copy()  # as loops are compiled for
+        anchor = x + (load.travel - start.load.travel)
+        begin = self._entered(start, load, x)
+        if self.condensed.constant:
+            if self.condensed.motions.shape[1]:
+                begin = lowered(self.condensed, replace(begin, load=load))
+            return self.solved(begin, load, anchor)
+        return self._iterated(begin, load, anchor, tolerance, limit)
+
+    def _iterated(
+        self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
+    ) -> EquilibriumState:
+        """Do as `settle` from `start`, whose states are those that `load` brings at once, `anchor` (k,) being known."""
+        state = before = start
+        kept = self.condensed.equilibrium is start.u
+        scale, last, new, alike = 1.0, 0.0, False, 0
+        for _ in range(limit):
+            if kept:
+                if not self.relinearise(state, load, anchor, CONTROL.rounds):
+                    kept = False
+                    continue
+                before = state
+            elif not self.linearise(state, load, anchor, CONTROL.rounds):
+                scale /= 2.0  # the last step went too far
+                if (
+                    state is before
+                    or scale < CONTROL.shortest
+                    or not self.linearise(before, load, anchor, CONTROL.rounds)
+                ):
+                    raise NotConverged("the body would turn inside out")
+                state = before
+            elif state is not before:
+                before, scale = state, min(1.0, 2.0 * scale)
+            state, largest, changed = self.moved(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+            if not largest < CONTROL.unbounded:
+                raise NotConverged("the displacements grow without bound")
+            fall = min(largest / last, 1.0) if last > 0.0 else 1.0
+            alike = alike + 1 if changed and abs(largest - last) <= CONTROL.same * last else 0
+            if alike == CONTROL.again:
+                raise NotConverged("states of contact come again and again")
+            left = min((2.0 * fall) ** 2 if not kept else 4.0 * fall if new else 2.0 * fall, 1.0)
+            if largest * left < CONTROL.margin * tolerance and not changed and scale == 1.0:
+                self.condensed.equilibrium = state.u
+                return state
+            new = not kept
+            still = largest < CONTROL.near if last == 0.0 else fall < CONTROL.slow
+            # A step along a tangent that has turned changes volume to second order, and a stiff body answers strongly.
+            kept = (still if kept else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turned
+            last = largest
+        raise NotConverged(f"no equilibrium within {limit} iterations")
+
+    def solved(
+        self,
+        state: EquilibriumState,
+        load: LoadState,
+        anchor: Array,
+        forces: ForceLoad | None = None,
+        rounds: int | None = None,
+    ) -> EquilibriumState:
+        """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `state`.
+
+        Under `forces` depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
+        """
+        self.systems += 1
+        self.condensed.relinearise(self._rest)  # from which all is one step
+        rounds = CONTROL.patience + 4 * len(self.skin_x) if rounds is None else rounds
+        used = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
+        if used == SINGULAR:
+            raise ContactLost("the touching points have no unique forces")
+        if used == UNSETTLED:
+            raise ContactLost(f"the states of the touching points still contradicted each other after {rounds} systems")
+        u = self.steps[:, EQUILIBRIUM].reshape(-1, 2).copy()
+        deeper, along = self.system.motion.tolist()
+        load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
+        iterations = state.iterations + used
+        contact = self._states
+        return EquilibriumState(
+            u, state.pressure, contact.state.copy(), contact.sense.copy(), contact.reaction.copy(), load, iterations
+        )
+
+    def _entered(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
+        """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `load` brings at once."""
+        states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
+        self._meet(states, self._position(start.u, load, x), load_arguments(load))
+        return replace(start, state=states.state, sense=states.sense)
+
+
+def lowered(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:
+    """Return the state with its lowest node on the surface where nothing touches: forces need one that does.
+
+    A body that nothing holds needs as many nodes as it has motions.
+    """
+    if start.touching.any():
+        return start
+    state, count = start.state.copy(), max(body.motions.shape[1], 1)
+    lowest = np.argsort(start.place(body)[:, 1], kind="stable")[:count]
+    state[lowest] = SLIP if start.load.frictionless else STICK
+    return replace(start, state=state)
+
+
+def load_arguments(load: LoadState) -> LoadArguments:
+    """Return `load` as loops take it."""
+    return LoadArguments(float(load.depth), float(load.mu), float(load.tau), int(load.sense))

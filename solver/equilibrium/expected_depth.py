@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.full_slip import slide_under
 from solver.equilibrium.load_stepping import sliding_load
-from solver.equilibrium.newton import EquilibriumState
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Friction, SceneError
 from solver.tolerances import SHALLOW
 

@@ -18,21 +18,20 @@ from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import SLIP, STICK
 from solver._kernels.contact_system import tributary
 from solver.arrays import Array, Flags, Indices
-from solver.body.condensed import Body
+from solver.body import Body
 from solver.body.finite import VALUES, FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.receptor import Endings, FinitePatches, LinearPatches, Patches, endings, middle
 from solver.body.stiffness import Centred
+from solver.constitutive import Moduli, Prony
 from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
-from solver.constitutive.linear import Moduli, Prony
 from solver.contact import SkinCompression, width
-from solver.element import Q2P1
-from solver.equilibrium.newton import EquilibriumState, Newton
+from solver.equilibrium import EquilibriumState, Newton
 from solver.failures import MIXED, NotConverged
-from solver.mesh.mesh import MeshError, distinct, with_middles
+from solver.mesh import Q2P1, MeshError, distinct, with_middles
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Material, Materials, SceneError
 from solver.tolerances import NO_ENERGY
 

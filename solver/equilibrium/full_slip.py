@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.load_stepping import StepControl, advance
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.failures import ContactLost, NotConverged
 from solver.progress import report_progress
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, STICK
 from solver.body.receptor import Patches
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, SolveFailure, beyond_friction, followed_to
 from solver.progress import report_progress
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Loading
 from solver.tolerances import ALL_SLIPS, SED_STILL
 

@@ -16,10 +16,10 @@ from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.body.validation import check_loads
-from solver.equilibrium.newton import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lowered
+from solver.equilibrium import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.failures import ContactLost, NotConverged, followed_to
 from solver.progress import check_stop, report_progress
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.tolerances import UNMET
 
 

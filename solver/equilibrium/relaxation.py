@@ -27,11 +27,10 @@ from solver.body.linear import CondensedLinear, LinearBody
 from solver.body.receptor import Endings, FinitePatches, patch_means
 from solver.body.stiffness import Elastic, Probes
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
-from solver.constitutive import overstress
-from solver.constitutive.linear import Moduli, Prony, kept
+from solver.constitutive import Moduli, Prony, kept, overstress
 from solver.constitutive.overstress import Past
-from solver.equilibrium.newton import EquilibriumState, Newton
-from solver.mesh.mesh import Mesh
+from solver.equilibrium import EquilibriumState, Newton
+from solver.mesh import Mesh
 
 KEPT = 4  # lengths of steps that a body is kept ready for, factors and all
 

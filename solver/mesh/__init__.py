@@ -1,1 +1,274 @@
-"""Meshes of the finger: outline, grid, elements along the skin and across the tissues."""
+"""Elements and meshes: nodes, nine-node quadrilaterals, regions, the skin that may touch and what is driven.
+
+Any mesh can be halved: every element is divided in four by its own quadratic geometry, the finer mesh nested in it.
+"""
+
+from dataclasses import dataclass, field, fields
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solver.arrays import Array, Flags, Indices
+
+# Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
+GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
+_FAR, _NEAR = (3.0 / 7.0 + 2.0 / 7.0 * 1.2**0.5) ** 0.5, (3.0 / 7.0 - 2.0 / 7.0 * 1.2**0.5) ** 0.5
+GAUSS_4 = np.array([-_FAR, -_NEAR, _NEAR, _FAR]), 0.5 + np.array([-1.0, 1.0, 1.0, -1.0]) * 30.0**0.5 / 36.0
+_ACROSS = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])  # position of each node among -1, 0, +1 along xi
+_UP = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])  # and along eta
+
+
+def line(s: Array) -> tuple[Array, Array]:
+    """Return the three quadratic shape functions of a line at `s` (...), and their slopes, each (..., 3).
+
+    >>> line(np.array(0.5))
+    (array([-0.125,  0.75 ,  0.375]), array([ 0., -1.,  1.]))
+    """
+    values = np.stack([s * (s - 1.0) / 2.0, 1.0 - s * s, s * (s + 1.0) / 2.0], axis=-1)
+    slopes = np.stack([s - 0.5, -2.0 * s, s + 0.5], axis=-1)
+    return values, slopes
+
+
+class Q2P1:
+    """The nine-node quadrilateral: biquadratic displacements, and a pressure linear in x and y inside each element.
+
+    The pressure is discontinuous between elements, so that it is condensed in the element. Stable and of optimal order
+    up to the incompressible limit (Boffi and Gastaldi 2002, Computing 69, 1-10, with the pressure in true coordinates).
+    """
+
+    name = "Q2/P-1"
+    order = 2  # of the displacements
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    positions = np.stack([_ACROSS - 1.0, _UP - 1.0], axis=-1)  # (9, 2) of the nodes
+    points = np.stack([np.tile(GAUSS_3[0], 3), np.repeat(GAUSS_3[0], 3)], axis=-1)  # (9, 2) quadrature
+    weights = np.tile(GAUSS_3[1], 3) * np.repeat(GAUSS_3[1], 3)  # (9,)
+
+    @staticmethod
+    def shape(at: Array) -> tuple[Array, Array]:
+        """Return the shape functions (..., 9) at local points (..., 2), and their gradients (..., 9, 2).
+
+        >>> values, gradients = Q2P1.shape(np.array([1.0, 1.0]))
+        >>> values
+        array([0., 0., 1., 0., 0., 0., 0., 0., 0.])
+        """
+        (nx, dx), (ny, dy) = line(at[..., 0]), line(at[..., 1])
+        across, up = nx[..., _ACROSS], ny[..., _UP]
+        gradients = np.stack([dx[..., _ACROSS] * up, across * dy[..., _UP]], axis=-1)
+        return across * up, gradients
+
+
+Numbers = TypeVar("Numbers", bound=np.generic)
+_NONE: Indices = np.empty(0, np.int64)
+
+
+def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
+    """Return the different numbers among these, in order.
+
+    >>> distinct(np.array([3, 1, 3]))
+    array([1, 3])
+    """
+    # for a few numbers several times as fast as np.unique, which imports masked arrays
+    ordered = np.sort(numbers, axis=None)
+    new = np.ones(len(ordered), bool)
+    new[1:] = ordered[1:] != ordered[:-1]
+    return ordered[new]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mesh:
+    """A body as arrays, read-only. Nodes of an element: corners, then mid-sides, then centre.
+
+    Corners run counter-clockwise, mid-side k lies between corners k and k+1:
+
+        3 - 6 - 2
+        7   8   5
+        0 - 4 - 1
+    """
+
+    nodes: Array  # (n, 2) undeformed positions [mm]
+    elements: Indices  # (e, 9)
+    region: Indices  # (e,) number of the material of each element
+    skin: Indices  # (2 k + 1,) nodes that may touch, along k edges: end, middle, end, middle, ... end
+    held: Indices  # (h,) nodes that are driven as a whole, in both directions
+    held_x: Indices = field(default_factory=lambda: _NONE)  # nodes that are driven along x alone, and roll along y
+    held_y: Indices = field(default_factory=lambda: _NONE)  # the same along y: rollers, and planes of symmetry
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only, and lengths and whole numbers those that loops take; others are left as they are.
+
+        Those others are refused where a body is made of them (`solver.body.validation`).
+        """
+        for f in fields(self):
+            array = np.asarray(getattr(self, f.name))
+            kinds, taken = ("fiu", np.float64) if f.name == "nodes" else ("iu", np.int64)
+            if array.dtype.kind in kinds or not array.size:
+                array = np.ascontiguousarray(array, taken)
+            view = array.view()
+            view.flags.writeable = False
+            object.__setattr__(self, f.name, view)
+
+    @property
+    def fixed(self) -> Indices:
+        """Return the numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
+        along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
+        return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
+
+    @property
+    def driven(self) -> Flags:
+        """Return which components of which nodes are held, (n, 2)."""
+        out = np.zeros(2 * len(self.nodes), bool)
+        out[self.fixed] = True
+        return out.reshape(-1, 2)
+
+
+# offsets along the grid's two directions of an element's nodes, for grids whose first direction turns to the second
+# clockwise (as from proximal to distal, then outwards to the skin)
+_ALONG = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])
+_OUT = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])
+
+
+class MeshError(ValueError):
+    """A mesh that cannot carry a solution: an element is folded or far too thin."""
+
+
+def grid_mesh(points: Array, layers: Indices, skin: slice, held: Indices) -> Mesh:
+    """Return the mesh of `points` (2 a + 1, 2 b + 1, 2), whose second direction ends on the skin.
+
+    `layers` (b,) is the region of each layer of elements, `skin` the range of points along the first direction that
+    may touch (from an even one to an even one), `held` node numbers. Node (i, j) has number i (2 b + 1) + j.
+    """
+    long, wide = points.shape[0], points.shape[1]
+    number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
+    first = number[: long - 1 : 2, : wide - 1 : 2].ravel()  # lowest node of each element
+    elements = first[:, None] + _ALONG * wide + _OUT
+    region = np.tile(layers, (long - 1) // 2)
+    mesh = Mesh(points.reshape(-1, 2), elements, region, number[skin, -1].copy(), held)
+    quality(mesh)
+    return mesh
+
+
+def quality(mesh: Mesh) -> dict[str, float]:
+    """Return the least ratio of smallest to largest Jacobian in an element, and the largest aspect of an element.
+
+    Raises MeshError where an element is folded (its Jacobian is not positive at every corner and quadrature point).
+    """
+    jacobian, det = jacobians(mesh, np.concatenate([Q2P1.points, Q2P1.corners]))
+    sides = np.linalg.norm(jacobian, axis=-2)  # lengths of the two tangents
+    aspect = np.maximum(sides[..., 0] / sides[..., 1], sides[..., 1] / sides[..., 0])
+    return {"jacobian_ratio": float((det.min(axis=1) / det.max(axis=1)).min()), "aspect": float(aspect.max())}
+
+
+def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
+    """Return the Jacobians (e, p, 2, 2) of all elements at local coordinates `at` (p, 2), and their determinants.
+
+    Raises MeshError where one is not positive: the element is folded there.
+    """
+    jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(at)[1]
+    det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+    if not det.min() > 0.0:
+        worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
+        raise MeshError(f"an element of the mesh is folded, near x = {worst[0]:.3g}, y = {worst[1]:.3g} mm")
+    return jacobian, det
+
+
+def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool = True) -> Mesh:
+    """Return a block on the surface, with lines between elements at `x_lines` and `y_lines` (from 0 up) [mm].
+
+    Its underside is flat, or a circle of `radius` [mm] that touches the surface at x = 0; it may touch everywhere. Its
+    top is held, or with `held` False nothing is.
+    """
+    x, y = with_middles(x_lines), with_middles(y_lines)[::-1]
+    bottom = 0.0 * x if np.isinf(radius) else radius - np.sqrt(radius**2 - x**2)
+    part = y / y[0]
+    points = np.empty((len(x), len(y), 2))
+    points[..., 0] = x[:, None]
+    points[..., 1] = bottom[:, None] * (1.0 - part) + y[0] * part
+    top = np.arange(len(x)) * len(y)
+    return grid_mesh(points, np.zeros(len(y) // 2, np.int64), slice(0, len(x)), top if held else top[:0])
+
+
+def with_middles(lines: Array) -> Array:
+    """Return the lines with one more in the middle of each gap."""
+    out = np.empty(2 * len(lines) - 1)
+    out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2.0
+    return out
+
+
+# A divided element has 5 x 5 nodes, numbered along its first direction, then up: here those of the element's own nine
+_OWN: Indices = np.round(2.0 * (Q2P1.positions + 1.0) @ [1.0, 5.0]).astype(np.int64)
+_LOCAL = np.stack([np.tile(np.linspace(-1.0, 1.0, 5), 5), np.repeat(np.linspace(-1.0, 1.0, 5), 5)], axis=-1)
+_SIDES: Indices = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])  # end, middle and end of an element's sides
+_QUARTERS: Indices = np.array([[0, 2, 10, 12]]).T + _OWN // 5 // 2 * 5 + _OWN % 5 // 2  # (4, 9) of the 5 x 5 nodes
+_VALUES = Q2P1.shape(_LOCAL)[0]  # (25, 9)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HalvedMesh:
+    """A mesh, nested in the one that it was made of; nodes of that keep their numbers."""
+
+    mesh: Mesh
+    _coarse: Mesh
+    _pairs: Indices  # (q,) end and middle of the half sides that have a new node, as one number, in order
+    _new: Array  # (m, 9) shape functions of each new node's element there
+    _of: Indices  # (m,) that element
+
+    @staticmethod
+    def of(mesh: Mesh) -> "HalvedMesh":
+        """Divide every element of a mesh."""
+        count, elements = len(mesh.nodes), mesh.elements
+        grid: Indices = np.full((len(elements), 25), -1, np.int64)
+        grid[:, _OWN] = elements
+        ends = [(side[end], side[1]) for side in _SIDES for end in (0, 2)]
+        places: Indices = np.array([(_OWN[one] + _OWN[other]) // 2 for one, other in ends])
+        keys = np.stack([_pair(elements[:, one], elements[:, other], count) for one, other in ends], axis=1)
+        pairs, first, number = np.unique(keys, return_index=True, return_inverse=True)
+        grid[:, places] = count + number.reshape(keys.shape)
+        inner = np.flatnonzero(grid[0] < 0)
+        grid[:, inner] = count + len(pairs) + np.arange(grid[:, inner].size).reshape(len(elements), -1)
+        of = np.concatenate([first // len(ends), np.repeat(np.arange(len(elements)), len(inner))])
+        at = np.concatenate([places[first % len(ends)], np.tile(inner, len(elements))])
+        new = _VALUES[at]
+        # A new node is held where all nodes are that it lies between: of its side, or of its element.
+        held = mesh.driven[elements[of]] | (new == 0.0)[..., None]
+        driven = np.concatenate([mesh.driven, held.all(axis=1)])
+        nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[of]])])
+        halved = Mesh(
+            nodes,
+            grid[:, _QUARTERS].reshape(-1, 9),
+            np.repeat(mesh.region, 4),
+            _chained(mesh.skin, pairs, count),
+            *_by_axis(driven),
+        )
+        return HalvedMesh(halved, mesh, pairs, new, of)
+
+    def chain(self, nodes: Indices) -> Indices:
+        """Return a chain of edges (2 k + 1,) of the coarse mesh, end, middle, ... end, with its new nodes."""
+        return _chained(nodes, self._pairs, len(self._coarse.nodes))
+
+    def between(self, values: Array) -> Array:
+        """Return nodal values (n, ...) of the coarse mesh with those of new nodes, interpolated in their elements."""
+        local = values[self._coarse.elements[self._of]]
+        return np.concatenate([values, np.einsum("mn,mn...->m...", self._new, local)])
+
+
+def _pair(end: Indices, middle: Indices, count: int) -> Indices:
+    return end * count + middle
+
+
+def _chained(nodes: Indices, pairs: Indices, count: int) -> Indices:
+    """Return a chain of nodes (2 k + 1,) with the new one between each two of them."""
+    ends, middles = nodes[:-1].copy(), nodes[1:].copy()
+    ends[1::2], middles[1::2] = nodes[2::2], nodes[1::2]
+    out = np.empty(max(2 * len(nodes) - 1, 0), np.int64)
+    out[::2], out[1::2] = nodes, count + np.searchsorted(pairs, _pair(ends, middles, count))
+    return out
+
+
+def _by_axis(driven: Flags) -> tuple[Indices, Indices, Indices]:
+    """Return the nodes held both ways, along x alone and along y alone, of flags (n, 2)."""
+    x, y = driven.T
+    return np.flatnonzero(x & y), np.flatnonzero(x & ~y), np.flatnonzero(y & ~x)
+
+
+ELEMENTS = (Q2P1,)

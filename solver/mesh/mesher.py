@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.mesh.mesh import Mesh, distinct, grid_mesh, with_middles
+from solver.mesh import Mesh, distinct, grid_mesh, with_middles
 from solver.scene.tables import Finger, Receptor
 
 

@@ -11,11 +11,11 @@ from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.equilibrium.load_path import Instant, RelaxingWay, Way
-from solver.equilibrium.newton import EquilibriumState
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)

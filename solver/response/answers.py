@@ -19,18 +19,18 @@ from solver.body.receptor import Patches
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import settled
 from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined
+from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_path import Instant, RelaxingWay, end, march
 from solver.equilibrium.load_stepping import forces_of
-from solver.equilibrium.newton import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, check_stop, interruptible, report_part, report_progress
 from solver.response.answer import Solved, prediction
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 # unbalanced part of the forces from which displacements are corrected further [-]
 SMALL_IMBALANCE, FINITE_IMBALANCE = 1e-10, 1e-8

@@ -10,18 +10,17 @@ from solver.arrays import Array, Indices
 from solver.body.finite import FiniteBody
 from solver.body.receptor import Endings, FinitePatches
 from solver.body.stiffness import Elastic, Probes, local_coordinates
-from solver.element import Q2P1
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
-from solver.equilibrium.newton import EquilibriumState
 from solver.failures import SolveFailure
-from solver.mesh.mesh import Mesh
+from solver.mesh import Q2P1, Mesh
 from solver.mesh.mesher import Outline
 from solver.prediction import Prediction, Skin
 from solver.progress import Progress, report_part
 from solver.quantities import FIELDS, SED
 from solver.response.answer import skin_of
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 # Eight triangles of each element, in its nine nodes
 _AROUND = [0, 4, 1, 5, 2, 6, 3, 7]  # the nodes along the sides of an element

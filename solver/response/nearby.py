@@ -19,25 +19,25 @@ from solver._kernels.contact_system import assemble_contact_system, bounded_leng
 from solver.arrays import Array
 from solver.body.receptor import Patches
 from solver.contact import STATE_NAMES
-from solver.continuation.arc_length import jumped_branch
+from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
-from solver.equilibrium import full_slip
-from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.load_stepping import balanced, sliding_load
-from solver.equilibrium.newton import (
+from solver.equilibrium import (
     BY_DEPTH,
     BY_FRICTION,
     EquilibriumState,
     ForceLoad,
     LoadState,
     Newton,
+    full_slip,
     load_arguments,
 )
+from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
+from solver.equilibrium.full_slip import slide_beside
+from solver.equilibrium.load_stepping import balanced, sliding_load
 from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import TISSUES
 from solver.tolerances import IMAGINARY
 

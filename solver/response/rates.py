@@ -13,14 +13,14 @@ import numpy as np
 
 from solver.accuracy.error_estimate import PARTS, edge_changes, half_width
 from solver.arrays import Array
+from solver.equilibrium import EquilibriumState, ForceLoad
 from solver.equilibrium.finger import KINDS, Finger
 from solver.equilibrium.load_path import Way, march
-from solver.equilibrium.newton import EquilibriumState, ForceLoad
 from solver.failures import SolveFailure
 from solver.prediction import History, Prediction
 from solver.quantities import NAMES
 from solver.response.answer import history
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 

@@ -17,16 +17,16 @@ from solver.body.stiffness import Elastic
 from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import WIDE, direct, nearest
+from solver.equilibrium import EquilibriumState
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import forces_of
-from solver.equilibrium.newton import EquilibriumState
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW, Prediction
 from solver.quantities import NAMES
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Receptor
 
 

@@ -15,7 +15,7 @@ from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.prediction import Prediction
 from solver.progress import Progress, interruptible, report_progress
 from solver.response.answers import MESHINGS, Answer, Meshing, Watch
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 KNOWN = 0.03  # of a limit of friction, to which it is known
 WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone

@@ -16,13 +16,13 @@ from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.body.receptor import Endings, Patches
 from solver.body.stiffness import Probes
+from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import corrected
-from solver.equilibrium.newton import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
 LIGHT = 1e-7  # N/mm: less than this is no touch

@@ -1,1 +1,135 @@
-"""The scene: its tables and their checks, the published finger and its ten surfaces."""
+"""Scene: all that defines one run of the solver, frozen, checked when made.
+
+Each of its tables (`scene.tables`) checks itself; here is what several decide together, and the other scenes that one
+scene leads to.
+"""
+
+import math
+from dataclasses import dataclass, field, replace
+
+from solver.scene.tables import (
+    LAWS_OF,
+    TISSUES,
+    Finger,
+    Friction,
+    Loading,
+    Materials,
+    Receptor,
+    SceneError,
+    Solve,
+)
+from solver.tolerances import STIFFNESSES
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scene:
+    """One run of the solver. Friction and loading have no default that anybody could mean."""
+
+    title: str = ""
+    finger: Finger = field(default_factory=Finger)
+    materials: Materials = field(default_factory=Materials)
+    friction: Friction
+    loading: Loading
+    receptor: Receptor = field(default_factory=Receptor)
+    solve: Solve = field(default_factory=Solve)
+
+    def __post_init__(self) -> None:
+        """Check what several tables decide together."""
+        self._check_laws()
+        self._check_stiffnesses()
+        skin = self.finger.epidermis + self.finger.dermis
+        half = self.receptor.ending[0] / 2.0
+        if not half < self.receptor.depth < self.finger.tip_radius - half:
+            raise SceneError("receptor.depth", self.receptor.depth, "the ending must lie between skin and finger axis")
+        if self.receptor.depth + half > skin + 1e-9:
+            raise SceneError("receptor.depth", self.receptor.depth, f"the ending must end within {skin:g} mm of skin")
+        along, angle = self.receptor.ending[1], math.radians(self.finger.contact_angle)
+        room = 2.0 * (self.finger.shaft_length + (self.finger.tip_radius - self.receptor.depth) * angle)
+        if not along < 0.999 * room:
+            allowed = f"along the skin it must end before the cut, and stay below {0.999 * room:.3g} mm"
+            raise SceneError("receptor.ending", self.receptor.ending, allowed)
+        room = self.finger.pulp_thickness()
+        if self.loading.indentation is not None and self.loading.indentation >= room:
+            allowed = f"it must stay below the {room:.3g} mm of tissue between first touch and bone"
+            raise SceneError("loading.indentation", self.loading.indentation, allowed)
+        drag, push = self.loading.tangential_force, self.loading.normal_force
+        if drag is not None and push is not None and drag > self.friction.mu * push * (1.0 + 1e-12):
+            allowed = f"friction carries at most mu times the normal force, {self.friction.mu * push:.4g}"
+            raise SceneError("loading.tangential_force", drag, allowed)
+
+    def _check_stiffnesses(self) -> None:
+        meshed = TISSUES if self.finger.bone == "meshed" else TISSUES[:-1]
+        softest = min(self.materials.of(name).E for name in meshed)
+        for name in meshed:
+            if not STIFFNESSES * softest * (1.0 + 1e-9) >= self.materials.of(name).E:
+                allowed = f"it must be at most {STIFFNESSES:g} times that of the softest tissue, {softest:g} MPa"
+                raise SceneError(f"materials.{name}.E", self.materials.of(name).E, allowed)
+
+    def _check_laws(self) -> None:
+        kinematics = self.solve.kinematics
+        for name in TISSUES:
+            tissue = self.materials.of(name)
+            if tissue.law is not None and tissue.law not in LAWS_OF[kinematics]:
+                has = " or ".join(f'"{law}"' for law in LAWS_OF[kinematics])
+                allowed = f'with solve.kinematics = "{kinematics}" it must be {has}'
+                raise SceneError(f"materials.{name}.law", tissue.law, allowed)
+        if self.finger.bone == "rigid" and self.materials.bone.prony:
+            allowed = 'a rigid bone does not relax: leave it out, or set finger.bone = "meshed"'
+            raise SceneError("materials.bone.prony", [(t.g, t.tau) for t in self.materials.bone.prony], allowed)
+
+    @property
+    def normal_force(self) -> float | None:
+        """The normal force asked for [N/mm], None where a depth is."""
+        return self._per_mm(self.loading.normal_force)
+
+    @property
+    def pressed(self) -> tuple[float, float, str]:
+        """How deep [mm] or hard [N/mm] the finger is pressed, and which way it slides: what like scenes share."""
+        return self.loading.indentation or 0.0, self.normal_force or 0.0, str(self.loading.slide)
+
+    @property
+    def viscoelastic(self) -> bool:
+        """Whether the course is marched in time while the tissues relax."""
+        return self.materials.relax and self.solve.course == "history"
+
+    @property
+    def tangential_force(self) -> float | None:
+        """The drag asked for, opposing the slide [N/mm], None where the bone slides until nothing changes."""
+        return self._per_mm(self.loading.tangential_force)
+
+    def _per_mm(self, force: float | None) -> float | None:
+        return force / self.finger.width if force is not None and self.loading.force_unit == "N" else force
+
+    @property
+    def loading_per_mm(self) -> Loading:
+        """The loading with its forces in N/mm."""
+        forces = {"normal_force": self.normal_force, "tangential_force": self.tangential_force}
+        return replace(self.loading, **forces, force_unit="N/mm")
+
+    def unloaded(self, depth: float) -> "Scene":
+        """Return the same finger pressed to a `depth` [mm] without friction: meshes depend on nothing more."""
+        bare = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
+        return replace(bare, solve=Solve(self.solve.kinematics))
+
+    def undragged(self) -> "Scene":
+        """Return the scene that slides on, where a drag was asked for."""
+        return replace(self, loading=replace(self.loading, tangential_force=None))
+
+    def earlier_slides(self) -> tuple["Scene", ...]:
+        """Return the settled slides on the way to the last one that go the other way, as scenes of their own."""
+        opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
+        way = {1: "+x", -1: "-x"}
+        solve = replace(self.solve, course="steady")
+        return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in opposite)
+
+    def pressed_only(self) -> "Scene":
+        """Return the scene up to the end of its pre-indentation, as a scene of its own."""
+        loading = replace(self.loading, slide="none", tangential_force=None)
+        return replace(self, loading=loading, solve=replace(self.solve, course="steady"))
+
+    def driven(self, depth: float) -> "Scene":
+        """Return the scene with its bone driven to `depth` [mm], where a normal force was asked for."""
+        loading = self.loading
+        if loading.indentation is not None:
+            return self
+        return replace(self, loading=Loading(depth, "none" if loading.dragged else loading.slide, loading.speed))

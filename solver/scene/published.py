@@ -8,7 +8,7 @@ pascals: 0.8033e4 Pa, not 0.8033e-4 MPa. "computed" takes that reading, "as-prin
 from dataclasses import dataclass
 from typing import Literal
 
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Friction, Loading
 
 Reading = Literal["computed", "as-printed"]

@@ -14,7 +14,7 @@ from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.methods import Kinematics
 
 # fineness, whether moved along the skin by half an element, and times the usual load steps: the first that have a state

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from solver.equilibrium.load_stepping import march, press_and_slide
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.methods import MESHED, Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
 from solver.verification.truth import JUDGED, KINEMATICS, cases

@@ -14,12 +14,12 @@ from solver.body.linear import LinearBody
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
+from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.load_stepping import sliding_load
-from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.request import clock
 
 Kinematics = Literal["small", "finite"]

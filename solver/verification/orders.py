@@ -11,8 +11,8 @@ from solver.continuation.finite_states import settled as finite_settled
 from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.mesh.mesher import Sizing
+from solver.scene import Scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
-from solver.scene.scene import Scene
 from solver.verification.published import contacts, locking
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 

@@ -19,8 +19,8 @@ from typing import Literal
 
 import numpy as np
 
+from solver.scene import Scene
 from solver.scene.published import scenes
-from solver.scene.scene import Scene
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Relaxation, SceneError, Solve
 from solver.verification.methods import Kinematics
 

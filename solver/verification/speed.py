@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.failures import SolveFailure
 from solver.response.answers import alike
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
 from solver.verification.truth import JUDGED, Truth, cases, known

@@ -13,8 +13,8 @@ import numpy as np
 
 from solver.failures import SolveFailure
 from solver.response.solution import solve_many
+from solver.scene import Scene
 from solver.scene.published import scenes
-from solver.scene.scene import Scene
 from solver.scene.tables import Solve
 from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
 from solver.verification.request import LeftOut, Measurements, Request, clock

@@ -8,11 +8,11 @@ from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.body.receptor import FinitePatches, endings
 from solver.body.stiffness import Elastic
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke
-from solver.constitutive.linear import Hooke
+from solver.equilibrium import Newton
 from solver.equilibrium.finger import FiniteFinger
-from solver.equilibrium.newton import Newton
-from solver.mesh.mesh import Mesh
+from solver.mesh import Mesh
 from solver.mesh.mesher import Sizing, finger_mesh
 
 

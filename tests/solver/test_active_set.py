@@ -8,12 +8,12 @@ import pytest
 from solver import ContactLost, Finger, Loading, Receptor
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
-from solver.constitutive.linear import Hooke
+from solver.constitutive import Hooke
 from solver.contact import FrictionLaw
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import Aim, Way
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain

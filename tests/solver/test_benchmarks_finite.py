@@ -7,9 +7,9 @@ import pytest
 
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import LAWS, energy, stress
+from solver.equilibrium import LoadState
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import LoadState
-from solver.mesh.mesh import block, quality
+from solver.mesh import block, quality
 from solver.verification.published.bodies import distorted
 from solver.verification.published.finite_contacts import ELEMENT, light_finite
 from solver.verification.published.problems import CAPPED, FINITE_PARTS

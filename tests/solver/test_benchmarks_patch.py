@@ -8,11 +8,10 @@ import pytest
 from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
-from solver.constitutive.linear import Hooke
-from solver.element import Q2P1
+from solver.constitutive import Hooke
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh.mesh import Mesh, block, quality
+from solver.mesh import Q2P1, Mesh, block, quality
 from solver.verification.published.bodies import distorted
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks

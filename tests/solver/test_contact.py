@@ -8,11 +8,11 @@ import pytest
 from solver import ContactLost
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
-from solver.constitutive.linear import Hooke
+from solver.constitutive import Hooke
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled, slide_beside, slide_under
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.mesh.mesh import block
+from solver.mesh import block
 
 RADIUS = 5.0
 

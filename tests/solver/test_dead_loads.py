@@ -8,10 +8,10 @@ import pytest
 from solver._kernels.compiling import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke, stress
-from solver.constitutive.linear import Hooke
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.load_stepping import loaded
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)

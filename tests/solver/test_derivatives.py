@@ -12,14 +12,13 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings, FinitePatches
 from solver.body.stiffness import Elastic, Probes
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
 from solver.constitutive.hyperelastic import shape as grown
-from solver.constitutive.linear import Hooke
 from solver.continuation.small_states import settled
+from solver.equilibrium import LoadState, Newton, load_stepping
 from solver.equilibrium import full_slip as sliding
-from solver.equilibrium import load_stepping
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.newton import LoadState, Newton
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
 from solver.response.nearby import of_skin, of_slide, slope

@@ -6,8 +6,8 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, Receptor, Scene, Solve, solve
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.continuation.existence import steady
+from solver.equilibrium import LoadState
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import LoadState
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 from solver import Materials, Relaxation, Solve, solve
 from solver.accuracy.audits import course_audits
 from solver.body.finite import FiniteBody
-from solver.constitutive import overstress
+from solver.constitutive import Hooke, Prony, overstress
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.constitutive.hyperelastic import stress as relaxed_stress
 from solver.constitutive.hyperelastic import tangent as relaxed_tangent
-from solver.constitutive.linear import Hooke, Prony
 from solver.constitutive.overstress import Past
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene

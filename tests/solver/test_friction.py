@@ -13,8 +13,7 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.constitutive.hyperelastic import NeoHooke
 from solver.contact import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import (
+from solver.equilibrium import (
     BY_DEPTH,
     BY_FRICTION,
     BY_TRAVEL,
@@ -22,7 +21,8 @@ from solver.equilibrium.newton import (
     LoadState,
     Newton,
 )
-from solver.mesh.mesh import block
+from solver.equilibrium.full_slip import settled
+from solver.mesh import block
 from solver.response.stepper import SmallStepper
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.active_set import Course, touchable, untouched

@@ -6,14 +6,14 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
+from solver.constitutive import Hooke, Prony
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
-from solver.constitutive.linear import Hooke, Prony
 from solver.contact import FrictionLaw
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import loaded, march
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
-from solver.mesh.mesh import Mesh, MeshError, block
+from solver.mesh import Mesh, MeshError, block
 
 MESH = block(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 1.0, 3))
 ONE = block(np.array([-1.0, 1.0]), np.array([0.0, 1.0]))

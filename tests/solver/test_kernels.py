@@ -15,7 +15,7 @@ from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive.hyperelastic import LAWS, NeoHooke
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.skin import crosses_itself, pinched

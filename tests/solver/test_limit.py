@@ -8,14 +8,12 @@ import pytest
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke, Ogden
-from solver.continuation import existence, finite_states
+from solver.continuation import existence, finite_states, folds_at, follow
 from solver.continuation import existence as reach
-from solver.continuation.arc_length import folds_at, follow
+from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import BY_FRICTION, LoadState, Newton
-from solver.mesh import mesher
-from solver.mesh.mesh import grid_mesh
+from solver.mesh import grid_mesh, mesher
 from tests.solver.finite_examples import published
 
 SLOW = pytest.mark.slow

@@ -6,8 +6,8 @@ from numpy.linalg import LinAlgError
 
 from solver import Finger, Receptor, solve, solve_many
 from solver.body.linear import LinearBody, LinearElimination
-from solver.constitutive.linear import Hooke, Moduli
-from solver.mesh.mesh import Mesh, block
+from solver.constitutive import Hooke, Moduli
+from solver.mesh import Mesh, block
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.oracle import linear as oracle

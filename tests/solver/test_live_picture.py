@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene
+from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.newton import EquilibriumState, LoadState
 from solver.mesh.mesher import Sizing
 from solver.response.stepper import LivePicture
 

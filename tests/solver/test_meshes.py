@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver import Finger, Receptor
-from solver.element import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1
-from solver.mesh.mesh import MeshError, grid_mesh, quality
+from solver.mesh import ELEMENTS, GAUSS_3, GAUSS_4, Q2P1, MeshError, grid_mesh, quality
 from solver.mesh.mesher import DERMIS, EPIDERMIS, FAT, Outline, Sizing, finger_mesh
 
 

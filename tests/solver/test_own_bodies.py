@@ -9,12 +9,12 @@ from solver.accuracy.error_estimate import PARTS, estimated
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Elastic
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke
-from solver.constitutive.linear import Hooke
+from solver.equilibrium import ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled, slide_under
 from solver.equilibrium.load_stepping import march
-from solver.equilibrium.newton import ForceLoad, LoadState, Newton
-from solver.mesh.mesh import HalvedMesh, block, quality
+from solver.mesh import HalvedMesh, block, quality
 
 SLIDES = LoadState(0.15, 0.3, sense=-1)
 

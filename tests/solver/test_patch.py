@@ -9,10 +9,10 @@ from solver import ContactLost
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
-from solver.constitutive.linear import Hooke
+from solver.constitutive import Hooke
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh.mesh import Mesh, block
+from solver.mesh import Mesh, block
 
 DERMIS = Hooke(0.08, 0.48)
 PRESSURE = 0.001

@@ -7,10 +7,10 @@ import pytest
 
 from solver import Material, Materials, Relaxation, Solve, solve
 from solver.body.stiffness import Probes
-from solver.constitutive.linear import Prony
+from solver.constitutive import Prony
 from solver.equilibrium import relaxation as relaxing
 from solver.equilibrium.relaxation import RelaxingBody
-from solver.mesh.mesh import block
+from solver.mesh import block
 from solver.scene.published import SLIPPERINESS, scene
 
 TIMES = [0.5, 1.0, 1.5, 2.0, 3.0, 6.0]

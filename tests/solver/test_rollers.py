@@ -8,12 +8,12 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke
-from solver.constitutive.linear import Hooke
+from solver.equilibrium import LoadState, Newton
 from solver.equilibrium.load_stepping import loaded, march
-from solver.equilibrium.newton import LoadState, Newton
-from solver.mesh.mesh import Mesh
-from solver.mesh.mesh import block as round_block
+from solver.mesh import Mesh
+from solver.mesh import block as round_block
 from solver.verification.published.bodies import ring
 from solver.verification.published.locking import INNER, OUTER, YOUNG, widening
 from tests.solver.finite_examples import block

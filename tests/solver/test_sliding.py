@@ -9,8 +9,8 @@ import pytest
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
+from solver.equilibrium import LoadState, Newton
 from solver.equilibrium.full_slip import settled
-from solver.equilibrium.newton import LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 

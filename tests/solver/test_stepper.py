@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve, stepper
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import march, press_and_slide
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.stepper import FiniteStepper, SmallStepper

@@ -4,10 +4,9 @@ import pytest
 from solver import Finger, Receptor
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Elastic, Probes, local_coordinates
-from solver.constitutive.linear import MATERIALS, Hooke
-from solver.element import Q2P1
+from solver.constitutive import MATERIALS, Hooke
 from solver.linalg import Tree, places
-from solver.mesh.mesh import block
+from solver.mesh import Q2P1, block
 from solver.mesh.mesher import Sizing, finger_mesh
 
 TISSUES = [Hooke(0.136, 0.48), Hooke(0.08, 0.48), Hooke(0.034, 0.48)]

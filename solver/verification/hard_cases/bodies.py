@@ -7,13 +7,13 @@ import numpy as np
 
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
+from solver.constitutive import Hooke
 from solver.constitutive.hyperelastic import NeoHooke
-from solver.constitutive.linear import Hooke
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
-from solver.mesh.mesh import Mesh, block
+from solver.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.prediction import percent
 from solver.scene.published import STICKINESS, scene

@@ -7,7 +7,7 @@ from math import log, pi, sqrt
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.hard_cases.outcome import Outcome, of_answer
 
 KNOWN = 1e-3  # indentation at which contact spans many elements, and is still far thinner than the epidermis [mm]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from solver.arrays import Array
-from solver.mesh.mesh import Mesh, block
+from solver.mesh import Mesh, block
 
 STIFF_LAYERS = 2
 

@@ -9,7 +9,7 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.prediction import Prediction, percent
 from solver.response.solution import UNKNOWN, solve_many
-from solver.scene.scene import Scene
+from solver.scene import Scene
 
 BALANCE = ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance")  # those of them that an answer has
 LIMITS = ("penetration", "tension", "cone_violation")

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.scene.tables import Finger, Friction, Loading, Material, Materials, Receptor, Slide, Solve
 from solver.verification.hard_cases.light import KNOWN, of_light_touch
 from solver.verification.hard_cases.outcome import Outcome, of_scene

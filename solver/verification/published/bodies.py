@@ -10,9 +10,8 @@ from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody
 from solver.body.stiffness import Probes, local_coordinates
 from solver.contact import OPEN, SLIP
-from solver.element import Q2P1
-from solver.equilibrium.newton import Newton
-from solver.mesh.mesh import Mesh, grid_mesh, with_middles
+from solver.equilibrium import Newton
+from solver.mesh import Q2P1, Mesh, grid_mesh, with_middles
 
 NONE: Indices = np.zeros(0, np.int64)
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from solver.arrays import Array
 from solver.body.linear import LinearBody, edge_load
-from solver.constitutive.linear import Hooke
+from solver.constitutive import Hooke
 from solver.contact import OPEN, STICK, FrictionLaw
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_stepping import balanced
-from solver.equilibrium.newton import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.verification.published.bodies import chain, disc, graded, mirrored, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 

@@ -10,9 +10,9 @@ from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive.hyperelastic import NeoHooke
+from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march
-from solver.equilibrium.newton import EquilibriumState, LoadState, Newton
 from solver.verification.published.bodies import graded, mirrored, mound
 from solver.verification.published.zones import half_above, half_width
 

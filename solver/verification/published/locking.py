@@ -5,9 +5,8 @@ import numpy as np
 from solver.arrays import Array, Indices
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Probes
-from solver.constitutive.linear import Hooke
-from solver.element import Q2P1
-from solver.mesh.mesh import Mesh
+from solver.constitutive import Hooke
+from solver.mesh import Q2P1, Mesh
 from solver.verification.published.bodies import distorted, membrane, ring
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa

@@ -10,7 +10,7 @@ from solver.arrays import Array
 from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
-from solver.scene.scene import Scene
+from solver.scene import Scene
 from solver.verification.estimates import Estimate, compared
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics

@@ -3,7 +3,7 @@
 import numpy as np
 
 from solver.body.stiffness import Elastic
-from solver.element import Q2P1
+from solver.mesh import Q2P1
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
