@@ -1,4 +1,4 @@
-"""How often a study tells which quantity its scores follow: a table for three designs (`sessions.statistics.recovery`).
+"""How often a study tells which quantity its scores follow: a table for three designs (`sessions.statistics.power`).
 
 A rival is decided where its Akaike weight is at least 0.95.
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sessions.prediction.planted_strokes import AREA, StudyDesign, planted_strokes
-from sessions.statistics.recovery import Judgement, preferred, study_weights, twins
+from sessions.statistics.power import Judgement, preferred, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS
 

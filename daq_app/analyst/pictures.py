@@ -6,7 +6,7 @@ import numpy as np
 
 from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts, SkinLine
 from sessions.prediction import Way
-from sessions.report import Field
+from sessions.report.contents import Field
 from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step
 from solver.prediction import ROW, Skin

@@ -8,7 +8,7 @@ from daq_app.analyst.state import AnalystState, Row, chosen, rows
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
-from sessions.report.responses import shown_response
+from sessions.report.wording import shown_response
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,9 @@ from sessions.prediction import PredictionOptions, TrialPrediction, Way, predict
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions
-from sessions.recording.unblinding import revealed
-from sessions.report import Field, Report, findings
+from sessions.recording.visits import revealed
+from sessions.report import findings
+from sessions.report.contents import Field, Report
 from sessions.report.predictions import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DecisionError, append, read

@@ -15,17 +15,15 @@ from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.stored import check_prediction, with_present_names
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
-from sessions.recording.calibration_uncertainty import checked_gain_error, gain_error_set, set_gain_error
-from sessions.recording.derived import load_derived, store_derived
+from sessions.recording.derived import checked_gain_error, gain_error_set, load_derived, set_gain_error, store_derived
 from sessions.recording.provenance import software_versions
-from sessions.recording.unblinding import revealed
 from sessions.recording.verification import differences, first_sentences, why
-from sessions.recording.visits import force_visit
+from sessions.recording.visits import force_visit, revealed
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import intervals_document, stroke_intervals
 from sessions.strokes.bootstrap_settings import BootstrapSettings
-from sessions.strokes.contact_area import AreaLaw
 from sessions.strokes.decisions import Decisions
+from sessions.strokes.friction import AreaLaw
 from sessions.strokes.stored import bootstrap_settings, check_analysis
 from sessions.toml_file import SettingsError, from_table
 

@@ -4,7 +4,7 @@ import argparse
 
 from daq_app.cli.options import within
 from daq_app.console import WrongValue
-from sessions.strokes.contact_area import FIXED, HERTZ, PLANNED_AT, AreaLaw
+from sessions.strokes.friction import FIXED, HERTZ, PLANNED_AT, AreaLaw
 
 AS_BEFORE = "as the session was analysed before, or else fixed"
 

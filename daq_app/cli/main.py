@@ -55,10 +55,10 @@ _FAILED = (
     "drivers.transducer.SetupError",
     "sessions.exchange.ExportError",
     "sessions.report.html.ReportError",
-    "sessions.exchange.csv_rows.ImportRefused",
+    "sessions.exchange.csv_text.ImportRefused",
     "sessions.plan.plan.Blinded",
     "sessions.prediction.press_model.FitError",
-    "sessions.recording.errors.RecordingError",
+    "sessions.recording.schema.RecordingError",
     "sessions.plan.study.StudyError",
     "solver.failures.SolveFailure",
 )

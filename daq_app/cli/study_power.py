@@ -11,8 +11,7 @@ from daq_app.cli.options import LARGEST_SEED, numbers_by_key, within
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.prediction import BY_NAME
 from sessions.prediction.planted_strokes import StudyDesign, planted_strokes
-from sessions.statistics.power import Planted, power
-from sessions.statistics.recovery import TWIN, Judgement, Recovery, recovery
+from sessions.statistics.power import TWIN, Judgement, Planted, Recovery, power, recovery
 
 SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
 # Likewise of those that tell quantities apart, or do not: one such study takes a thousand times as long.

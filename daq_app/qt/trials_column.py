@@ -15,7 +15,7 @@ from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
 from sessions.prediction import QUANTITIES
-from sessions.report.responses import shown_response
+from sessions.report.wording import shown_response
 
 pg: Any = pyqtgraph  # it has no types
 

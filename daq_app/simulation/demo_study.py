@@ -9,7 +9,7 @@ from daq_app.simulation.wiring import Connected, SimulatedPeople, connected
 from drivers.clock import Clock
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import Recording, Setting
-from sessions.report import Planted
+from sessions.report.contents import Planted
 from sessions.run.runner import SessionEnd
 
 PROTOCOL = "sensotact-friction"

@@ -16,7 +16,7 @@ from daq_app.simulation.wiring import planted_surface
 from sessions.plan.plan import Block
 from sessions.plan.protocols import plan, protocol
 from sessions.prediction import PredictionOptions, seds_at
-from sessions.strokes.contact_area import FIXED, AreaLaw
+from sessions.strokes.friction import FIXED, AreaLaw
 from simulators.subject import SimulatedSubject, SubjectSettings
 from simulators.surface import Surface
 

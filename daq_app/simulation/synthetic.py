@@ -23,8 +23,8 @@ from sessions.recording import RecordingError, Setting
 from sessions.recording.schema import LIVE_FILE
 from sessions.run import steps
 from sessions.run.runner import RunnerSettings
-from sessions.statistics.pooling.exclusions import EXCLUSIONS
 from sessions.statistics.pooling.ground_truth import Spoilt
+from sessions.statistics.pooling.visit import EXCLUSIONS
 from simulators.bench import Bench, BenchSettings, PlantedStroke
 from simulators.direct import DirectTransducer, Hurt
 from simulators.subject import SimulatedSubject, SubjectSettings

@@ -1,11 +1,13 @@
-"""CSV whose text cells a spreadsheet takes for text: one that begins like a formula has an apostrophe before it.
+"""CSV written so that a spreadsheet takes text for text, and rows of files that somebody else wrote.
 
 A spreadsheet runs a cell that begins with `=`, `+`, `-`, `@`, a tab or a carriage return (OWASP, "CSV injection").
-Numbers stay as they are. `plain` gives back the text that `harmless` was given, so that an export comes back whole.
+Text that begins like a formula has an apostrophe before it; numbers stay as they are. `plain` gives back the text that
+`harmless` was given, so that an export comes back whole.
 """
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, TextIO
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
@@ -44,3 +46,51 @@ def _begins_like_a_formula(text: str) -> bool:
     except ValueError:
         return True
     return False
+
+
+COMMENT = "#"
+_DELIMITERS = (",", ";", "\t")
+
+
+class ImportRefused(Exception):
+    """The file cannot be taken as a recording; one sentence names file, line and what to do."""
+
+
+def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:
+    """Yield line number and cells of every row that is no comment; empty lines are allowed at the end alone."""
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ImportRefused(f"{path}: byte {error.start} is no UTF-8 text; save the file as CSV in UTF-8") from error
+    lines = text.splitlines(keepends=True)
+    first_line = next((line for line in lines if not line.startswith(COMMENT)), "")
+    delimiter = next((mark for mark in _DELIMITERS if mark in first_line), ",")
+    empty: int | None = None
+    reader = csv.reader(iter(lines), delimiter=delimiter)
+    try:
+        for cells in reader:
+            if cells and cells[0].startswith(COMMENT):
+                continue
+            if not any(cell.strip() for cell in cells):
+                empty = empty or reader.line_num
+                continue
+            if empty is not None:
+                raise ImportRefused(f"{path}, line {empty} is empty: remove it, or what follows it")
+            yield reader.line_num, cells
+    except csv.Error as error:
+        raise ImportRefused(f"{path}, line {reader.line_num}: this is no CSV ({error}); save the file anew") from error
+
+
+def cell_text(cell: str) -> str:
+    """Return what a cell holds, on one line and not too long."""
+    return " ".join(cell.split())[:40]
+
+
+def number_in(cell: str) -> float | None:
+    """Return a cell as a number (nan and infinities too), or None."""
+    if "_" in cell:  # Python reads 1_000 as a number; a data file means none
+        return None
+    try:
+        return float(cell)
+    except ValueError:
+        return None

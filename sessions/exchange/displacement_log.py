@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.exchange.csv_rows import ImportRefused, cell_text, number_in, records
+from sessions.exchange.csv_text import ImportRefused, cell_text, number_in, records
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 
 Array = NDArray[np.float64]

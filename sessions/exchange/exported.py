@@ -9,9 +9,8 @@ from typing import Any, cast
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.atomic_file import write_whole
-from sessions.recording.calibration_uncertainty import GAIN_ERROR
-from sessions.recording.derived import bytes_of
-from sessions.recording.digests import Digest, different, digest_of
+from sessions.recording.derived import GAIN_ERROR, bytes_of
+from sessions.recording.description import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
 from sessions.recording.provenance import software_versions

@@ -20,11 +20,10 @@ from sessions.exchange.session_tables import Column, tables
 from sessions.file_access import LARGEST_DOCUMENT
 from sessions.json_document import json_value
 from sessions.recording import LoggedEvent
-from sessions.recording.calibration_uncertainty import GAIN_ERROR
-from sessions.recording.event_shapes import event_data
+from sessions.recording.derived import GAIN_ERROR
+from sessions.recording.log import event_data
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
-from sessions.recording.sealed_copy import DataSet, texts, write_copy
-from sessions.recording.text_column import read_texts
+from sessions.recording.sealed_copy import DataSet, read_texts, texts, write_copy
 from sessions.strokes.decisions import DECISIONS
 
 PART = 65_536  # readings at once

@@ -15,7 +15,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.atomic_file import write_whole
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
-from sessions.exchange.csv_rows import COMMENT, ImportRefused, cell_text, number_in, records
+from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, number_in, records
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.recording.provenance import Setting, provenance

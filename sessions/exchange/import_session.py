@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sessions.exchange import FORMATS
-from sessions.exchange.csv_rows import ImportRefused
+from sessions.exchange.csv_text import ImportRefused
 from sessions.exchange.exported import ExportedSession, restore
 from sessions.file_access import remedy
 from sessions.recording import Recording, RecordingError

@@ -19,12 +19,11 @@ from sessions.exchange.column_meanings import (
     RESPONSE,
     STROKE,
     TRIAL,
+    predicted_with,
 )
-from sessions.exchange.prediction_settings import predicted_with
 from sessions.recording import LoggedEvent, Recording
-from sessions.recording.event_shapes import event_data
 from sessions.recording.head import json_text
-from sessions.recording.log import ANSWERS
+from sessions.recording.log import ANSWERS, event_data
 from sessions.strokes.bootstrap import NUMBERS
 
 Cell = str | int | float | None

@@ -17,11 +17,10 @@ import msgspec
 from sessions.atomic_file import write_whole
 from sessions.file_access import DATABASE_FAILURES, bounded, read_limited, remedy
 from sessions.json_document import json_object
-from sessions.plan.blinding import Key
 from sessions.plan.orders import opaque_codes
 from sessions.plan.protocols import Body, Protocol
 from sessions.plan.protocols.planning import check_body
-from sessions.plan.study import Member, Study, StudyError, StudyEvent, check_code, free_slot
+from sessions.plan.study import Key, Member, Study, StudyError, StudyEvent, check_code, free_slot
 from sessions.toml_file import NotAllowed, SettingsError, from_toml
 
 STUDY_FILE = "study.sqlite"

@@ -3,11 +3,9 @@
 Each trial becomes a scene: its measured friction, its block's indentation, its direction and speed, and one finger.
 """
 
-from sessions.prediction.finger_file import finger_in
-from sessions.prediction.options import PredictionOptions, tau_scale, with_own_finger
+from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, shown_unit, tau_scale, with_own_finger
 from sessions.prediction.predicting import Way, predict
 from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES, scene_along, scenes_of, with_loads
-from sessions.prediction.shown_quantities import BY_NAME, shown_unit
 from sessions.prediction.solving import (
     Progress,
     derivatives_by,

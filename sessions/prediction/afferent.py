@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.prediction import QUANTITIES, SED, Quantity, SessionPrediction, TrialPrediction
-from sessions.prediction.sed_interval import Ends
+from sessions.prediction.stored import Ends
 from solver.quantities import NAMES
 
 Array = NDArray[np.float64]

@@ -1,12 +1,28 @@
-"""What a user may ask of the model, and the finger that it is asked of."""
+"""What a user may ask of the model: quantity, finger, strain, readings; and the scene file that tells a finger."""
 
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
 
 from sessions.plan.plan import SessionPlan
+from sessions.toml_file import from_toml, text_of
 from solver import Friction, Loading, Scene
+from solver.quantities import QUANTITIES, Quantity
 from solver.scene.published import SCALE
 from solver.scene.published import Reading as TauReading
+
+BY_NAME: Mapping[str, Quantity] = {quantity.name: quantity for quantity in QUANTITIES}
+
+
+def shown_unit(quantity: Quantity) -> tuple[str, float]:
+    """Return the unit in which people read a quantity, and a number in it by the one that is kept.
+
+    >>> shown_unit(BY_NAME["sed"]), shown_unit(BY_NAME["shear_along_skin"])
+    (('kPa', 1000.0), ('1', 1.0))
+    """
+    return ("kPa", 1e3) if quantity.unit == "MPa" else ("1", 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,3 +71,28 @@ def tau_scale(options: PredictionOptions) -> float:
 def bound(tau_max: float | None, options: PredictionOptions) -> float | None:
     """Return the traction bound [MPa] in the reading asked for."""
     return None if tau_max is None else tau_max * tau_scale(options)
+
+
+# Every scene has them, and `sessions.prediction.scenes` puts those of the trials in their place.
+_OF_TRIALS: Mapping[str, Mapping[str, Any]] = {"friction": {"mu": 0.0}, "loading": {"indentation": 1.0}}
+_OF_OPTIONS = ("kinematics", "course", "evidence")
+
+
+def finger_in(path: Path) -> tuple[Scene, str]:
+    """Return the scene whose finger, materials, receptor and tolerance a file tells, and what of it is not taken.
+
+    The file may lack friction and loading. "" where all that it holds is taken. Raises FileNotFoundError, and
+    SettingsError for anything wrong in what is taken.
+    """
+    text = text_of(path)
+    scene = from_toml(text, Scene, str(path), instead=_OF_TRIALS)
+    document = tomllib.loads(text)
+    ignored = [f"[{name}]" for name in _OF_TRIALS if name in document]
+    ignored += [f"solve.{name}" for name in _OF_OPTIONS if name in document.get("solve", {})]
+    if not ignored:
+        return scene, ""
+    are = "is" if len(ignored) == 1 else "are"
+    return scene, (
+        f"{path}: {', '.join(ignored)} {are} not taken: each trial brings its own friction and loading, and strain "
+        "and course are options of the verb"
+    )

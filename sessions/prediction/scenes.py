@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 from sessions.plan.plan import DISTAL_TO_PROXIMAL, PROXIMAL_TO_DISTAL, Block, SessionPlan, Trial
 from sessions.prediction.options import PredictionOptions, bound, template, with_own_finger
-from sessions.prediction.stored import TrialPrediction
-from sessions.prediction.variants import Variant
+from sessions.prediction.stored import TrialPrediction, Variant
 from sessions.strokes import Analysis, FrictionParameters, Stroke
 from solver import Friction, Loading, Scene, SceneError, Slide, Solve
 from solver.scene.published import SCALE

@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import load_derived, store_derived
-from sessions.recording.unblinding import UNBLINDING
+from sessions.recording.visits import UNBLINDING
 
 SEAL = "sealed-prediction.json"
 NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")

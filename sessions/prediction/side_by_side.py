@@ -20,10 +20,8 @@ from sessions.prediction import (
     tau_scale,
     traction_reached,
 )
-from sessions.prediction.sed_interval import SedInterval
-from sessions.prediction.stored import known_error
+from sessions.prediction.stored import Alternative, SedInterval, Variant, known_error, variants
 from sessions.prediction.uncertainty import Drawn, draws_of, intervals_of
-from sessions.prediction.variants import Alternative, Variant, variants
 from sessions.strokes import Analysis
 
 

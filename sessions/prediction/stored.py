@@ -1,22 +1,114 @@
-"""What the model says of each trial and of a session, and how that is told as plain data."""
+"""What the model says of each trial, in each variant and of a session, and how that is told as plain data."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import msgspec
 
 from sessions.json_document import complete, converted
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
-from sessions.prediction.sed_interval import Ends, SedInterval
-from sessions.prediction.variants import Alternative
-from sessions.strokes.contact_area import FIXED, AreaLaw
 from sessions.strokes.decisions import Decision
+from sessions.strokes.friction import FIXED, AreaLaw
 from sessions.toml_file import from_table
 from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin
 from solver.response.fields import Fields, fields_of
+
+Method = Literal["derivatives", "sampling"]  # by the solver's converged tangent; by draws that are solved
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SedInterval:
+    """The 95 % interval of one SED that friction makes, and the force where that drives: not the model's error.
+
+    With it those of the same state's forces and depth, by the tangent alone; None where there is no tangent.
+    """
+
+    low: float | None  # [MPa]; None where `reason` says why
+    high: float | None
+    method: Method | None
+    # Derivatives by the converged tangent: where the method is sampling, they hold close to the friction found alone
+    by_mu: float | None = None  # of the SED by mu [MPa]
+    by_tau_max: float | None = None  # by tau_max as the model gets it [-]
+    by_force: float | None = None  # by the normal force, where that drives the model [MPa/N]
+    reason: str = ""
+    normal_force: Ends | None = None  # of the whole finger [N]
+    tangential_force: Ends | None = None  # [N]
+    indentation: Ends | None = None  # found under a force [mm]; both ends alike where it was given
+
+
+Driven = Literal["depth", "force", "other way"]
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """How a trial is predicted."""
+
+    kinematics: Literal["small", "finite"]
+    tau_reading: Literal["computed", "as-printed"]
+    driven: Driven  # by the block's depth; by the force measured; by the depth, slid the other way
+
+    @property
+    def sentence(self) -> str:
+        """It, for people.
+
+        >>> Variant("finite", "as-printed", "depth").sentence
+        'finite strain, tau_max as printed, at the planned depth'
+        """
+        return f"{self.kinematics} strain, {self.way}"
+
+    @property
+    def way(self) -> str:
+        """It, without the strain."""
+        reading = "tau_max as printed, " if self.tau_reading == "as-printed" else ""
+        return f"{reading}{_DRIVEN[self.driven]}"
+
+
+_DRIVEN = {
+    "depth": "at the planned depth",
+    "force": "at the measured force",
+    "other way": "at the planned depth, slid the other way",
+}
+
+
+_KINDS: Mapping[str, tuple[Literal["small", "finite"], ...]] = {
+    "none": (),
+    "small": ("small",),
+    "both": ("small", "finite"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative:
+    """The settled state of a trial in one variant. A number is None where `reason` says why."""
+
+    variant: Variant
+    tau_max: float | None  # that the model got [MPa]
+    indentation: float | None  # given, or found under the force [mm]
+    sed: float | None  # averaged over the ending [MPa]
+    error_estimate: float | None  # relative, of sed
+    normal_force: float | None  # of the whole finger [N]
+    tangential_force: float | None  # [N]
+    reason: str = ""
+    traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
+    interval: SedInterval | None = None  # of the SED, where it was asked for
+    normal_force_error: float | None = None  # estimated by the solver, of normal_force, relative [-]; None: given
+    tangential_force_error: float | None = None  # likewise of tangential_force
+    indentation_error: float | None = None  # likewise of the indentation; None where that was given
+    doubt: str = ""  # why the numbers are not to be believed, where the model was driven beyond its range
+
+
+def variants(choice: Literal["none", "small", "both"]) -> Iterator[Variant]:
+    """Yield the variants asked for: those at small strain, or those at finite strain too."""
+    for kinematics in _KINDS[choice]:
+        yield Variant(kinematics, "computed", "depth")
+        yield Variant(kinematics, "as-printed", "depth")
+        yield Variant(kinematics, "computed", "force")
+        yield Variant(kinematics, "computed", "other way")
+
 
 _NOT_STORED = ("prediction", "opposite")  # of a row as plain data: all that the solver found
 _STORED_OTHERWISE = ("stimulus", "alternatives", "interval", "opposite_interval")

@@ -24,7 +24,7 @@ from sessions.prediction import (
     tau_scale,
     with_loads,
 )
-from sessions.prediction.sed_interval import Ends, SedInterval
+from sessions.prediction.stored import Ends, SedInterval
 from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from sessions.strokes.bootstrap_settings import BootstrapSettings

@@ -10,17 +10,17 @@ from sessions.file_access import read_limited, remedy
 from sessions.json_document import json_value
 from sessions.recording.description import description
 from sessions.recording.disk_space import release_reserve
-from sessions.recording.errors import RecordingError
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
+from sessions.recording.rescue import fold_log
 from sessions.recording.schema import (
     DESCRIPTION_FILE,
     LIVE_FILE,
     MANIFEST_FILE,
     SEALED_FILE,
+    RecordingError,
 )
 from sessions.recording.sealed_copy import differences, write_copy
-from sessions.recording.wal_checkpoint import fold_log
 
 SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)
 

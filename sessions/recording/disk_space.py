@@ -9,8 +9,7 @@ from pathlib import Path
 
 from sessions.file_access import open_new
 from sessions.plan.plan import SessionPlan
-from sessions.recording.errors import RecordingError
-from sessions.recording.schema import BYTES_A_READING
+from sessions.recording.schema import BYTES_A_READING, RecordingError
 
 RATE_UNKNOWN = 1000.0  # readings a second assumed of a device that does not tell [Hz]
 TRIAL_TIME = 90.0  # mounting, zero, stroke and score, with a redo now and then [s]

@@ -9,8 +9,7 @@ from typing import Any
 from sessions.atomic_file import write_whole
 from sessions.file_access import read_limited, remedy
 from sessions.json_document import json_object
-from sessions.recording.errors import RecordingError
-from sessions.recording.schema import MANIFEST_FILE
+from sessions.recording.schema import MANIFEST_FILE, RecordingError
 
 
 def is_sealed(folder: Path) -> bool:

@@ -22,10 +22,9 @@ from sessions.json_document import converted, json_value
 from sessions.plan.adaptive import with_mounted
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.errors import RecordingError
-from sessions.recording.event_shapes import event_data
 from sessions.recording.head import check_provenance, info_from_dict, plan_from_dict
-from sessions.recording.log import LoggedEvent, TrialRecord, trial_records
+from sessions.recording.log import LoggedEvent, TrialRecord, event_data, trial_records
+from sessions.recording.schema import RecordingError
 from sessions.recording.wal_recovery import log_tail
 
 # Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.

@@ -1,4 +1,4 @@
-"""Whether a live file still lies where its name says, and how what it holds is written anew where it does not."""
+"""What becomes of a live file: written anew where its name is gone, and the log that a crash left folded into it."""
 
 import itertools
 import sqlite3
@@ -8,7 +8,9 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 from sessions.atomic_file import sync_folder
-from sessions.recording.errors import RecordingError
+from sessions.recording.log import LoggedEvent
+from sessions.recording.reader import Recording, torn_log
+from sessions.recording.schema import LIVE_FILE, RecordingError, event_row
 
 Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file
 SIDES = ("", "-wal")  # the live file, and its log, which holds the newest commits
@@ -62,3 +64,29 @@ def _new_folders(session: Path) -> Iterator[Path]:
         numbers = itertools.chain([""], (f"-{number}" for number in itertools.count(2)))
         names = (place / f"{session.name}-rescued{number}" for number in numbers)
         yield next(folder for folder in names if not folder.exists())
+
+
+def fold_log(crashed: Recording) -> None:
+    """Fold a log that a crash left into the live file. Raises RecordingError while somebody still writes.
+
+    Folding loses sight of a torn tail, so that an event is added to tell of it.
+    """
+    live = crashed.folder / LIVE_FILE
+    if not live.with_name(f"{live.name}-wal").exists():
+        return
+    number, time_ns, readings = (
+        (last.number, last.time_ns, last.readings) if (last := next(reversed(crashed.events), None)) else (0, 0, 0)
+    )
+    torn = [
+        LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
+        for i, sentence in enumerate(torn_log(live), 1)
+    ]
+    try:
+        with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
+            for event in torn:
+                connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+            connection.execute("PRAGMA journal_mode=DELETE")
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"{live} is in use ({error}); end the program that still writes it, or reads it"
+        ) from error

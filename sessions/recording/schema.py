@@ -12,6 +12,11 @@ from drivers.readings import ReadingBlock
 from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent
 
+
+class RecordingError(Exception):
+    """A session folder cannot be written or read; the message says which, why, and what is safe."""
+
+
 FORMAT = "daq-app session"
 FORMAT_VERSION = 3  # also PRAGMA user_version of the live file
 APPLICATION_ID = 0x44415146  # "DAQF" in ASCII: PRAGMA application_id, at byte 68 of the file

@@ -1,11 +1,36 @@
-"""Visits of a study joined by the subject's code: who scored, and who stroked on a transducer."""
+"""Visits of a study joined by the subject's code, and what blinded ones say once the study's key was opened."""
 
+from dataclasses import replace
 from pathlib import Path
 
-from sessions.plan.study import StudyError
-from sessions.recording import Recording
-from sessions.recording.schema import LIVE_FILE
-from sessions.recording.unblinding import revealed
+from sessions.plan.study import Key, StudyError
+from sessions.recording.derived import load_derived
+from sessions.recording.log import trial_records
+from sessions.recording.reader import Recording
+from sessions.recording.schema import LIVE_FILE, RecordingError
+
+UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
+
+
+def revealed(recording: Recording) -> Recording:
+    """Return a session with all that is known of its stimuli by now: a blinded one as it is, until its key was opened.
+
+    Raises RecordingError where the opened key is not the one that was sealed.
+    """
+    if not recording.plan.blinded:
+        return recording
+    stored = load_derived(recording.folder, UNBLINDING)
+    if stored is None:
+        return recording
+    path = recording.folder / UNBLINDING
+    try:
+        key = Key.from_dict(stored["key"])
+        if key.sha256 != recording.plan.key_sha256:
+            raise ValueError("its SHA-256 is not that in the plan")
+        plan = key.plan(recording.plan)
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(f"{path} is not the key that was sealed ({error}); unblind the session anew") from error
+    return replace(recording, plan=plan, trials=trial_records(plan, recording.events))
 
 
 def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:

@@ -11,47 +11,14 @@ from sessions.prediction.series_slopes import other_signs
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
-from sessions.report.commands import scene_file, session_commands
-from sessions.report.contents import (
-    Answers,
-    Course,
-    Experiment,
-    Fact,
-    Field,
-    History,
-    Planted,
-    PredictionFinding,
-    Report,
-    StrokeFinding,
-    TextFile,
-    Trace,
-)
+from sessions.report.contents import Fact, Planted, PredictionFinding, Report
 from sessions.report.experiments import experiments, quantities, with_psychometric
+from sessions.report.facts import scene_file, session_commands
 from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
 from sessions.report.strokes import course, flaws, strokes
 from sessions.statistics.multiverse import Values
-from sessions.statistics.scores import MeanScore, Relation, ScoreTable, joined, score_table
+from sessions.statistics.scores import ScoreTable, joined, score_table
 from sessions.strokes import Analysis
-
-__all__ = [
-    "Answers",
-    "Course",
-    "Experiment",
-    "Fact",
-    "Field",
-    "Further",
-    "History",
-    "MeanScore",
-    "Planted",
-    "PredictionFinding",
-    "Relation",
-    "Report",
-    "StrokeFinding",
-    "TextFile",
-    "Trace",
-    "findings",
-    "score_table",
-]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from sessions.prediction import Response
-from sessions.prediction.sed_interval import Ends, SedInterval
-from sessions.prediction.variants import Alternative
+from sessions.prediction.stored import Alternative, Ends, SedInterval
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scales.psychometric import Psychometric

@@ -12,12 +12,10 @@ from sessions.recording.reader import Recording
 from sessions.report.contents import Answers, Experiment, PredictionFinding, StrokeFinding
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
-from sessions.statistics.scales.constant_stimuli import comparison, function_of
-from sessions.statistics.scales.psychometric import Psychometric
+from sessions.statistics.scales.psychometric import Psychometric, comparison, function_of
 from sessions.statistics.scores import Relation, ScoreTable, mean_scores, relation, score_matrix
 from sessions.strokes import Analysis
-from sessions.strokes.contact_area import FIXED, AreaLaw
-from sessions.strokes.friction import rule_for
+from sessions.strokes.friction import FIXED, AreaLaw, rule_for
 
 Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` -> block and index -> number
 

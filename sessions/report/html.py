@@ -1,4 +1,4 @@
-"""The report as one self-contained page, and its figures as files with their numbers."""
+"""The pages of a session and of a study, each self-contained, and figures as files with their numbers."""
 
 import base64
 import io
@@ -8,17 +8,36 @@ from functools import partial
 from itertools import chain
 from pathlib import Path
 
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
 from sessions.exchange.csv_text import write_rows
 from sessions.file_access import open_new, remedy
-from sessions.report import Report
+from sessions.report import study_prose
 from sessions.report import tables as report_tables
+from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
+from sessions.report.figures.scores import study_plates
 from sessions.report.prose import doubts, question, summary, told_apart
+from sessions.report.study_csv import columns_csv, trials_csv
 from sessions.report.tables import Table
 from sessions.report.tables.cells import parted
-from sessions.report.templates import template
+from sessions.report.tables.study import study_tables
+from sessions.report.tables.study_models import missing_models, missing_scores
+from sessions.statistics.pooling.findings import StudyFindings
+
+
+def template(name: str) -> Template:
+    """Return the template in a file of this folder."""
+    environment = Environment(
+        loader=PackageLoader("sessions.report", "."),
+        autoescape=select_autoescape(default=True, default_for_string=True),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+    return environment.get_template(name)
+
 
 HEAD = "<!DOCTYPE html>"
 BODY = {"table-relation", "table-strokes", "table-predictions", "table-rivals"}  # all others stand in the appendix
@@ -167,3 +186,46 @@ def swap_in(path: Path, text: str) -> None:
         raise ReportError(
             f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"
         ) from error
+
+
+# Tables that are no appendix; that of the trials stands under a heading of its own behind it.
+STUDY_BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals", "table-trials"}
+QUESTION = (
+    "People stroke surfaces and scale what they feel. Does the strain-energy density (SED) that a finger model "
+    "predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
+)
+
+
+def study_page(study: StudyFindings, name: str) -> str:
+    """Return the page of the study called `name`; the same findings give the same bytes."""
+    figures = {plate.name: plate for plate in study_plates(study)}
+    tables, further = parted(study_tables(study), STUDY_BODY)
+    trials = tables.pop("trials")
+    numbers = {plate: n for n, plate in enumerate(figures, 1)}
+    numbers |= {table.name: n for n, table in enumerate((*chain.from_iterable(tables.values()), *further, *trials), 1)}
+    return template("study.html.jinja").render(
+        study=study,
+        name=name,
+        question=QUESTION,
+        summary=study_prose.summary(study),
+        told_apart=study_prose.told_apart(study),
+        sealed=study_prose.sealed(study),
+        who=study_prose.who(study),
+        excluded=study_prose.excluded(study),
+        remarks=study_prose.remarks(study),
+        modelled=study_prose.modelled(study),
+        versions=study_prose.versions(),
+        again=study_prose.again(study),
+        command=study_prose.command(study, name),
+        trials=sum(len(visit.rows) for visit in study.visits),
+        trials_file=text_address(trials_csv(study)),
+        columns_file=text_address(columns_csv(study)),
+        unmodelled=missing_models(study),
+        untold=missing_scores(study),
+        figures=figures,
+        tables={**tables, "trials": trials},
+        further=further,
+        numbers=numbers,
+        drawing=drawn,
+        data_address=partial(data_address, head=study.simulated),
+    )

@@ -13,7 +13,7 @@ from sessions.prediction import PredictionOptions, SessionPrediction, TrialPredi
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.model_facts import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
-from sessions.strokes.contact_area import AreaLaw
+from sessions.strokes.friction import AreaLaw
 
 _NUMBER = re.compile(r"\d+(\.\d+)?(e[-+]?\d+)?")
 _FROM_ROW = {"tau_max": "mu", "error_estimate": "sed", "normal_per_mm": "normal_force", "wall_s": "sed"}

@@ -8,8 +8,8 @@ from sessions.exchange.csv_text import write_rows
 from sessions.exchange.session_tables import heading
 from sessions.prediction import QUANTITIES, SED
 from sessions.statistics.multiverse import Path
-from sessions.statistics.pooling.exclusions import decided
 from sessions.statistics.pooling.findings import StudyFindings
+from sessions.statistics.pooling.visit import decided
 from sessions.statistics.rivals import Rival
 
 SIMULATED = "SIMULATED"

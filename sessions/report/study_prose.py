@@ -10,16 +10,15 @@ from itertools import chain
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.model_facts import UNKNOWNS
 from sessions.recording.provenance import software_versions
-from sessions.report import Fact
-from sessions.report.commands import area_words, calibration_words, model_words
-from sessions.report.robustness import OTHER_FINGERS
-from sessions.report.tables.multiverse import paths_sentence
-from sessions.report.tables.psychometric import compared_in_study, psychometric_sentences
+from sessions.report.contents import Fact
+from sessions.report.facts import area_words, calibration_words, model_words
+from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.report.tables.scales import scale_sentences
+from sessions.report.tables.scales import compared_in_study, psychometric_sentences, scale_sentences
+from sessions.report.tables.scores import paths_sentence
 from sessions.report.wording import correlation, digits, plural, significant
-from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.pooling.visit import Exclusion
 
 _FEW = 12  # trials named one by one
 

@@ -14,13 +14,13 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, FleetingWriter, LoggedEvent, Recording, RecordingError
-from sessions.recording.digests import digest_of
+from sessions.recording.description import digest_of
 from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
 from sessions.recording.verification import differences
+from sessions.run.event_log import Step, parts, steps_of
 from sessions.run.resuming import Seam, resumption
 from sessions.run.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session
-from sessions.run.session_history import Step, parts, steps
 from sessions.run.steps import Command, Event
 
 SLICE = 0.02  # longest wait before a stop is noticed [s]
@@ -182,7 +182,7 @@ class _Player:
     progress: Progress
 
     def __post_init__(self) -> None:
-        self._steps = steps(self.log)
+        self._steps = steps_of(self.log)
         self._first_ns = self.log[0].time_ns if self.log else 0
         self._began = time.monotonic()
         self._next = 0

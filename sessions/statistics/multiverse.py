@@ -30,12 +30,10 @@ from sessions.prediction import (
     slides,
 )
 from sessions.recording import Recording
-from sessions.statistics.adjusted_means import surface_means
-from sessions.statistics.scores import pearson
+from sessions.statistics.scores import pearson, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
-from sessions.strokes.contact_area import FIXED, HERTZ, AreaLaw
-from sessions.strokes.friction import Rule
+from sessions.strokes.friction import FIXED, HERTZ, AreaLaw, Rule
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
 
 Pair = tuple[float, float]

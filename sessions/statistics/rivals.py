@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sessions.prediction import BY_NAME, SED
-from sessions.statistics.adjusted_means import surface_means
-from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from sessions.statistics.dependent_correlations import (
     Contrast,
     cases_needed,
@@ -16,8 +14,8 @@ from sessions.statistics.dependent_correlations import (
     left_out_error,
     partial_correlation,
 )
-from sessions.statistics.reml import Array
-from sessions.statistics.scores import CONFIDENCE, fisher_interval, pearson, relation, spearman
+from sessions.statistics.mixed_model import Array, akaike_weights, crossed_deviance
+from sessions.statistics.scores import CONFIDENCE, fisher_interval, pearson, relation, spearman, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
 MODEL = SED.label  # the published quantity, to which the others are compared where no other is named

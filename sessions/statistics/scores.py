@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
+from itertools import pairwise
+
+from sessions.recording.log import TrialRecord
 
 CONFIDENCE = 0.95
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
@@ -302,3 +305,62 @@ def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None
     orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
     rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))
     return float(np.mean(np.abs(rhos) >= abs(rho) - 1e-12))
+
+
+def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:
+    """Return the mean of each surface from `points` of subject, index and number, subjects' own repeats averaged first.
+
+    A subject has a level of its own, and where some missed a surface the plain mean of the others would carry who they
+    are: level of subject and effect of surface are fitted together by least squares (means adjusted for unbalanced
+    blocks: Yates 1934, J. Am. Stat. Assoc. 29:51), and a surface's mean is that of all subjects. With every surface met
+    by all it is the plain mean. None of nothing, and where subjects who met some surfaces met none of the others:
+    nothing compares them.
+
+    >>> means = surface_means([("a", 0, 1.0), ("a", 50, 2.0), ("b", 0, 11.0)])
+    >>> {index: round(mean, 9) for index, mean in means.items()}
+    {0: 6.0, 50: 7.0}
+    """
+    own: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for subject, index, value in points:
+        own[subject, index].append(value)
+    if not own:
+        return None
+    subjects, indices = sorted({subject for subject, _ in own}), sorted({index for _, index in own})
+    values = np.array([float(np.mean(all_of)) for all_of in own.values()])
+    if len(own) == len(subjects) * len(indices):
+        return {index: float(values[[one == index for _, one in own]].mean()) for index in indices}
+    whose = np.array([[float(subject == one) for one in subjects] for subject, _ in own])
+    which = np.array([[float(index == one) for one in indices] for _, index in own])
+    design = np.hstack([whose, which])
+    if np.linalg.matrix_rank(design) < len(subjects) + len(indices) - 1:
+        return None
+    fitted = np.linalg.lstsq(design, values, rcond=None)[0]
+    level = float(fitted[: len(subjects)].mean())
+    return {index: level + float(effect) for index, effect in zip(indices, fitted[len(subjects) :], strict=True)}
+
+
+def grading(records: Iterable[TrialRecord]) -> dict[str, str]:
+    """Return a sentence for each descriptor that was pre-evaluated; none where nothing was.
+
+    The grading holds where the answers rise with the maker's number throughout. Raises Blinded while it is sealed.
+    """
+    judgements: defaultdict[str, dict[int, float]] = defaultdict(dict)
+    for record in records:
+        answer = record.number if record.score is None else record.score
+        if record.trial.phase == "pre-evaluation" and answer is not None:
+            stimulus = record.trial.stimulus
+            judgements[stimulus.descriptor][stimulus.known_index] = answer
+    return {descriptor: _sentence(answers) for descriptor, answers in judgements.items()}
+
+
+def _sentence(answers: dict[int, float]) -> str:
+    """Say whether answers rise with the index.
+
+    >>> _sentence({0: 3.0, 55: 62.0, 75: 58.0})
+    'the grading does not hold: 75 was judged no higher than 55 (0: 3, 55: 62, 75: 58)'
+    """
+    listed = ", ".join(f"{index}: {answer:g}" for index, answer in sorted(answers.items()))
+    if len(answers) < 2:
+        return f"too few answers to see a grading ({listed})"
+    wrong = [f"{b} was judged no higher than {a}" for a, b in pairwise(sorted(answers)) if answers[b] <= answers[a]]
+    return f"{'the grading does not hold: ' + ', '.join(wrong) if wrong else 'the grading holds'} ({listed})"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.filters import peaks
+from sessions.strokes.forces import peaks
 from sessions.strokes.onset import Baseline, ContactDetector, Lift, Onset
 from sessions.strokes.settings import AnalysisSettings
 

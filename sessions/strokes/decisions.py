@@ -18,8 +18,8 @@ from msgspec import Meta
 from sessions.file_access import remedy
 from sessions.json_document import converted, json_object
 from sessions.recording.derived import bytes_of
-from sessions.recording.errors import RecordingError
 from sessions.recording.head import json_text
+from sessions.recording.schema import RecordingError
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.strokes.bootstrap_settings import BootstrapSettings
-from sessions.strokes.break_away import ClimbReadings, thin
 from sessions.strokes.onset import onset_threshold
+from sessions.strokes.stick import ClimbReadings, thin
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ Where no source stands beside a threshold, its reason does. Names of fields are 
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-from sessions.strokes.contact_area import FIXED, AreaLaw
+from sessions.strokes.friction import FIXED, AreaLaw
 from sessions.strokes.onset import DetectorSettings
 
 ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where nobody stated the transducer's own [-]

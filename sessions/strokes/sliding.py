@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import Frame
-from sessions.strokes.flaws import FlawName
+from sessions.strokes.flaws import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.span import Span
-from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, SPEED, Findings
-from sessions.strokes.track import Track, mean_vector
+from sessions.strokes.span import Span, Track, mean_vector
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -6,17 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
-from sessions.strokes.break_away import break_away
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import StrokeDecisions
-from sessions.strokes.flaws import Flaw, FlawName
+from sessions.strokes.flaws import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings, Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.sliding import slide
-from sessions.strokes.span import Span, StrokeZero
-from sessions.strokes.stick_slip import power_of_normal_force, stick_slip
+from sessions.strokes.span import (
+    Span,
+    StrokeZero,
+    Track,
+    curve_of,
+    mean_vector,
+    noise_of_ratio,
+    track_of,
+    unfiltered_forces,
+)
+from sessions.strokes.stick import break_away, power_of_normal_force, stick_slip
 from sessions.strokes.stroke import Stroke
-from sessions.strokes.stroke_findings import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings
-from sessions.strokes.track import Track, curve_of, mean_vector, noise_of_ratio, track_of, unfiltered_forces
 
 Array = NDArray[np.float64]
 

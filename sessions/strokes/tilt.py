@@ -15,8 +15,7 @@ from sessions.plan.plan import Frame
 from sessions.strokes.contacts import Contact
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.sliding import block_means, displacement
-from sessions.strokes.span import Span, StrokeZero
-from sessions.strokes.track import track_of
+from sessions.strokes.span import Span, StrokeZero, track_of
 
 Pair = tuple[float, float]
 

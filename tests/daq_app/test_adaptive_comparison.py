@@ -22,7 +22,7 @@ from sessions.report.experiments import experiments, with_psychometric
 from sessions.run.resuming import resumption
 from sessions.run.states import Mounting
 from sessions.statistics.scales.psychometric import QUARTILE
-from sessions.strokes.contact_area import FIXED
+from sessions.strokes.friction import FIXED
 from simulators.subject import SubjectSettings
 
 ADAPTIVE = protocol("adaptive-comparison")

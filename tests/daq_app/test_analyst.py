@@ -24,7 +24,7 @@ from daq_app.analyst.shown import numbers, points, progress_words, row_words, se
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.analyst.transport import Transport
 from daq_app.analyst.work import Work
-from sessions.recording.calibration_uncertainty import set_gain_error
+from sessions.recording.derived import set_gain_error
 from sessions.strokes.decisions import Decision, Decisions, read
 from tests.sessions.report_example import example
 

@@ -12,7 +12,7 @@ from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
 from sessions.report.experiments import experiments, with_psychometric
-from sessions.report.tables.psychometric import (
+from sessions.report.tables.scales import (
     compared_in_study,
     compared_with_standard,
     psychometric_sentences,
@@ -21,7 +21,7 @@ from sessions.report.tables.psychometric import (
 from sessions.statistics.pooling.answers import constant_stimuli
 from sessions.statistics.pooling.visit import VisitOptions, visit_of
 from sessions.statistics.scales.psychometric import QUARTILE
-from sessions.strokes.contact_area import FIXED
+from sessions.strokes.friction import FIXED
 from simulators.subject import SubjectSettings
 
 

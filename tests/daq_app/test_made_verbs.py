@@ -25,7 +25,7 @@ from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, finger_in
 from sessions.recording import Recording
 from sessions.recording.archive import seal
-from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.recording.derived import gain_error_set
 from sessions.report import findings
 from sessions.statistics.pooling.visit import VisitOptions, visit_of
 from sessions.strokes import AnalysisSettings, analyse

@@ -5,9 +5,8 @@ import math
 
 import numpy as np
 
-from sessions.prediction.sed_interval import SedInterval
-from sessions.prediction.variants import Alternative, variants
-from sessions.report import (
+from sessions.prediction.stored import Alternative, SedInterval, variants
+from sessions.report.contents import (
     Answers,
     Course,
     Experiment,

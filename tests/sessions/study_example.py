@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from sessions.statistics.multiverse import PATHS
-from sessions.statistics.pooling.exclusions import Exclusion
 from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions
+from sessions.statistics.pooling.visit import Exclusion, TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
 

@@ -27,7 +27,7 @@ from sessions.exchange.import_session import exported, import_session
 from sessions.exchange.session_tables import tables
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
-from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.recording.derived import gain_error_set
 from sessions.strokes import analyse
 
 AGAIN = [name for name, module in FORMATS.items() if hasattr(importlib.import_module(module), "read")]

@@ -12,7 +12,7 @@ from daq_app.cli.main import run
 from sessions.exchange.import_session import exported, import_session
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
-from sessions.recording.digests import digest_of
+from sessions.recording.description import digest_of
 from sessions.recording.head import plan_to_dict
 from sessions.recording.schema import FORMAT_VERSION
 from sessions.strokes import analyse

@@ -16,8 +16,7 @@ from report_example import TABLES, bare, example
 from study_example import study
 
 from sessions.report.figures import plates
-from sessions.report.html import page, write_figures
-from sessions.report.study_page import study_page
+from sessions.report.html import page, study_page, write_figures
 from sessions.report.study_prose import remarks
 from sessions.report.tables import tables
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from sessions.exchange.csv_columns import ColumnsUnknown, columns
 from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, ImportRefused, import_csv
-from sessions.recording.errors import RecordingError
 from sessions.recording.reader import Recording
+from sessions.recording.schema import RecordingError
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
 from sessions.toml_file import SettingsError
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_example import example
 
-from sessions.report.figures.labels import spread
 from sessions.report.figures.scores import _free_place
+from sessions.report.figures.style import spread
 
 
 @given(

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from sessions.report.tables.scales import latent_table
-from sessions.statistics.pooling.answers import ConstantStimuli, latent_scales
-from sessions.statistics.pooling.averages import average
+from sessions.statistics.pooling.answers import ConstantStimuli, average, latent_scales
 from sessions.statistics.scales.latent import JUDGEMENTS, of_comparisons, of_judgements
 from sessions.statistics.scales.paired import Choice, paired_scale
 from sessions.statistics.scales.psychometric import QUARTILE

@@ -16,7 +16,7 @@ from stand_ins import CALIBRATION, INFO
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.manifest import list_in_manifest
-from sessions.recording.text_column import TextColumn, read_texts, write_texts
+from sessions.recording.sealed_copy import TextColumn, read_texts, write_texts
 
 REAL = replace(INFO, simulated=False)
 

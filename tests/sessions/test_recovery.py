@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.cli.main import run
-from sessions.statistics.recovery import Judgement, recovery, twins
+from sessions.statistics.power import Judgement, recovery, twins
 
 DEPTHS = (1.0, 2.0)
 

@@ -13,13 +13,14 @@ from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.prediction import PredictionOptions, predict
 from sessions.recording import Recording, SessionWriter
-from sessions.report import Further, Planted, findings
+from sessions.report import Further, findings
+from sessions.report.contents import Planted
 from sessions.report.figures.relation import relation_panel
 from sessions.report.html import page
 from sessions.report.prose import summary
-from sessions.report.responses import shown_response
 from sessions.report.strokes import _extremes
 from sessions.report.tables.scores import relation_table
+from sessions.report.wording import shown_response
 from sessions.statistics.scores import Score, ScoreTable, score_table
 from sessions.strokes.analysis import analyse
 

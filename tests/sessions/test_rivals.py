@@ -10,12 +10,11 @@ from scipy import optimize, stats
 from study_example import study
 
 from sessions.report.figures import picture
+from sessions.report.html import study_page
 from sessions.report.prose import told_apart
 from sessions.report.study_csv import rivals_csv
-from sessions.report.study_page import study_page
 from sessions.report.tables import tables
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.statistics.crossed_model import akaike_weights, crossed_deviance
 from sessions.statistics.dependent_correlations import (
     cases_needed,
     contrast,
@@ -23,6 +22,7 @@ from sessions.statistics.dependent_correlations import (
     partial_correlation,
     steiger_z,
 )
+from sessions.statistics.mixed_model import akaike_weights, crossed_deviance
 from sessions.statistics.rivals import MODEL, MODEL_MU, RivalTrial, rivals_of_means, rivals_within
 from sessions.statistics.within_subjects import repeated_correlation
 from solver import Finger, solve_many

@@ -8,10 +8,10 @@ from recordings import begun
 
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import Recording
-from sessions.statistics.grading import grading
 from sessions.statistics.scores import (
     Score,
     ScoreTable,
+    grading,
     joined,
     mean_scores,
     relation,

@@ -8,7 +8,7 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
 from sessions.prediction import PredictionOptions, predict, side_by_side
 from sessions.prediction.side_by_side import with_alternatives
-from sessions.prediction.variants import Variant
+from sessions.prediction.stored import Variant
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.scene.published import STICKINESS
 

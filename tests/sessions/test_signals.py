@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from sessions.strokes import filters as signals
+from sessions.strokes import forces as signals
 
 
 @pytest.fixture(params=["compiled", "by the front door"])
@@ -33,7 +33,7 @@ def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included():
 
 
 def test_a_session_is_analysed_without_waiting_for_the_whole_of_scipys_signals():
-    use = "import sys, numpy as np; from sessions.strokes.filters import low_pass, peaks; "
+    use = "import sys, numpy as np; from sessions.strokes.forces import low_pass, peaks; "
     use += "low_pass(np.ones((20, 1)), 20.0, 200.0, 3); peaks(np.ones(3)); "
     done = subprocess.run(
         [sys.executable, "-c", use + "print('scipy.signal' in sys.modules, 'scipy.stats' in sys.modules)"],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_strokes import N, T, analysed, block, felt, stroke, trapezium, wrench
 
-from sessions.strokes.break_away import Climb
+from sessions.strokes.stick import Climb
 
 
 def climbing(ratio, slip):

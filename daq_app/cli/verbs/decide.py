@@ -13,7 +13,7 @@ from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number
 from sessions.plan.study import check_code
 from sessions.recording import Recording
-from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.recording.derived import gain_error_set
 from sessions.strokes import Analysis, Stroke, analyse
 from sessions.strokes.decision_preview import preview, with_present
 from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read

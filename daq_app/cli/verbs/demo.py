@@ -54,8 +54,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     analysis = analyse_session(recording, console)
     prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, variants="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
-    from sessions.report import findings, score_table
+    from sessions.report import findings
     from sessions.report.html import plates, write_figures, write_report
+    from sessions.statistics.scores import score_table
 
     console.progress(0.9, "writing the report")
     scores = [score_table(Recording.open(folder)) for folder in study.scored]

@@ -17,8 +17,7 @@ from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
 from sessions.recording.derived import store_page
-from sessions.recording.unblinding import revealed
-from sessions.recording.visits import score_visits
+from sessions.recording.visits import revealed, score_visits
 from sessions.report import Further
 from sessions.report.predictions import afferent_facts
 from sessions.statistics.multiverse import trial_paths
@@ -75,7 +74,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
         afferent = usual_settings(options.quantity)
     prediction = predict_session(recording, analysis, console, _prediction_options(recording, options), afferent)
-    from sessions.report import findings, score_table
+    from sessions.report import findings
+    from sessions.statistics.scores import score_table
 
     further = _further(recording, prediction, afferent, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)

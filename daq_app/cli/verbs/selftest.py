@@ -11,7 +11,7 @@ from pathlib import Path
 
 from daq_app.console import DONE, FLAWED, Console
 from daq_app.recorder.selftest import SelfTestFailed, selftest
-from sessions.recording.certificate import write_certificate
+from sessions.recording.provenance import write_certificate
 from sessions.recording.storage_safety import unsafe
 
 EXAMPLE = "daq-app selftest --out recordings"

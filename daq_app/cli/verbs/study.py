@@ -31,12 +31,11 @@ from sessions.file_access import read_limited
 from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
-from sessions.statistics.pooling.exclusions import exclusions_in
 from sessions.statistics.pooling.findings import UNITS, StudyFindings
 from sessions.statistics.pooling.ground_truth import checked_planted
 from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import VisitOptions
-from sessions.strokes.contact_area import FIXED
+from sessions.statistics.pooling.visit import VisitOptions, exclusions_in
+from sessions.strokes.friction import FIXED
 
 EXAMPLE = "daq-app study recordings --out results"
 PLANTED = "planted.json"
@@ -135,9 +134,8 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
-    from sessions.report.html import swap_in
+    from sessions.report.html import study_page, swap_in
     from sessions.report.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, rivals_csv, trials_csv
-    from sessions.report.study_page import study_page
 
     files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
     swap_in(files["page"], study_page(study, name))

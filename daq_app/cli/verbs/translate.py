@@ -19,7 +19,7 @@ from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translati
 from sessions.plan.protocols.protocol import Protocol
 from sessions.prediction import QUANTITIES
 from sessions.recording import RecordingError
-from sessions.report.responses import shown_response
+from sessions.report.wording import shown_response
 from sessions.toml_file import NotAllowed, toml_text
 from solver.quantities import FIELDS
 

@@ -11,14 +11,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from daq_app.console import DONE, FLAWED, Console
-from sessions.plan.blinding import Key
-from sessions.plan.study import StudyError, check_code
+from sessions.plan.study import Key, StudyError, check_code
 from sessions.plan.study_file import is_study, note, open_study, study_key
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import RECORDED, load_derived, store_derived
 from sessions.recording.manifest import is_sealed
-from sessions.recording.unblinding import UNBLINDING
-from sessions.recording.visits import sessions_of
+from sessions.recording.visits import UNBLINDING, sessions_of
 
 EXAMPLE = "daq-app unblind studies/friction --by E02"
 

@@ -11,7 +11,7 @@ from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
-from sessions.recording.calibration_uncertainty import GAIN_ERROR, gain_error_set
+from sessions.recording.derived import GAIN_ERROR, gain_error_set
 from sessions.strokes.decisions import DECISIONS, read
 from sessions.strokes.doubtful_readings import doubtful_readings
 from sessions.toml_file import SettingsError

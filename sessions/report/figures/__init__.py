@@ -3,16 +3,23 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from sessions.report import Report, StrokeFinding
+from sessions.report.contents import Report, StrokeFinding
+from sessions.report.figures.courses import (
+    MU,
+    NORMAL,
+    SPEED,
+    TANGENTIAL,
+    StrokeQuantity,
+    course_panel,
+    response_panel,
+    stroke_panel,
+)
 from sessions.report.figures.finger import common_levels, finger_panels
 from sessions.report.figures.multiverse import CAPTION, paths_panel
-from sessions.report.figures.recording import course_panel
 from sessions.report.figures.relation import relation_panel
-from sessions.report.figures.responses import response_panel
 from sessions.report.figures.scores import score_panel
-from sessions.report.figures.strokes import MU, NORMAL, SPEED, TANGENTIAL, StrokeQuantity, stroke_panel
 from sessions.report.figures.style import Panel, Plate, look
-from sessions.report.responses import shown_response
+from sessions.report.wording import shown_response
 
 __all__ = ["Panel", "Plate", "picture", "plates"]
 

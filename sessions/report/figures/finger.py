@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.tri import Triangulation, TriContourSet
 
-from sessions.report import Field
+from sessions.report.contents import Field
 from sessions.report.figures.style import GREY, INK, PALE, Panel, Sheet, sheet, svg
 
 # Perceptually uniform, darker for more, in the same order in grey; its black end is left to the lines.

@@ -6,12 +6,10 @@
 import math
 from collections.abc import Sequence
 
-from sessions.report import Experiment, PredictionFinding
-from sessions.report.contents import Numbers
+from sessions.report.contents import Experiment, Numbers, PredictionFinding
 from sessions.report.figures.style import GREEN, GREY, Panel, Sheet, sheet, svg
-from sessions.report.responses import ShownResponse, shown_response
 from sessions.report.tables.rivals import rival_words
-from sessions.report.wording import correlation, spread_share
+from sessions.report.wording import ShownResponse, correlation, shown_response, spread_share
 from sessions.statistics.scores import MeanScore, Relation
 
 

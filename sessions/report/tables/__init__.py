@@ -1,9 +1,8 @@
 """The tables of a report: cells as text, and for every number that is missing the reason."""
 
 from sessions.prediction import BY_NAME
-from sessions.report import Report
+from sessions.report.contents import Report
 from sessions.report.tables.cells import Cell, Column, Group, Table, sections_of
-from sessions.report.tables.multiverse import paths_table
 from sessions.report.tables.predictions import (
     afferent_table,
     beside_forces_table,
@@ -12,9 +11,9 @@ from sessions.report.tables.predictions import (
     force_table,
     prediction_table,
 )
-from sessions.report.tables.psychometric import compared_with_standard, psychometric_table
 from sessions.report.tables.rivals import responses_table, rivals_table
-from sessions.report.tables.scores import answer_tables, relation_table, score_table
+from sessions.report.tables.scales import compared_with_standard, psychometric_table
+from sessions.report.tables.scores import answer_tables, paths_table, relation_table, score_table
 from sessions.report.tables.strokes import course_table, planted_table, stroke_table
 
 __all__ = ["Cell", "Column", "Group", "Table", "tables"]

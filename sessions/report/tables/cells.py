@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from sessions.report import Report
+from sessions.report.contents import Report
 from sessions.report.wording import NONE, between
 
 Thing = TypeVar("Thing")

@@ -4,13 +4,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 from sessions.prediction import SED
-from sessions.prediction.sed_interval import Ends, SedInterval
-from sessions.prediction.variants import Alternative
-from sessions.report import PredictionFinding, Report
-from sessions.report.responses import ShownResponse, shown_response
+from sessions.prediction.stored import Alternative, Ends, SedInterval
+from sessions.report.contents import PredictionFinding, Report
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, grouped, table
 from sessions.report.tables.strokes import model_mu
-from sessions.report.wording import direction, places, sed, significant, tau, with_error
+from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
 
 
 def prediction_table(report: Report) -> Table | None:

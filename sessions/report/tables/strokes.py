@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from sessions.report import Planted, PredictionFinding, Report, StrokeFinding
+from sessions.report.contents import Planted, PredictionFinding, Report, StrokeFinding
 from sessions.report.tables.cells import Cell, Notes, Row, Table, grouped, table
 from sessions.report.wording import NONE, places, signed, tau
 

@@ -5,17 +5,22 @@ from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
 from sessions.report.predictions import model_in_short
-from sessions.report.responses import shown_response
 from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
-from sessions.report.tables.multiverse import paths_table
-from sessions.report.tables.psychometric import compared_in_study, psychometric_table
 from sessions.report.tables.rivals import responses_table, rivals_table
-from sessions.report.tables.scales import latent_table, scales_table
-from sessions.report.tables.scores import rank_interval, score_cells, spread_cell
-from sessions.report.tables.study_models import flaws_table, models_table, planted_table
-from sessions.report.tables.study_trials import trials_table
-from sessions.report.wording import NONE, correlation, digits, p_value, places, significant, three_figures
-from sessions.statistics.pooling.averages import Average
+from sessions.report.tables.scales import compared_in_study, latent_table, psychometric_table, scales_table
+from sessions.report.tables.scores import paths_table, rank_interval, score_cells, spread_cell
+from sessions.report.tables.study_models import flaws_table, models_table, planted_table, trials_table
+from sessions.report.wording import (
+    NONE,
+    correlation,
+    digits,
+    p_value,
+    places,
+    shown_response,
+    significant,
+    three_figures,
+)
+from sessions.statistics.pooling.answers import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.visit import Visit
 from sessions.statistics.scores import MeanScore, Relation

@@ -7,10 +7,8 @@ from typing import Any
 from sessions.prediction import SED
 from sessions.statistics.mixed_model import MixedModel
 from sessions.statistics.multiverse import PathFinding
-from sessions.statistics.pooling.answers import ConstantStimuli
-from sessions.statistics.pooling.averages import Average, Estimates
-from sessions.statistics.pooling.exclusions import Exclusion
-from sessions.statistics.pooling.visit import Visit, VisitOptions
+from sessions.statistics.pooling.answers import Average, ConstantStimuli, Estimates
+from sessions.statistics.pooling.visit import Exclusion, Visit, VisitOptions
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scales.latent import Judgement
 from sessions.statistics.scales.paired import Consistence, Ends, PairedScale

@@ -9,12 +9,19 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction import SED, Quantity, shown_unit
-from sessions.statistics.adjusted_means import surface_means
 from sessions.statistics.mixed_model import MixedModel, mixed_model
 from sessions.statistics.multiverse import PathTrial, path_findings
-from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent, latent_scales
-from sessions.statistics.pooling.averages import Average, average, averages, by_subject, estimates
-from sessions.statistics.pooling.exclusions import Exclusion, decided
+from sessions.statistics.pooling.answers import (
+    Average,
+    average,
+    averages,
+    by_subject,
+    choices,
+    constant_stimuli,
+    estimates,
+    exponent,
+    latent_scales,
+)
 from sessions.statistics.pooling.findings import (
     CARRY_OVER,
     DRIFT,
@@ -26,7 +33,7 @@ from sessions.statistics.pooling.findings import (
     SurfaceMean,
 )
 from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
-from sessions.statistics.pooling.visit import TrialRow, Visit, VisitOptions, scores_of
+from sessions.statistics.pooling.visit import Exclusion, TrialRow, Visit, VisitOptions, decided, scores_of
 from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
 from sessions.statistics.scales.paired import MODELS, consistence, paired_scale
 from sessions.statistics.scores import (
@@ -36,6 +43,7 @@ from sessions.statistics.scores import (
     relation,
     reversed_subjects,
     score_matrix,
+    surface_means,
 )
 from sessions.statistics.variance_components import Spread, spreads
 from sessions.statistics.within_subjects import (

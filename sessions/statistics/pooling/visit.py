@@ -1,7 +1,11 @@
-"""One session's contribution to a study: a row a trial, with scores, friction and prediction side by side."""
+"""One session's contribution to a study: a row a trial with scores, friction and prediction, and who is left out.
+
+Decisions to leave a subject out stand in a file that people keep beside the sessions.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
@@ -12,15 +16,53 @@ from sessions.prediction.model_facts import model_facts
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
-from sessions.recording.calibration_uncertainty import gain_error_set
+from sessions.recording.derived import gain_error_set
 from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
-from sessions.recording.unblinding import revealed
+from sessions.recording.visits import revealed
 from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
-from sessions.strokes.contact_area import FIXED, AreaLaw
+from sessions.strokes.friction import FIXED, AreaLaw
+from sessions.toml_file import NotAllowed, load_toml
+
+EXCLUSIONS = "exclusions.toml"
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """One decision: every visit of a subject stays out, or its scores and strokes on one descriptor."""
+
+    subject: str
+    why: str
+    who: str
+    descriptor: str = ""  # "" for all
+
+    def __post_init__(self) -> None:
+        """Refuse a decision that nobody made or nobody can follow."""
+        for key, allowed in (("subject", "a subject's code"), ("why", "the reason"), ("who", "who decided it")):
+            if not getattr(self, key).strip():
+                raise NotAllowed(key, getattr(self, key), f"{allowed}, not empty")
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusions:
+    """The file."""
+
+    exclude: tuple[Exclusion, ...] = ()
+
+
+def exclusions_in(folder: Path) -> tuple[Exclusion, ...]:
+    """Return the decisions kept in a study's folder, none where there is no file. Raises SettingsError."""
+    path = folder / EXCLUSIONS
+    return load_toml(path, Exclusions).exclude if path.is_file() else ()
+
+
+def decided(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) -> Exclusion | None:
+    """Return the decision that leaves a subject's trials on a descriptor out, None where there is none."""
+    return next((e for e in exclusions if e.subject == subject and e.descriptor in ("", descriptor)), None)
+
 
 FORM = 11  # raised when a row holds something else: what was stored before is then computed anew
 

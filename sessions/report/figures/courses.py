@@ -1,0 +1,240 @@
+"""What runs in time: forces of a recording, forces, friction and speed of its strokes, and predicted responses."""
+
+# pyright: reportUnknownMemberType=false
+# matplotlib does not type the keyword arguments it passes on.
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from matplotlib.axes import Axes
+
+from sessions.report.contents import Course, PredictionFinding, StrokeFinding, Trace
+from sessions.report.figures.style import (
+    GREEN,
+    GREY,
+    INK,
+    PALE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+    Label,
+    Panel,
+    Sheet,
+    label_right,
+    shades,
+    sheet,
+    svg,
+)
+
+
+def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulated: bool) -> Panel:
+    """Return both forces against time; strokes are grey bands with their number."""
+    drawn = sheet(672, 270, (1.0, 1.0), share_x=True)
+    upper, lower = drawn.axes
+    first, last = (course.time[0], course.time[-1]) if course.time else (0.0, 1.0)
+    for axes, values, colour, name in (
+        (upper, course.normal, SKY, "normal force"),
+        (lower, course.tangential, VERMILLION, "tangential force"),
+    ):
+        for stroke in strokes:
+            begin, end = first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
+            text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
+            axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
+        axes.plot(course.time, values, color=colour, linewidth=0.8)
+        axes.axhline(0.0, color=GREY, linewidth=0.4)
+        axes.set_ylabel(f"{name}\n[N]")
+        axes.set_xlim(first, last if last > first else first + 1.0)
+        axes.margins(y=0.08)
+    upper.tick_params(labelbottom=False)
+    lower.set_xlabel("time on the device's clock [s]")
+    for stroke, middle in _numbered(strokes, first, last):
+        upper.annotate(
+            str(stroke.number),
+            xy=(middle, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            color=INK,
+            fontsize=7.5,
+        )
+    name, title = "course", "Normal and tangential force over the whole recording"
+    header = ("time [s]", "normal force [N]", "tangential force [N]")
+    rows = tuple(zip(course.time, course.normal, course.tangential, strict=True))
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+def _numbered(strokes: tuple[StrokeFinding, ...], first: float, last: float) -> list[tuple[StrokeFinding, float]]:
+    """Return the strokes whose number has room, each with its middle [s]."""
+    room = 0.025 * (last - first)
+    kept: list[tuple[StrokeFinding, float]] = []
+    for stroke in strokes:
+        begin, end = first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
+        middle = (begin + end) / 2
+        if not kept or middle - kept[-1][1] >= room:
+            kept.append((stroke, middle))
+    return kept
+
+
+MOST_LABELLED = 12  # more curves in one picture cannot be told apart by labels
+
+
+class StrokeQuantity(NamedTuple):
+    """What is drawn in the course of strokes."""
+
+    name: str  # of its figure
+    values: str  # its name in a trace, and in the title
+    level: str  # a stroke's number over the steady window
+    column: str  # with its unit
+    axis: str
+    word: str  # before a level
+    colour: str
+
+
+NORMAL = StrokeQuantity("normal-force", "normal", "normal_force", "N [N]", "normal force N [N]", "N", SKY)
+TANGENTIAL = StrokeQuantity(
+    "tangential-force", "tangential", "tangential_force", "T [N]", "tangential force T [N]", "T", VERMILLION
+)
+MU = StrokeQuantity("friction", "mu", "mu_dynamic", "mu [-]", "µ = T / N [–]", "µ", PURPLE)
+SPEED = StrokeQuantity(
+    "speed", "speed", "speed", "speed [mm/s]", "speed of the centre of pressure [mm/s]", "speed", GREY
+)
+
+
+def stroke_panel(
+    of: StrokeQuantity, strokes: Sequence[StrokeFinding], experiment: str, *, simulated: bool
+) -> Panel | None:
+    """Return a quantity of one experiment's strokes from contact onset on; None where nothing can be drawn.
+
+    Strokes whose speed was refused are left out of speeds.
+    """
+    if of is SPEED:
+        strokes = [stroke for stroke in strokes if stroke.speed is not None]
+    drawn = sheet(328, 290)
+    (axes,) = drawn.axes
+    axes.set_title(experiment)
+    axes.set_ylabel(of.axis)
+    rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
+    if not rows:
+        return None
+    if of is SPEED:
+        fastest = max(stroke.speed for stroke in strokes if stroke.speed is not None and stroke.trace is not None)
+        low, high = axes.get_ylim()
+        axes.set_ylim(max(low, -0.3 * fastest), min(high, 2.0 * fastest))
+    name = f"{of.name}-{experiment}" if experiment else of.name
+    title = f"{of.values} against time, {experiment or 'all strokes'}"
+    header = ("stroke", "index", "time since contact [s]", of.column, "in steady window")
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+Row = tuple[int, int | None, float, float, int]
+
+
+def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding, Trace]]) -> tuple[Row, ...]:
+    """Draw curves thin, thick in their steady windows, labelled at their steady level; return what was drawn."""
+    (axes,) = drawn.axes
+    ordered = sorted(curves, key=lambda c: (c[0].index is None, c[0].index or 0, c[0].number))
+    rows: list[Row] = []
+    labels: list[Label] = []
+    for (stroke, trace), shade in zip(ordered, shades(of.colour, max(len(ordered), 1)), strict=False):
+        values: Sequence[float | None] = getattr(trace, of.values)
+        inside = [in_window(stroke, t) for t in trace.time]
+        y = [math.nan if v is None else v for v in values]
+        level: float | None = getattr(stroke, of.level)
+        text = _name(stroke) + (f", {of.word} {level:.3g} over the steady window" if level is not None else "")
+        style = "solid" if level is not None else (0, (3, 2))
+        axes.plot(trace.time, y, color=shade, linewidth=0.7, linestyle=style, gid=drawn.note(text))
+        steady = [v if within else math.nan for v, within in zip(y, inside, strict=True)]
+        axes.plot(trace.time, steady, color=shade, linewidth=2.2, solid_capstyle="butt")
+        drawn_values = [
+            (t, v, within) for t, v, within in zip(trace.time, values, inside, strict=True) if v is not None
+        ]
+        rows += [(stroke.number, stroke.index, t, v, int(within)) for t, v, within in drawn_values]
+        if drawn_values:
+            at = [(t, v) for t, v, within in drawn_values if within] or [(t, v) for t, v, _ in drawn_values]
+            labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at[-1]))
+    axes.set_xlabel("time since contact onset [s]")
+    axes.set_xlim(0.0, max((t for _, _, t, _, _ in rows), default=1.0))
+    _settle(axes, [v for _, _, _, v, _ in rows])
+    if len(labels) <= MOST_LABELLED:
+        label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
+    return tuple(rows)
+
+
+def in_window(stroke: StrokeFinding, time: float) -> bool:
+    """Say whether an instant [s since the trace's zero] lies in the steady window."""
+    if stroke.steady is None or stroke.trace is None:
+        return False
+    return stroke.steady[0] <= stroke.trace.origin + time <= stroke.steady[1]
+
+
+def _settle(axes: Axes, values: Sequence[float]) -> None:
+    """Fix the limits at all that was drawn, from 0 on where nothing lies below."""
+    if values:
+        low, high = min(*values, 0.0), max(values)
+        axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
+
+
+def _name(stroke: StrokeFinding) -> str:
+    return f"stroke {stroke.number}" + (f", index {stroke.index}" if stroke.index is not None else "")
+
+
+PRESSED = 1.0  # the model presses for 1 s, then slides [s]
+
+
+def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simulated: bool) -> Panel | None:
+    """Return SED against time: the whole course above, sliding alone on its own scale below."""
+    courses = sorted(
+        ((p, p.history) for p in predictions if p.history is not None),
+        key=lambda c: (c[0].index is None, c[0].index or 0, c[0].stroke or 0),
+    )
+    if not courses:
+        return None
+    drawn = sheet(328, 420, (1.0, 1.25))
+    whole, sliding = drawn.axes
+    labels: list[Label] = []
+    rows: list[tuple[int | None, int | None, float, float]] = []
+    seen: list[float] = []
+    kind = "stroke" if courses[0][0].index is None else "index"
+    end = max(history.time[-1] for _, history in courses)
+    for (prediction, history), shade in zip(courses, shades(GREEN, len(courses)), strict=True):
+        kilopascal = [1e3 * value for value in history.sed]
+        label = str(prediction.stroke if prediction.index is None else prediction.index)
+        text = f"{kind} {label}: {kilopascal[-1]:.3f} kPa in the end"
+        for axes in drawn.axes:
+            axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=drawn.note(text))
+            if history.time[-1] < end:  # settled: it stays
+                axes.plot(
+                    [history.time[-1], end], [kilopascal[-1]] * 2, color=shade, linewidth=0.8, linestyle=(0, (2, 2))
+                )
+        labels.append(Label(label, end, kilopascal[-1]))
+        rows += [(prediction.trial, prediction.index, t, v) for t, v in zip(history.time, history.sed, strict=True)]
+        seen += [v for t, v in zip(history.time, kilopascal, strict=True) if t >= PRESSED]
+    whole.axvline(PRESSED, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
+    whole.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
+    for text, offset, side in (("pressing", -4, "right"), ("sliding", 4, "left")):
+        whole.annotate(
+            text,
+            xy=(PRESSED, 0.98),
+            xycoords=("data", "axes fraction"),
+            xytext=(offset, 0),
+            textcoords="offset points",
+            ha=side,
+            va="top",
+            color=GREY,
+        )
+    whole.set_title(name)
+    sliding.set_xlim(PRESSED, end)
+    margin = 0.06 * (max(seen) - min(seen) or max(seen))
+    sliding.set_ylim(min(seen) - margin, max(seen) + margin)
+    whole.set_xlim(0.0, end)
+    whole.set_ylabel("SED [kPa]")
+    sliding.set_ylabel("SED while sliding [kPa]")
+    sliding.set_xlabel("time [s]")
+    label_right(drawn, sliding, labels, kind)
+    title = f"Predicted response in time, {name or 'all strokes'}"
+    name = f"response-{name}" if name else "response"
+    header = ("trial", "index", "time [s]", "SED [MPa]")
+    return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, tuple(rows))
