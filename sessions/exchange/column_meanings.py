@@ -4,10 +4,12 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from sessions.prediction import Scene
+from sessions.prediction import Scene, TrialPrediction
+from sessions.prediction.stored import Alternative, Variant
 from sessions.recording.log import OUTCOMES
 from sessions.strokes.bootstrap import NUMBERS
-from sessions.strokes.stroke import meanings
+from sessions.strokes.friction import FrictionParameters
+from sessions.strokes.stroke import Stroke, meanings
 from sessions.toml_file import from_table, toml_text
 
 Cell = str | int | float | None
@@ -75,34 +77,79 @@ TRIAL = {
     **{f"zero_{axis}": (unit, "of the wrench in the take's unloaded stretch") for axis, unit in AXES},
 }
 
-_MEASURED = meanings()
-_FURTHER: Mapping[str, Columns] = {  # further columns of a stroke, by the column they follow
+_Further = Mapping[str, Columns]  # further columns of a record, by the column they follow
+
+
+def _columns(record: type, further: _Further) -> Columns:
+    """Return the meanings that the fields of a record have, and further columns behind some of them."""
+    own = meanings(record).items()
+    return {name: words for one, meaning in own for name, words in {one: meaning, **further.get(one, {})}.items()}
+
+
+_INTERVAL_BY = "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval"
+_FORCE_ERRORS = {
+    "normal_force_error": ("", "relative, estimated by the solver, of normal_force"),
+    "tangential_force_error": ("", "relative, estimated by the solver, of tangential_force"),
+    "normal_force_interval": ("N", "95 % interval of normal_force that the uncertainty of friction makes"),
+    "tangential_force_interval": ("N", "95 % interval of tangential_force that the uncertainty of friction makes"),
+}
+_OF_STROKE: _Further = {
     "direction_from": {"direction_agrees": ("", "share of bootstrap repeats with that direction")},
     "flaws": {
-        **{f"{name}_bootstrap": (_MEASURED[name].unit, f"95 % bootstrap interval of {name}") for name in NUMBERS},
+        **{
+            f"{name}_bootstrap": (meanings(Stroke)[name].unit, f"95 % bootstrap interval of {name}") for name in NUMBERS
+        },
         "gain_error": ("", "calibration: standard uncertainty of each axis' gain, which the bootstrap intervals hold"),
         "gain_error_origin": ("", "of that: set, or assumed where nobody stated it"),
     },
 }
-STROKE: Columns = {
-    name: meaning for own, words in _MEASURED.items() for name, meaning in {own: words, **_FURTHER.get(own, {})}.items()
+_OF_FRICTION: _Further = {
+    "mu": {
+        "mu_interval": ("", "95 % interval of that very number"),
+        "mu_interval_by": ("", "the kind of that interval, and of which number of strokes it is"),
+    },
+    "tau_max": {
+        "tau_max_interval": ("MPa", "95 % interval of it; the contact area is taken as given"),
+        "tau_max_interval_by": ("", "the kind of that interval"),
+    },
 }
-
-FRICTION = {
-    "trial": ("", "number of the trial"),
-    "stroke": ("", "position of the stroke, from 0"),
-    "mu": ("", "coefficient of friction the model is given"),
-    "mu_interval": ("", "95 % interval of that very number"),
-    "mu_interval_by": ("", "the kind of that interval, and of which number of strokes it is"),
-    "tau_max": ("MPa", "traction bound the model is given"),
-    "tau_max_interval": ("MPa", "95 % interval of it; the contact area is taken as given"),
-    "tau_max_interval_by": ("", "the kind of that interval"),
-    "contact_area": ("mm2", "that tau_max was told for"),
-    "speed": ("mm/s", "of the stroke"),
-    "direction": ("", "+1 proximal to distal, -1 back, as measured"),
-    "rule": ("", "which T/N mu is"),
-    "flaws": ("", "names of what is wrong with the stroke"),
+_OF_ALTERNATIVE: _Further = {
+    "tangential_force": {
+        **_FORCE_ERRORS,
+        "indentation_error": ("", "relative, estimated by the solver, of a depth that was found"),
+        "indentation_interval": ("mm", "95 % interval that friction, and the force, make of a depth that was found"),
+    },
+    "reason": {
+        "doubt": ("", "why the numbers are not to be believed: the model was driven beyond its range"),
+        "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
+        "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
+        "sed_interval_by": ("", _INTERVAL_BY),
+    },
 }
+_OF_PREDICTION: _Further = {
+    "block": {
+        "stimulus_descriptor": ("", "what was judged"),
+        "stimulus_index": ("", "the maker's number of the stimulus"),
+        "stimulus_code": ("", "label on the stimulus"),
+    },
+    "sed": {
+        "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
+        "sed_interval_by": ("", _INTERVAL_BY),
+        "opposite_sed_interval": ("MPa", "likewise of opposite_sed"),
+        "opposite_sed_interval_by": ("", "likewise"),
+    },
+    "measured_tangential": _FORCE_ERRORS,
+    "matching_depth": {
+        "matching_depth_error": ("", "relative, estimated by the solver; none where found on a rough mesh"),
+        "matching_depth_interval": ("mm", "95 % interval that friction and the measured force make of it"),
+    },
+    "opposite_sed": {"opposite_error": ("", "relative, of opposite_sed")},
+    "wall_s": PREDICTED_WITH,
+}
+STROKE = _columns(Stroke, _OF_STROKE)
+FRICTION = _columns(FrictionParameters, _OF_FRICTION)
+ALTERNATIVE = {"trial": ("", "number of the trial"), **_columns(Variant, {}), **_columns(Alternative, _OF_ALTERNATIVE)}
+PREDICTION = _columns(TrialPrediction, _OF_PREDICTION)
 
 FLAW = {
     "flaw": ("", "its name"),
@@ -141,37 +188,6 @@ POSITION = {
     "position": ("", "on the line, 0 to 100"),
 }
 
-FORCES = {
-    "normal_force_error": ("", "relative, estimated by the solver, of normal_force"),
-    "tangential_force_error": ("", "relative, estimated by the solver, of tangential_force"),
-    "normal_force_interval": ("N", "95 % interval of normal_force that the uncertainty of friction makes"),
-    "tangential_force_interval": ("N", "95 % interval of tangential_force that the uncertainty of friction makes"),
-}
-
-ALTERNATIVE = {
-    "trial": ("", "number of the trial"),
-    "kinematics": ("", "small or finite strain"),
-    "tau_reading": ("", "of tau_max: computed, or as-printed (a hundredth)"),
-    "driven": ("", "by depth, by force (measured), or by depth the other way"),
-    "tau_max": ("MPa", "traction bound the model was given"),
-    "indentation": ("mm", "given, or found under the force"),
-    "sed": ("MPa", "strain-energy density averaged over the ending"),
-    "error_estimate": ("", "relative, of sed"),
-    "normal_force": ("N", "the model's, times the finger's width"),
-    "tangential_force": ("N", "likewise"),
-    **FORCES,
-    "indentation_error": ("", "relative, estimated by the solver, of a depth that was found"),
-    "indentation_interval": ("mm", "95 % interval that friction, and the force, make of a depth that was found"),
-    "reason": ("", "why there is no number"),
-    "doubt": ("", "why the numbers are not to be believed: the model was driven beyond its range"),
-    "traction": ("MPa", "greatest friction traction on the skin; a tau_max above it bounds nothing"),
-    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction, and of a driving force, makes"),
-    "sed_interval_by": (
-        "",
-        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
-    ),
-}
-
 RESPONSE = {
     "trial": ("", "number of the trial"),
     "quantity": ("", "its name in files and options"),
@@ -179,43 +195,4 @@ RESPONSE = {
     "error": ("", "estimated by the solver, in the same unit"),
     "unit": ("", "of value and error; - for a strain"),
     "meaning": ("", "what the quantity is"),
-}
-
-PREDICTION = {
-    "trial": ("", "number of the trial"),
-    "stroke": ("", "position of the stroke it was made for, from 0"),
-    "block": ("", "name of the trial's block"),
-    "stimulus_descriptor": ("", "what was judged"),
-    "stimulus_index": ("", "the maker's number of the stimulus"),
-    "stimulus_code": ("", "label on the stimulus"),
-    "mu": ("", "coefficient of friction the model was given"),
-    "mu_rule": ("", "which T/N that is"),
-    "tau_max": ("MPa", "traction bound the model was given"),
-    "indentation": ("mm", "of the model's finger"),
-    "direction": ("", "+1 proximal to distal, -1 back"),
-    "speed": ("mm/s", "of the slide"),
-    "sed": ("MPa", "strain-energy density averaged over the ending (mJ/mm3)"),
-    "sed_interval": ("MPa", "95 % interval of sed that the uncertainty of friction makes, where it was asked for"),
-    "sed_interval_by": (
-        "",
-        "derivatives (by the converged tangent) or sampling (of draws), or why there is no interval",
-    ),
-    "opposite_sed_interval": ("MPa", "likewise of opposite_sed"),
-    "opposite_sed_interval_by": ("", "likewise"),
-    "error_estimate": ("", "relative, of sed"),
-    "normal_per_mm": ("N/mm", "the model's normal force"),
-    "tangential_per_mm": ("N/mm", "the model's tangential force"),
-    "normal_force": ("N", "the same times the finger's width"),
-    "tangential_force": ("N", "the same times the finger's width"),
-    "measured_normal": ("N", "mean over the steady window"),
-    "measured_tangential": ("N", "mean over the steady window"),
-    **FORCES,
-    "matching_depth": ("mm", "indentation at which the model presses as was measured"),
-    "matching_depth_error": ("", "relative, estimated by the solver; none where found on a rough mesh"),
-    "matching_depth_interval": ("mm", "95 % interval that friction and the measured force make of it"),
-    "opposite_sed": ("MPa", "slid the other way"),
-    "opposite_error": ("", "relative, of opposite_sed"),
-    "wall_s": ("", "time the solve took, in s"),
-    **PREDICTED_WITH,
-    "reasons": ("", "for each number left out, why"),
 }

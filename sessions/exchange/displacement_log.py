@@ -1,30 +1,17 @@
 """The log of a stage, or of whatever else followed the bone, beside a recording."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sessions.exchange.csv_text import ImportRefused, cell_text, number_in, records
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
-
-Array = NDArray[np.float64]
+from sessions.prediction.press_curves import DisplacementLog
 
 DISPLACEMENT = "displacement_mm"
 WIDTH = "contact_width_mm"
 CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export calls them
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DisplacementLog:
-    """Where a stage stood; n rows in order of time."""
-
-    clock: str  # one of CLOCKS: what `at` counts
-    at: Array  # (n,) [s], [ns] or readings, growing
-    displacement: Array  # (n,) positive into the finger, from anywhere [mm]
-    width: Array  # (n,) of the contact along the finger [mm]; nan where nobody measured it
 
 
 def displacement_log(path: Path) -> DisplacementLog:

@@ -106,10 +106,7 @@ def _force_per_mm(prepared: Prepared) -> float | None:
 
 
 def _filled(
-    prepared: Prepared,
-    answer: Prediction | SolveFailure,
-    back: Prediction | SolveFailure,
-    depth: float | None,
+    prepared: Prepared, answer: Prediction | SolveFailure, back: Prediction | SolveFailure, depth: float | None
 ) -> TrialPrediction:
     """Return the row with what the solver found, or with the reason for what it did not."""
     row, scene = prepared.row, prepared.scene

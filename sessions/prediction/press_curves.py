@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,28 +20,14 @@ SHORTEST_HOLD = 0.5  # ... for so long: what shortest press the analysis knows [
 LEAST_TRAVEL = 0.1  # [mm]; less is no press, or the log is none of the bone
 
 
-class StageLog(Protocol):
+@dataclass(frozen=True, slots=True, eq=False)
+class DisplacementLog:
     """Where the bone or the stage stood; n rows in order of time."""
 
-    @property
-    def clock(self) -> str:
-        """What `at` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings."""
-        ...
-
-    @property
-    def at(self) -> Array:
-        """Instants (n,), growing."""
-        ...
-
-    @property
-    def displacement(self) -> Array:
-        """Displacement (n,) [mm], positive into the finger."""
-        ...
-
-    @property
-    def width(self) -> Array:
-        """Length of the contact along the finger (n,) [mm], nan where nobody measured it."""
-        ...
+    clock: str  # what `at` counts: "time_s" [s], "received_ns" [ns] or "sequence" of the readings
+    at: Array  # (n,) growing
+    displacement: Array  # (n,) positive into the finger, from anywhere [mm]
+    width: Array  # (n,) of the contact along the finger [mm]; nan where nobody measured it
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +40,7 @@ class PressCurves:
     left_out: tuple[str, ...]  # a sentence each
 
 
-def press_curves(recording: Recording, log: StageLog, settings: AnalysisSettings) -> PressCurves:
+def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisSettings) -> PressCurves:
     """Return the loading part of each press without a slide, in trials of every phase."""
     if recording.info is None:
         return PressCurves((), (), (), ("No forces were recorded.",))
@@ -95,7 +80,7 @@ def _holds(stroke: Stroke, instant: float) -> bool:
     return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
 
 
-def _loading(stroke: Stroke, when: Array, log: StageLog) -> LoadingCurve | str:
+def _loading(stroke: Stroke, when: Array, log: DisplacementLog) -> LoadingCurve | str:
     """Return the loading of a press whose log has its rows at instants `when` (n,) [s]; or why there is none."""
     curve = stroke.curve
     assert curve is not None

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
 import msgspec
 
@@ -11,6 +11,7 @@ from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.strokes.decisions import Decision
 from sessions.strokes.friction import FIXED, AreaLaw
+from sessions.strokes.stroke import Meaning
 from sessions.toml_file import from_table
 from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin
@@ -47,9 +48,11 @@ Driven = Literal["depth", "force", "other way"]
 class Variant:
     """How a trial is predicted."""
 
-    kinematics: Literal["small", "finite"]
-    tau_reading: Literal["computed", "as-printed"]
-    driven: Driven  # by the block's depth; by the force measured; by the depth, slid the other way
+    kinematics: Annotated[Literal["small", "finite"], Meaning("", "small or finite strain")]
+    tau_reading: Annotated[
+        Literal["computed", "as-printed"], Meaning("", "of tau_max: computed, or as-printed (a hundredth)")
+    ]
+    driven: Annotated[Driven, Meaning("", "by depth, by force (measured), or by depth the other way")]
 
     @property
     def sentence(self) -> str:
@@ -86,13 +89,13 @@ class Alternative:
     """The settled state of a trial in one variant. A number is None where `reason` says why."""
 
     variant: Variant
-    tau_max: float | None  # that the model got [MPa]
-    indentation: float | None  # given, or found under the force [mm]
-    sed: float | None  # averaged over the ending [MPa]
-    error_estimate: float | None  # relative, of sed
-    normal_force: float | None  # of the whole finger [N]
-    tangential_force: float | None  # [N]
-    reason: str = ""
+    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model was given")]
+    indentation: Annotated[float | None, Meaning("mm", "given, or found under the force")]
+    sed: Annotated[float | None, Meaning("MPa", "strain-energy density averaged over the ending")]
+    error_estimate: Annotated[float | None, Meaning("", "relative, of sed")]
+    normal_force: Annotated[float | None, Meaning("N", "the model's, times the finger's width")]
+    tangential_force: Annotated[float | None, Meaning("N", "likewise")]
+    reason: Annotated[str, Meaning("", "why there is no number")] = ""
     traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
     interval: SedInterval | None = None  # of the SED, where it was asked for
     normal_force_error: float | None = None  # estimated by the solver, of normal_force, relative [-]; None: given
@@ -130,28 +133,28 @@ class TrialPrediction:
     A number is None where `reasons` says why, under the number's name.
     """
 
-    trial: int | None
-    stroke: int | None  # position in `Analysis.strokes`; None where the trial has none
-    block: str | None
+    trial: Annotated[int | None, Meaning("", "number of the trial")]
+    stroke: Annotated[int | None, Meaning("", "position of the stroke it was made for, from 0")]
+    block: Annotated[str | None, Meaning("", "name of the trial's block")]
     stimulus: Stimulus | None
-    mu: float | None  # that the model got [-]
-    mu_rule: str  # which mu that is
-    tau_max: float | None  # that the model got [MPa]
-    indentation: float | None  # [mm]
-    direction: int | None  # +1 proximal to distal, -1 back; as measured, or else as planned
-    speed: float | None  # [mm/s]
-    sed: float | None  # averaged over the ending [MPa]
-    error_estimate: float | None  # relative, of sed
-    normal_per_mm: float | None  # [N/mm]
-    tangential_per_mm: float | None  # [N/mm]
-    normal_force: float | None  # normal_per_mm times the finger's width [N]
-    tangential_force: float | None  # [N]
-    measured_normal: float | None  # mean over the steady window [N]
-    measured_tangential: float | None  # [N]
-    matching_depth: float | None  # indentation at which the model's normal force is the measured one [mm]
-    opposite_sed: float | None  # at the same depth, slid the other way [MPa]
-    wall_s: float | None  # the solve [s]
-    reasons: Mapping[str, str]
+    mu: Annotated[float | None, Meaning("", "coefficient of friction the model was given")]
+    mu_rule: Annotated[str, Meaning("", "which T/N that is")]
+    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model was given")]
+    indentation: Annotated[float | None, Meaning("mm", "of the model's finger")]
+    direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back")]
+    speed: Annotated[float | None, Meaning("mm/s", "of the slide")]
+    sed: Annotated[float | None, Meaning("MPa", "strain-energy density averaged over the ending (mJ/mm3)")]
+    error_estimate: Annotated[float | None, Meaning("", "relative, of sed")]
+    normal_per_mm: Annotated[float | None, Meaning("N/mm", "the model's normal force")]
+    tangential_per_mm: Annotated[float | None, Meaning("N/mm", "the model's tangential force")]
+    normal_force: Annotated[float | None, Meaning("N", "the same times the finger's width")]
+    tangential_force: Annotated[float | None, Meaning("N", "the same times the finger's width")]
+    measured_normal: Annotated[float | None, Meaning("N", "mean over the steady window")]
+    measured_tangential: Annotated[float | None, Meaning("N", "mean over the steady window")]
+    matching_depth: Annotated[float | None, Meaning("mm", "indentation at which the model presses as was measured")]
+    opposite_sed: Annotated[float | None, Meaning("MPa", "slid the other way")]
+    wall_s: Annotated[float | None, Meaning("", "time the solve took, in s")]
+    reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")]
     prediction: Prediction | None = None  # all that the solver found
     opposite: Prediction | None = None  # that slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for

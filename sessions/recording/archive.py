@@ -13,13 +13,7 @@ from sessions.recording.disk_space import release_reserve
 from sessions.recording.manifest import changed_files, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import fold_log
-from sessions.recording.schema import (
-    DESCRIPTION_FILE,
-    LIVE_FILE,
-    MANIFEST_FILE,
-    SEALED_FILE,
-    RecordingError,
-)
+from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
 from sessions.recording.sealed_copy import differences, write_copy
 
 SEALED = (LIVE_FILE, SEALED_FILE, DESCRIPTION_FILE)

@@ -117,12 +117,7 @@ def _record(trial: Trial, events: Sequence[LoggedEvent]) -> TrialRecord:
 
 ANSWERS = {"scored": "score", "number_given": "number", "chosen": "choice"}
 _ANSWERED: Mapping[Answer, str] = {"line": "scored", "number": "number_given", "choice": "chosen"}
-_OUTCOMES: Mapping[Answer, Outcome] = {
-    "line": "scored",
-    "number": "numbered",
-    "choice": "chosen",
-    "none": "presented",
-}
+_OUTCOMES: Mapping[Answer, Outcome] = {"line": "scored", "number": "numbered", "choice": "chosen", "none": "presented"}
 
 
 def _ended(take: Take, event: LoggedEvent, discarded: str | None) -> Take:

@@ -184,20 +184,18 @@ class SessionWriter:
         Raises RecordingError when it cannot be written.
         """
         self._check()
-        event = LoggedEvent(
-            self._event_count + 1,
-            self.clock.now_ns() if time_ns is None else time_ns,
-            kind,
-            trial,
-            self._readings,
-            dict(data or {}),
-        )
+        instant_ns = self.instant_ns(kind, trial) if time_ns is None else time_ns
+        event = LoggedEvent(self._event_count + 1, instant_ns, kind, trial, self._readings, dict(data or {}))
         json_text(event.data)  # what JSON cannot hold is refused here, before it spoils a commit
         self._events.append(event)
         self._event_count += 1
         if commit:
             self.commit()
         return event
+
+    def instant_ns(self, _kind: str, _trial: int | None) -> int:
+        """Return the instant of an event for which none was given [ns, session clock]."""
+        return self.clock.now_ns()
 
     def commit(self) -> Acknowledged:
         """Make all that was handed over safe, and say how much that is now.

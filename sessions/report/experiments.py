@@ -78,11 +78,8 @@ def experiments(
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
     number was told.
     """
-    return tuple(
-        _experiment(block, plan.subject, tables, numbers, paths or {}, law, response)
-        for block in plan.blocks
-        if block.phase == "main"
-    )
+    main = [block for block in plan.blocks if block.phase == "main"]
+    return tuple(_experiment(block, plan.subject, tables, numbers, paths or {}, law, response) for block in main)
 
 
 def _experiment(

@@ -9,54 +9,13 @@ from sessions.exchange.session_tables import heading
 from sessions.prediction import QUANTITIES, SED
 from sessions.statistics.multiverse import Path
 from sessions.statistics.pooling.findings import StudyFindings
-from sessions.statistics.pooling.visit import decided
+from sessions.statistics.pooling.visit import TrialRow, decided
 from sessions.statistics.rivals import Rival
+from sessions.strokes.stroke import meanings
 
 SIMULATED = "SIMULATED"
 TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
-# What each column of the table of trials means, with its unit: all fields of a trial's row but its paths.
-_MEANING: Mapping[str, tuple[str, str]] = {
-    "trial": ("", "number of the trial in its session, from 1"),
-    "block": ("", "name of its block"),
-    "descriptor": ("", "what was judged"),
-    "index": ("", "its maker's number of the surface on the descriptor, 0 to 100"),
-    "code": ("", "label on the back of the surface"),
-    "direction": ("", "planned: 1 from proximal to distal, -1 back"),
-    "repetition": ("", "how often this surface has been met in the block, from 1"),
-    "place": ("", "trials of the block before this one"),
-    "before": ("", "index stroked just before in the same block; empty for the first"),
-    "outcome": ("", "how the trial ended"),
-    "score": ("", "answer on the line, 0 to 100"),
-    "estimate": ("", "number on the subject's own scale, where numbers were asked for"),
-    "choice": ("", "the subject's answer where two were compared: first or second"),
-    "standard": ("", "index of the surface that all others of the block are compared with; empty where there is none"),
-    "rule": ("", "which mu the model got: maximum, or mean over the steady window"),
-    "mu": ("", "coefficient of friction that the model got"),
-    "mu_low": ("", "lower end of its 95 % bootstrap interval"),
-    "mu_high": ("", "upper end"),
-    "mu_dynamic": ("", "mean of T/N over the steady window"),
-    "mu_static": ("", "T/N at a static peak; empty where none stands out"),
-    "tau_max": ("MPa", "greatest tangential force over the contact area: the traction bound"),
-    "tau_max_low": ("MPa", "lower end of its 95 % bootstrap interval"),
-    "tau_max_high": ("MPa", "upper end"),
-    "speed": ("mm/s", "of the centre of pressure over the steady window"),
-    "speed_low": ("mm/s", "lower end of its 95 % bootstrap interval"),
-    "speed_high": ("mm/s", "upper end"),
-    "normal_force": ("N", "measured, mean over the steady window"),
-    "normal_force_low": ("N", "lower end of its 95 % bootstrap interval"),
-    "normal_force_high": ("N", "upper end"),
-    "sed": ("MPa", "predicted strain-energy density, averaged over the ending"),
-    "sed_low": ("MPa", "lower end of the 95 % interval that the uncertainty of friction alone makes"),
-    "sed_high": ("MPa", "upper end"),
-    "sed_interval": ("", "how that interval was found, or why there is none"),
-    "error_estimate": ("", "of sed, from its mesh, relative"),
-    "tangential_force": ("N", "measured, mean over the steady window"),
-    "model_normal_force": ("N", "of the model, pressed to the planned depth, times the finger's width"),
-    "model_normal_force_error": ("", "its relative error, estimated by the solver"),
-    "matching_depth": ("mm", "depth at which the model would press as hard as the subject did"),
-    "flaws": ("", "names of the flaws graded doubtful or worse, with blanks between"),
-    "why": ("", "why there is no SED"),
-}
+_MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row but its paths
 _RESPONSES: Mapping[str, tuple[str, str]] = {
     one.name: ("" if one.unit == "-" else one.unit, f"of the model, averaged over the ending: {one.meaning}")
     for one in QUANTITIES

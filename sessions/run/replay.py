@@ -1,7 +1,7 @@
 """A recorded session goes through the same course once more, from its readings and from what people did."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import SequenceMatcher
@@ -95,7 +95,8 @@ class _Rewriter(FleetingWriter):
         self._cut = False
         self._next_event = 0
         self._closing = False
-        self.log_written: list[LoggedEvent] = []
+        self.log_written: list[LoggedEvent] = []  # that was committed
+        self.safe = self.log_written.extend
 
     def follow_part(self, log: Sequence[LoggedEvent]) -> None:
         """Take the instants from the log of a part, which may have been cut short."""
@@ -104,25 +105,16 @@ class _Rewriter(FleetingWriter):
         self._cut = not any(event.kind == "ended" for event in log)
         self._next_event = 0
 
-    def event(
-        self,
-        kind: str,
-        trial: int | None = None,
-        data: Mapping[str, Any] | None = None,
-        *,
-        time_ns: int | None = None,
-        commit: bool = True,
-    ) -> LoggedEvent:
-        """Write an event down. Raises _CutShort where the recording ends without an end."""
+    def instant_ns(self, kind: str, trial: int | None) -> int:
+        """Return when such an event was recorded next. Raises _CutShort where the recording ends without an end."""
         if self._cut and (kind == "ended" or self._next_event == len(self._log)):
             raise _CutShort("the recording was cut short here")
         ahead = range(self._next_event, len(self._log))
         place = next((i for i in ahead if (self._log[i].kind, self._log[i].trial) == (kind, trial)), None)
-        if place is not None:
-            self._next_event = place + 1
-            time_ns = self._log[place].time_ns
-        self.log_written.append(super().event(kind, trial, data, time_ns=time_ns, commit=commit))
-        return self.log_written[-1]
+        if place is None:
+            return super().instant_ns(kind, trial)
+        self._next_event = place + 1
+        return self._log[place].time_ns
 
     def commit(self) -> Acknowledged:
         """Write in large parts: nobody waits for an acknowledgement."""
@@ -134,8 +126,9 @@ class _Rewriter(FleetingWriter):
     def finish(self) -> None:
         """Write down what sealing said of a torn log, and close."""
         self._closing = True
+        self._cut, self._log = False, ()
         for event in self._later:
-            super().event(event.kind, data=event.data)
+            self.event(event.kind, data=event.data)
         super().close()
 
 
@@ -319,8 +312,8 @@ def _run(
                 progress((number + part) / len(logs), what)
 
             player = _Player(recording.info, log, readings, limit, clock, recorded_settings(log), speed, show)
-            resumed = None if number == 0 else _resumed(recording.plan, writer.log_written, log)
             writer.follow_part(log)
+            resumed = None if number == 0 else _resumed(recording.plan, writer.log_written, log)
             _run_part(recording.plan, player, writer, resumed)
     finally:
         writer.finish()

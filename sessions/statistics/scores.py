@@ -22,6 +22,25 @@ _RESAMPLES = 10_000
 _EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
 
 
+def bounds(low: float | None, high: float | None) -> tuple[float, float] | None:
+    """Return the ends of an interval as a pair; None where one of them is missing."""
+    return None if low is None or high is None else (low, high)
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalEstimate:
+    """A value with its 95 % interval; None where the data set no bound, or too few subjects give one."""
+
+    value: float
+    low: float | None
+    high: float | None
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """The ends of the interval; None where one of them is missing."""
+        return bounds(self.low, self.high)
+
+
 @dataclass(frozen=True, slots=True)
 class Score:
     """One answer."""

@@ -6,13 +6,13 @@ them. No area is measured here.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
-from sessions.strokes.stroke import Stroke
+from sessions.strokes.stroke import Meaning, Stroke
 
 Array = NDArray[np.float64]
 
@@ -56,16 +56,16 @@ Rule = Literal["maximum", "mean over steady window"]
 class FrictionParameters:
     """What the model gets of one stroke. None where honesty allows no number."""
 
-    trial: int | None
-    stroke: int  # position in `Analysis.strokes`
-    mu: float | None  # [-]
+    trial: Annotated[int | None, Meaning("", "number of the trial")]
+    stroke: Annotated[int, Meaning("", "position of the stroke, from 0")]
+    mu: Annotated[float | None, Meaning("", "coefficient of friction the model is given")]
     mu_interval: tuple[float, float] | None  # the bootstrap's, of that very number; None before it is drawn
-    tau_max: float | None  # [MPa]
-    contact_area: float  # that tau_max was told for [mm2]
-    speed: float | None  # [mm/s]
-    direction: int | None  # as measured: +1 proximal to distal, -1 back
-    rule: Rule  # which mu it is
-    flaws: tuple[str, ...]
+    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model is given")]
+    contact_area: Annotated[float, Meaning("mm2", "that tau_max was told for")]
+    speed: Annotated[float | None, Meaning("mm/s", "of the stroke")]
+    direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back, as measured")]
+    rule: Annotated[Rule, Meaning("", "which T/N mu is")]
+    flaws: Annotated[tuple[str, ...], Meaning("", "names of what is wrong with the stroke")]
 
 
 def rule_for(trial: Trial | None) -> Rule:

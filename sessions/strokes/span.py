@@ -98,6 +98,10 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
     onset, lift = contact.onset, contact.lift
     before = None if onset is None else span.windows.before(onset, settings.zero.zero_stretch)
     after = None if lift is None else span.windows.after(lift, settings.zero.zero_stretch)
+    zero = before or after
+    if zero is None:
+        return None
+    level, error, drift, flaw = zero.level, zero.error, None, None
     if before is not None and after is not None:
         # Taken to be half-way; it may lie anywhere between the two, hence a rectangular distribution's deviation. What
         # noise alone makes of the difference is no drift.
@@ -106,28 +110,12 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
         noise = before.error**2 + after.error**2
         error = np.sqrt(noise / 4.0 + np.maximum(drift**2 - noise, 0.0) / 12.0)
         origin = f"half-way from unloaded before contact, {before.when}, to after it, {after.when}"
-        unsure = _unsure(span, contact, idle, level, drift, settings)
-        return StrokeZero(level, before.noise, *_filtered(span, before), error, origin, drift, unsure, None)
-    if before is not None:
+    elif before is not None:
         origin = f"unloaded before contact, {before.when}"
-        unsure = _unsure(span, contact, idle, before.level, None, settings)
-        return StrokeZero(
-            before.level, before.noise, *_filtered(span, before), before.error, origin, None, unsure, None
-        )
-    if after is not None:
-        origin = f"unloaded after contact, {after.when}"
-        unsure = _unsure(span, contact, idle, after.level, None, settings)
-        return StrokeZero(
-            after.level,
-            after.noise,
-            *_filtered(span, after),
-            after.error,
-            origin,
-            None,
-            unsure,
-            FlawName.ZERO_AFTER_CONTACT,
-        )
-    return None
+    else:
+        origin, flaw = f"unloaded after contact, {zero.when}", FlawName.ZERO_AFTER_CONTACT
+    unsure = _unsure(span, contact, idle, level, drift, settings)
+    return StrokeZero(level, zero.noise, *_filtered(span, zero), error, origin, drift, unsure, flaw)
 
 
 def _filtered(span: Span, zero: Zero) -> tuple[Array, float]:

@@ -99,7 +99,7 @@ class Stroke:
         return {column.name: getattr(self, column.name) for column in fields(self) if column.name != "curve"}
 
 
-def meanings() -> dict[str, Meaning]:
-    """Return the unit and the meaning of each number of a stroke, by its name, for those who read its tables."""
-    hints = get_type_hints(Stroke, include_extras=True)
+def meanings(record: type) -> dict[str, Meaning]:
+    """Return unit and meaning of each field of a record that has one, by its name, for those who read its tables."""
+    hints = get_type_hints(record, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}

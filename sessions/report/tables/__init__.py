@@ -33,10 +33,7 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
             beside_table(report),
             beside_forces_table(report),
         ),
-        "rivals": (
-            rivals_table(compared, quantity, report.model),
-            responses_table(compared, quantity, report.model),
-        ),
+        "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
         "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
         "afferent": (afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),

@@ -35,7 +35,7 @@ class Group:
     """Rows under a heading of their own, "" for none."""
 
     name: str
-    rows: tuple["Row", ...]
+    rows: tuple[tuple[Cell, ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,8 @@ class Table:
     notes: tuple[tuple[str, str], ...]  # mark, sentence
 
 
-Row = tuple[Cell, ...]
+Row = tuple[Cell | str | int, ...]  # a text or a whole number stands for a cell of its own
+Rows = tuple[str, Iterable[Row]]  # the heading of a group, and its rows
 
 
 @dataclass(slots=True)
@@ -105,12 +106,13 @@ class Notes:
         return tuple((mark, sentence) for sentence, mark in self.marks.items())
 
 
-def table(name: str, caption: str, columns: str, groups: Iterable[Group], notes: Notes | None = None) -> Table | None:
+def table(name: str, caption: str, columns: str, groups: Iterable[Rows], notes: Notes | None = None) -> Table | None:
     """Return a table without its empty groups; None where no group has rows.
 
     `columns` are its heads with their units, as in "index | SED [kPa]".
     """
-    kept = tuple(group for group in groups if group.rows)
+    cells = ((name, tuple(tuple(map(_cell, row)) for row in rows)) for name, rows in groups)
+    kept = tuple(Group(name, rows) for name, rows in cells if rows)
     if not kept:
         return None
     short, further = _in_short(caption)
@@ -122,6 +124,10 @@ def table(name: str, caption: str, columns: str, groups: Iterable[Group], notes:
         kept,
         (*further, *(notes.listed() if notes else ())),
     )
+
+
+def _cell(content: Cell | str | int) -> Cell:
+    return content if isinstance(content, Cell) else Cell(str(content))
 
 
 def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
@@ -156,15 +162,12 @@ def parted(
 
 
 def grouped(
-    report: Report,
-    things: Sequence[Thing],
-    experiment: Callable[[Thing], str],
-    row: Callable[[Thing], Row],
-) -> tuple[Group, ...]:
+    report: Report, things: Sequence[Thing], experiment: Callable[[Thing], str], row: Callable[[Thing], Row]
+) -> list[Rows]:
     """Return the rows of all things under the names of their experiments."""
     names = [e.name for e in report.experiments]
-    groups = [Group(name, tuple(row(t) for t in things if experiment(t) == name)) for name in names]
-    return (*groups, Group("", tuple(row(t) for t in things if experiment(t) not in names)))
+    groups: list[Rows] = [(name, [row(t) for t in things if experiment(t) == name]) for name in names]
+    return [*groups, ("", [row(t) for t in things if experiment(t) not in names])]
 
 
 def range_cell(low: float | None, high: float | None, shown: Callable[[float], str]) -> Cell:

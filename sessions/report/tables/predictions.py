@@ -6,7 +6,7 @@ from dataclasses import replace
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
 from sessions.report.contents import PredictionFinding, Report
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, grouped, table
+from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, grouped, table
 from sessions.report.tables.strokes import model_mu
 from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
 
@@ -29,7 +29,7 @@ def prediction_table(report: Report) -> Table | None:
         missing = p.reasons.get("sed")
         return (
             notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
-            Cell({"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule)),
+            {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
             _depth(p, notes),
             _stroked_sed(p, notes),
@@ -195,17 +195,17 @@ def _ways(report: Report) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one.variant.way for one in first))
 
 
-def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> tuple[Group, ...]:
+def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows]:
     """Return the rows of each experiment at each strain."""
     first = next((p.alternatives for p in report.predictions if p.alternatives), ())
-    groups: list[Group] = []
+    groups: list[Rows] = []
     for strain in dict.fromkeys(one.variant.kinematics for one in first):
 
         def row(p: PredictionFinding, strain: str = strain) -> Row:
             return tuple(cell(one) for one in p.alternatives if one.variant.kinematics == strain)
 
-        groups += [Group(f"{group.name or 'trials'}, at {strain} strain", group.rows) for group in _rows(report, row)]
-    return tuple(groups)
+        groups += [(f"{name or 'trials'}, at {strain} strain", rows) for name, rows in _rows(report, row)]
+    return groups
 
 
 def force_table(report: Report) -> Table | None:
@@ -273,7 +273,7 @@ def direction_table(report: Report) -> Table | None:
         doubt = p.doubt or p.opposite_doubt
         return (
             _depth(p, notes),
-            Cell(direction(p.direction)),
+            direction(p.direction),
             _stroked_sed(p, notes),
             other,
             notes.estimate(
@@ -302,19 +302,17 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
-def _table(
-    report: Report, name: str, caption: str, columns: str, groups: Iterable[Group], notes: Notes
-) -> Table | None:
+def _table(report: Report, name: str, caption: str, columns: str, groups: Iterable[Rows], notes: Notes) -> Table | None:
     """Return a table whose rows are named by trial and index, or by the stroke where there are no trials."""
     planned = any(p.trial is not None for p in report.predictions)
     return table(name, caption, f"{'trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
-def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> tuple[Group, ...]:
+def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]:
     """Return the named rows of all trials by experiment; `row` gives the cells after the name."""
 
     def named(p: PredictionFinding) -> Row:
-        name = (Cell(str(p.stroke)),) if p.trial is None else (Cell(str(p.trial)), Cell(str(p.index)))
+        name = (str(p.stroke),) if p.trial is None else (p.trial, str(p.index))
         return (*name, *row(p))
 
     return grouped(report, report.predictions, lambda p: p.experiment, named)

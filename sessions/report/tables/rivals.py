@@ -3,10 +3,11 @@
 from collections.abc import Callable, Sequence
 from textwrap import fill
 
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
+from sessions.report.tables.cells import Cell, Notes, Row, Table, table
 from sessions.report.wording import NONE, correlation, digits, p_value, places
 from sessions.statistics.dependent_correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
+from sessions.statistics.scores import bounds
 
 _ALPHA = 0.05
 MANY_SURFACES = 10_000  # beyond which nobody asks how many
@@ -39,7 +40,7 @@ def responses_table(compared: Compared, quantity: str, model: str) -> Table | No
 def _table(anchor: str, caption: str, compared: Compared, quantity: str, shown: Callable[[str], bool]) -> Table | None:
     notes = Notes()
     groups = [
-        Group(name, tuple(_row(rival, quantity, notes) for rival in rivals if shown(rival.name)))
+        (name, tuple(_row(rival, quantity, notes) for rival in rivals if shown(rival.name)))
         for name, rivals in compared
     ]
     columns = (
@@ -108,22 +109,20 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
 def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     why = rival.reasons.get
     contrast = rival.contrast
-    ends = None if rival.low is None or rival.high is None else (rival.low, rival.high)
-    low, high = rival.partial_low, rival.partial_high
-    partial = None if low is None or high is None else (low, high)
-    less = (Cell(NONE), Cell(NONE), Cell(NONE))
+    ends = bounds(rival.low, rival.high)
+    partial = bounds(rival.partial_low, rival.partial_high)
+    less = (NONE, NONE, NONE)
     if contrast is not None:
-        inside = None if contrast.low is None or contrast.high is None else (contrast.low, contrast.high)
         less = (
-            notes.estimate(contrast.difference, correlation, None, inside),
-            _or_dash(None if contrast.z is None else digits(contrast.z, 2)),
-            _or_dash(None if contrast.p is None else p_value(contrast.p)),
+            notes.estimate(contrast.difference, correlation, None, bounds(contrast.low, contrast.high)),
+            NONE if contrast.z is None else digits(contrast.z, 2),
+            NONE if contrast.p is None else p_value(contrast.p),
         )
     elif rival.name != quantity:
         less = (notes.number(None, correlation, why("contrast")), *less[1:])
     return (
-        Cell(rival.name),
-        Cell(str(rival.n)),
+        rival.name,
+        rival.n,
         notes.estimate(rival.r, correlation, why("r"), ends, "too few cases, or a perfect r"),
         *less,
         notes.estimate(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
@@ -136,10 +135,6 @@ def _weight(rival: Rival, notes: Notes) -> Cell:
     if rival.weight is None and "weight" not in rival.reasons:
         return Cell(NONE)
     return notes.number(rival.weight, places(3), rival.reasons.get("weight"))
-
-
-def _or_dash(text: str | None) -> Cell:
-    return Cell(NONE if text is None else text)
 
 
 def _named(names: Sequence[str]) -> str:

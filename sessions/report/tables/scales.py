@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 
 from sessions.report.contents import Report
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, table
+from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, table
 from sessions.report.wording import NONE, digits, p_value, places
 from sessions.statistics.pooling.answers import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scales.latent import JUDGEMENTS, Judgement
-from sessions.statistics.scales.paired import Ends, PairedScale
-from sessions.statistics.scales.psychometric import Profile, Psychometric
+from sessions.statistics.scales.paired import PairedScale
+from sessions.statistics.scales.psychometric import Psychometric
+from sessions.statistics.scores import IntervalEstimate, bounds
 
 CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
 
@@ -20,7 +21,7 @@ CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
 def scales_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     """Return the values of each surface by both models, where subjects chose between two."""
     notes = Notes()
-    groups = [Group(one.descriptor, tuple(_rows(one, notes))) for one in descriptors if one.scales]
+    groups = [(one.descriptor, tuple(_rows(one, notes))) for one in descriptors if one.scales]
     caption = (
         "Scales from choices between two surfaces, with mean 0: Bradley and Terry's in logits, Thurstone's case V in z,"
         " by maximum likelihood, with 95 % intervals of a bootstrap over subjects. Last row: what coming first adds."
@@ -34,18 +35,18 @@ def latent_table(descriptors: Sequence[DescriptorFindings]) -> Table | None:
     if judgements in ([], ["scores"]):
         return None
     notes = Notes()
-    groups: list[Group] = []
+    groups: list[Rows] = []
     for one in descriptors:
         means = {mean.index: mean.mean for mean in one.scores}
         rows = (
             (
-                Cell(str(index)),
+                index,
                 notes.number(means.get(index), places(1), "no scores were given"),
                 *(_latent(one, kind, index, notes) for kind in judgements),
             )
             for index in one.indices
         )
-        groups.append(Group(one.descriptor, tuple(rows)))
+        groups.append((one.descriptor, tuple(rows)))
     heads = " | ".join(f"by {kind} [z]" for kind in judgements)
     caption = (
         "One latent scale, with mean 0. Its unit is the standard deviation of the difference of two judgements: √2 "
@@ -60,22 +61,20 @@ def _latent(one: DescriptorFindings, kind: Judgement, index: int, notes: Notes) 
     scaled = None if values is None else values.get(index)
     if scaled is None:
         return notes.number(None, str, f"no scale by {kind}: nobody gave them, too few did, or nothing scatters")
-    ends = None if scaled.low is None or scaled.high is None else (scaled.low, scaled.high)
-    return notes.estimate(scaled.value, places(2), None, ends, "too few subjects")
+    return notes.estimate(scaled.value, places(2), None, scaled.ends, "too few subjects")
 
 
 def _rows(one: DescriptorFindings, notes: Notes) -> Iterable[Row]:
     indices = sorted({index for scale in one.scales for index in scale.values}) or list(one.indices)
     for index in indices:
-        yield (Cell(str(index)), *(_value(scale, scale.values.get(index), notes) for scale in one.scales))
-    yield (Cell("first of two"), *(_value(scale, scale.first, notes) for scale in one.scales))
+        yield (index, *(_value(scale, scale.values.get(index), notes) for scale in one.scales))
+    yield ("first of two", *(_value(scale, scale.first, notes) for scale in one.scales))
 
 
-def _value(scale: PairedScale, interval: Ends | None, notes: Notes) -> Cell:
+def _value(scale: PairedScale, interval: IntervalEstimate | None, notes: Notes) -> Cell:
     if interval is None:
         return notes.number(None, str, scale.reason or "this surface was not chosen between")
-    ends = None if interval.low is None or interval.high is None else (interval.low, interval.high)
-    return notes.estimate(interval.value, places(2), None, ends, scale.interval_reason or None)
+    return notes.estimate(interval.value, places(2), None, interval.ends, scale.interval_reason or None)
 
 
 def scale_sentences(one: DescriptorFindings) -> list[str]:
@@ -123,7 +122,7 @@ def psychometric_table(judgements: Iterable[Judged]) -> Table | None:
     """Return PSE, JND, lapses, order and scatter of each subject, under the name of what was judged."""
     notes = Notes()
     groups = [
-        Group(name, (*(_row(who, one, notes) for who, one in functions.items()), *_mean_row(means, notes)))
+        (name, (*(_row(who, one, notes) for who, one in functions.items()), *_mean_row(means, notes)))
         for name, functions, means in judgements
         if functions
     ]
@@ -160,8 +159,8 @@ def psychometric_sentences(judged: Judged) -> list[str]:
     if len(functions) == 1:
         sentences += [_of_one(title, one) for one in functions.values()]
     elif pse is not None and jnd is not None:
-        equal = f"{digits(math.exp(pse.mean), 2)}{_range(_ends(pse), math.exp, 2)}"
-        least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(_ends(jnd), _mean_percent, 0)}"
+        equal = f"{digits(math.exp(pse.mean), 2)}{_range(bounds(pse.low, pse.high), math.exp, 2)}"
+        least = f"{digits(_mean_percent(jnd.mean), 0)} % of it{_range(bounds(jnd.low, jnd.high), _mean_percent, 0)}"
         sentences.append(
             f"{title}: over {pse.n} of {len(functions)} subjects the surface felt equal to the standard has {equal} "
             f"times its µ; over {jnd.n} the just noticeable difference is {least}."
@@ -184,16 +183,11 @@ def _of_one(title: str, one: Psychometric) -> str:
         jnd = f"below {digits(_percent(one.jnd.high), 0)} % of it"
     elif one.jnd.low is not None and one.jnd.high is not None:
         jnd = f"{digits(_percent(one.jnd.value), 0)} % of it{_range((one.jnd.low, one.jnd.high), _percent, 0)}"
-    ends = None if one.pse.low is None or one.pse.high is None else (one.pse.low, one.pse.high)
     return (
         f"{title}: by {one.answers} answers the surface felt equal to the standard has "
-        f"{digits(math.exp(one.pse.value), 2)}{_range(ends, math.exp, 2)} times its µ; the just noticeable difference "
-        f"is {jnd}, with {digits(100.0 * one.lapse.value, 0)} % lapses."
+        f"{digits(math.exp(one.pse.value), 2)}{_range(one.pse.ends, math.exp, 2)} times its µ; the just noticeable "
+        f"difference is {jnd}, with {digits(100.0 * one.lapse.value, 0)} % lapses."
     )
-
-
-def _ends(mean: Average) -> tuple[float, float] | None:
-    return None if mean.low is None or mean.high is None else (mean.low, mean.high)
 
 
 def _range(ends: tuple[float, float] | None, unit: Callable[[float], float], after: int) -> str:
@@ -224,15 +218,15 @@ def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
             "it takes two subjects",
         )
         for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0))
-        for ends in [_ends(mean)]
+        for ends in [bounds(mean.low, mean.high)]
     ]
-    yield (Cell("geometric mean"), Cell(f"of {pse.n} and {jnd.n}"), *cells, Cell(NONE), Cell(NONE), Cell(NONE))
+    yield ("geometric mean", f"of {pse.n} and {jnd.n}", *cells, NONE, NONE, NONE)
 
 
 def _row(who: str, one: Psychometric, notes: Notes) -> Row:
     return (
-        Cell(who),
-        Cell(str(one.answers)),
+        who,
+        one.answers,
         _cell(one.pse, one, math.exp, 2, notes),
         _cell(one.jnd, one, _percent, 0, notes),
         _cell(one.lapse, one, lambda share: 100.0 * share, 1, notes),
@@ -241,10 +235,12 @@ def _row(who: str, one: Psychometric, notes: Notes) -> Row:
     )
 
 
-def _cell(profile: Profile | None, one: Psychometric, unit: Callable[[float], float], after: int, notes: Notes) -> Cell:
+def _cell(
+    profile: IntervalEstimate | None, one: Psychometric, unit: Callable[[float], float], after: int, notes: Notes
+) -> Cell:
     if profile is None:
         return notes.number(None, str, one.reason or "orders are not known")
-    ends = None if profile.low is None or profile.high is None else (unit(profile.low), unit(profile.high))
+    ends = None if profile.ends is None else (unit(profile.ends[0]), unit(profile.ends[1]))
     sides = [f"above {digits(unit(profile.low), after)}"] if profile.low is not None else []
     sides += [f"below {digits(unit(profile.high), after)}"] if profile.high is not None else []
     without = f"within what was compared the answers bound it {' and '.join(sides) or 'on neither side'}"

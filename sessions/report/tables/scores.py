@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.report.contents import Report
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, table
+from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, range_cell, table
 from sessions.report.wording import NONE, correlation, digits, identifier, places, shown_response, significant
 from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
 from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
@@ -12,7 +12,7 @@ from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_i
 def score_table(report: Report) -> Table | None:
     """Return mean scores with their intervals."""
     notes = Notes()
-    groups = tuple(Group(e.name, tuple(score_cells(m, notes) for m in e.scores)) for e in report.experiments)
+    groups = tuple((e.name, tuple(score_cells(m, notes) for m in e.scores)) for e in report.experiments)
     columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
     caption = (
         "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
@@ -31,9 +31,9 @@ def score_cells(mean: MeanScore, notes: Notes) -> Row:
         )
         interval = Cell(interval.text, notes.mark(why), why)
     return (
-        Cell(str(mean.index)),
-        Cell(str(mean.n)),
-        Cell(digits(mean.mean, 1)),
+        mean.index,
+        mean.n,
+        digits(mean.mean, 1),
         interval,
         spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
     )
@@ -53,12 +53,10 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
     for e in report.experiments:
         if e.answers:
             notes = Notes()
-            rows = tuple(
-                (Cell(a.subject), *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers
-            )
+            rows = tuple((a.subject, *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers)
             columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
             caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-            tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [Group("", rows)], notes))
+            tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
     return tuple(tables)
 
 
@@ -66,10 +64,10 @@ def relation_table(report: Report) -> Table | None:
     """Return how the predicted quantity goes with mean scores and with the indices."""
     shown = shown_response(report.response)
     notes = Notes()
-    groups: list[Group] = []
+    groups: list[Rows] = []
     for e in report.experiments:
         related = [("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation)]
-        groups.append(Group(e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
+        groups.append((e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
     columns = (
         f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
         f"exact p of rho | slope [{shown.step} a point] | r without one"
@@ -95,8 +93,8 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
         f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
     )
     return (
-        Cell(name),
-        Cell(str(related.n)),
+        name,
+        related.n,
         notes.number(related.pearson, correlation, related.reason),
         notes.interval(related.low, related.high, correlation, related.reason),
         notes.number(related.spearman, correlation, related.reason),
@@ -110,7 +108,7 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
             "no line has one through two points, or through points wholly on it",
             unit=1e6,
         ),
-        Cell(left_out),
+        left_out,
     )
 
 
@@ -119,7 +117,7 @@ Named = tuple[str, Sequence[PathFinding]]
 
 def paths_table(named: Iterable[Named]) -> Table | None:
     """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
-    groups = [Group(name, _rows(findings)) for name, findings in named if findings]
+    groups = [(name, _rows(findings)) for name, findings in named if findings]
     columns = (
         "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
     )
@@ -149,22 +147,18 @@ def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
 
 
 def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
-    rows = [(Cell("all"), Cell(""), Cell(""), *_spread(spread(correlations(findings)), len(findings)))]
+    rows = [("all", "", "", *_spread(spread(correlations(findings)), len(findings)))]
     before = ""
     for choice, name, of, usual in by_choice(findings):
         count = sum(getattr(one.path, choice) == name for one in findings)
         label = CHOICE_LABELS[choice] if choice != before else ""
-        rows.append((Cell(label), Cell(name), Cell("usual" if usual else ""), *_spread(of, count)))
+        rows.append((label, name, "usual" if usual else "", *_spread(of, count)))
         before = choice
     return tuple(rows)
 
 
 def _spread(of: Spread | None, paths: int) -> Row:
     if of is None:
-        return (Cell(f"0 of {paths}"), *(Cell(NONE) for _ in range(6)))
+        return (f"0 of {paths}", *(NONE for _ in range(6)))
     numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
-    return (
-        Cell(f"{of.correlated} of {paths}"),
-        Cell(str(of.distinct)),
-        *(Cell(correlation(value)) for value in numbers),
-    )
+    return (f"{of.correlated} of {paths}", of.distinct, *(correlation(value) for value in numbers))

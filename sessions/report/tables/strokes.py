@@ -41,7 +41,7 @@ def stroke_table(report: Report) -> Table | None:
             notes.number(
                 stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)], stroke.reasons.get("direction")
             ),
-            Cell(", ".join(name.replace("_", " ") for name in stroke.flaws) or "none"),
+            ", ".join(name.replace("_", " ") for name in stroke.flaws) or "none",
         )
 
     kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
@@ -99,7 +99,7 @@ def _table(
     def named(stroke: StrokeFinding) -> Row:
         stimulus = (stroke.trial, stroke.index) if planned else ()
         where = (notes.number(v, places(0), "no trial asks for it") for v in stimulus)
-        return (Cell(str(stroke.number)), *where, *row(stroke))
+        return (stroke.number, *where, *row(stroke))
 
     groups = grouped(report, report.strokes, lambda s: s.experiment, named)
     return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
@@ -131,10 +131,7 @@ def planted_table(report: Report) -> Table | None:
 
     def row(p: Planted) -> Row:
         stroke = strokes_by_trial.get(p.trial)
-        cells: list[Cell] = [
-            Cell(str(p.trial)),
-            Cell(NONE if stroke is None or stroke.index is None else str(stroke.index)),
-        ]
+        cells: list[Cell | str | int] = [p.trial, NONE if stroke is None or stroke.index is None else str(stroke.index)]
         prediction = predictions.get(p.trial)
         name, mu = model_mu(stroke, prediction)
         quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
@@ -147,7 +144,7 @@ def planted_table(report: Report) -> Table | None:
             ends = stroke.bootstrap.get(name) if stroke else None
             found_cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
-            cells += [Cell(shown(truth)), found_cell, notes.number(off, signed, reason)]
+            cells += [shown(truth), found_cell, notes.number(off, signed, reason)]
         right = stroke is not None and stroke.direction == p.direction
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)

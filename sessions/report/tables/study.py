@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
 from sessions.report.predictions import model_in_short
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, sections_of, table
+from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, range_cell, sections_of, table
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import compared_in_study, latent_table, psychometric_table, scales_table
 from sessions.report.tables.scores import paths_table, rank_interval, score_cells, spread_cell
@@ -23,7 +23,7 @@ from sessions.report.wording import (
 from sessions.statistics.pooling.answers import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.visit import Visit
-from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.scores import MeanScore, Relation, bounds
 from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
 
 
@@ -56,7 +56,7 @@ def _visits(study: StudyFindings) -> Table | None:
     rows = tuple(_visit_row(visit, study) for visit in study.visits)
     columns = "session | subject | answers | strokes with SED | ended as planned | flawed trials | counted"
     caption = "Visits in the order of their names; flawed: doubtful or worse, the table of trials names each flaw."
-    return table("table-visits", caption, columns, [Group("", rows)])
+    return table("table-visits", caption, columns, [("", rows)])
 
 
 def _visit_row(visit: Visit, study: StudyFindings) -> Row:
@@ -64,13 +64,13 @@ def _visit_row(visit: Visit, study: StudyFindings) -> Row:
     out += [e.descriptor or "nothing" for e in study.excluded if e.subject == visit.subject]
     counted = "yes" if not out else ("no" if "nothing" in out else f"without {', '.join(out)}")
     return (
-        Cell(visit.session),
-        Cell(visit.subject),
-        Cell(f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}"),
-        Cell(str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE),
-        Cell("yes" if visit.complete else "no"),
-        Cell(str(sum(bool(row.flaws) for row in visit.rows))),
-        Cell(counted),
+        visit.session,
+        visit.subject,
+        f"{sum(row.score is not None for row in visit.rows)} of {len(visit.rows)}",
+        str(sum(row.sed is not None for row in visit.rows)) if visit.forces else NONE,
+        "yes" if visit.complete else "no",
+        sum(bool(row.flaws) for row in visit.rows),
+        counted,
     )
 
 
@@ -102,11 +102,11 @@ def _scores(study: StudyFindings) -> Table | None:
 def _agreement(study: StudyFindings) -> Table | None:
     rows = tuple(
         (
-            Cell(one.descriptor),
-            Cell(str(agreement.n)),
-            Cell(digits(agreement.kendall_w, 2)),
-            Cell(p_value(agreement.friedman_p)),
-            Cell(p_value(agreement.page_p)),
+            one.descriptor,
+            agreement.n,
+            digits(agreement.kendall_w, 2),
+            p_value(agreement.friedman_p),
+            p_value(agreement.page_p),
         )
         for one in study.descriptors
         if (agreement := one.agreement) is not None
@@ -116,14 +116,14 @@ def _agreement(study: StudyFindings) -> Table | None:
         "Agreement on the order of the surfaces; Friedman: that they differ; Page: that scores rise with the index. "
         "Exploratory: neither p is corrected, and neither belongs to a family that is."
     )
-    return table("table-agreement", caption, columns, [Group("", rows)])
+    return table("table-agreement", caption, columns, [("", rows)])
 
 
 def _normalised(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         raw = {mean.index: mean for mean in one.scores}
         for index, mean in one.normalised.means.items():
-            yield (Cell(str(index)), *_with_interval(raw[index], 1), *_with_interval(mean, 2))
+            yield (index, *_with_interval(raw[index], 1), *_with_interval(mean, 2))
 
     columns = (
         "index | subjects | as given [0–100] | 95 % interval [0–100] | subjects | standardised [1] | 95 % interval [1]"
@@ -139,8 +139,12 @@ def _normalised(study: StudyFindings) -> Table | None:
 def _differences(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         for pair in one.differences:
-            name = Cell(f"{pair.high_index} − {pair.low_index}")
-            yield (name, *_with_interval(pair, 1), Cell(p_value(pair.p)), Cell(p_value(pair.p_holm)))
+            yield (
+                f"{pair.high_index} − {pair.low_index}",
+                *_with_interval(pair, 1),
+                p_value(pair.p),
+                p_value(pair.p_holm),
+            )
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
     caption = (
@@ -158,15 +162,8 @@ def _estimates(study: StudyFindings) -> Table | None:
         if one.estimates is None:
             return
         for index, geometric in one.estimates.geometric.items():
-            level = one.estimates.equal_moduli[index]
-            cells = [Cell(str(index)), Cell(str(geometric.n))]
-            for mean in (geometric, level):
-                cells.append(Cell(significant(math.exp(mean.mean), 3)))
-                if mean.low is None or mean.high is None:
-                    cells.append(notes.number(None, str, "one subject alone has no interval"))
-                else:
-                    cells.append(range_cell(math.exp(mean.low), math.exp(mean.high), three_figures))
-            yield tuple(cells)
+            means = (geometric, one.estimates.equal_moduli[index])
+            yield (index, geometric.n, *(cell for mean in means for cell in _geometric(mean, notes)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{name}: {', '.join(s)}" for name, s in _without_logarithm(study)]
@@ -177,6 +174,14 @@ def _estimates(study: StudyFindings) -> Table | None:
     )
     groups = _by_descriptor(study, rows)
     return table("table-estimates", caption, columns, groups, notes)
+
+
+def _geometric(mean: Average, notes: Notes) -> Row:
+    """Return the geometric mean and its interval of an average of logarithms."""
+    ends = bounds(mean.low, mean.high)
+    low, high = (None, None) if ends is None else map(math.exp, ends)
+    interval = notes.interval(low, high, three_figures, "one subject alone has no interval")
+    return three_figures(math.exp(mean.mean)), interval
 
 
 def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
@@ -190,8 +195,8 @@ def _surfaces(study: StudyFindings) -> Table | None:
         for s in one.surfaces:
             response = None if s.response is None else _scaled(s.response, shown.factor)
             yield (
-                Cell(str(s.index)),
-                Cell(str(s.subjects)),
+                s.index,
+                s.subjects,
                 *_mean(s.mu, 3, notes),
                 *_mean(response, shown.places, notes),
                 _spread(response, notes),
@@ -209,9 +214,7 @@ def _surfaces(study: StudyFindings) -> Table | None:
         f"with t intervals; standard deviation of the {shown.label} with its interval by chi squared. "
         f"Model: {model}."
     )
-    groups = [
-        Group(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)
-    ]
+    groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
     return table("table-surfaces", caption, columns, groups, notes)
 
 
@@ -228,11 +231,7 @@ def _forces(study: StudyFindings) -> Table | None:
         for s in one.surfaces:
             if s.normal_force is not None or s.model_normal_force is not None:
                 numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
-                yield (
-                    Cell(str(s.index)),
-                    Cell(str(s.subjects)),
-                    *(cell for number in numbers for cell in _mean(number, 2, notes)),
-                )
+                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, 2, notes)))
 
     columns = (
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
@@ -246,14 +245,14 @@ def _forces(study: StudyFindings) -> Table | None:
         f"trial. Model: {model}."
     )
     return table(
-        "table-forces", caption, columns, [Group(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
+        "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
     )
 
 
 def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row:
     """Return how many subjects a mean is over, the mean, and its interval."""
     ends = range_cell(mean.low, mean.high, places(decimals))
-    return Cell(str(mean.n)), Cell(digits(mean.mean, decimals)), ends
+    return mean.n, digits(mean.mean, decimals), ends
 
 
 def _scaled(mean: Average, by: float) -> Average:
@@ -263,14 +262,12 @@ def _scaled(mean: Average, by: float) -> Average:
     return Average(mean.n, by * mean.mean, times(mean.sd), times(mean.low), times(mean.high))
 
 
-def _mean(mean: Average | None, decimals: int, notes: Notes) -> tuple[Cell, Cell]:
+def _mean(mean: Average | None, decimals: int, notes: Notes) -> Row:
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
-        missing = notes.number(None, str, "no subject's stroke gives this number")
-        return missing, missing
-    if mean.low is None or mean.high is None:
-        return Cell(digits(mean.mean, decimals)), notes.number(None, str, "one subject alone has no interval")
-    return Cell(digits(mean.mean, decimals)), range_cell(mean.low, mean.high, places(decimals))
+        return (notes.number(None, str, "no subject's stroke gives this number"),) * 2
+    interval = notes.interval(mean.low, mean.high, places(decimals), "one subject alone has no interval")
+    return digits(mean.mean, decimals), interval
 
 
 def _relation(study: StudyFindings) -> Table | None:
@@ -300,7 +297,7 @@ def _relation(study: StudyFindings) -> Table | None:
         "nor are the intervals. Last column: least and greatest r when one surface, or one subject, is left out, and "
         "which."
     )
-    groups = [Group(one.descriptor, rows(one)) for one in study.descriptors]
+    groups = [(one.descriptor, rows(one)) for one in study.descriptors]
     return table("table-relation", caption, columns, groups, notes)
 
 
@@ -319,14 +316,14 @@ def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row
     """Return the row of the correlation of means over subjects, where there is one."""
     if related is not None and related.pearson is not None:
         yield (
-            Cell(name),
-            Cell(f"{related.n} surfaces"),
-            Cell(correlation(related.pearson)),
+            name,
+            f"{related.n} surfaces",
+            correlation(related.pearson),
             notes.interval(related.low, related.high, correlation, related.reason),
             _or_dash(related.spearman, correlation),
             rank_interval(related, notes),
             _or_dash(related.spearman_p, p_value),
-            Cell(NONE),
+            NONE,
             _without([(f"index {label}", r) for label, r in related.without if r is not None]),
         )
 
@@ -340,28 +337,28 @@ def _within_subjects(
     """Return the row of the correlation within subjects, where there is one."""
     if repeated is not None:
         yield (
-            Cell(name),
-            Cell(f"{repeated.dof} d.f."),
-            Cell(correlation(repeated.r)),
+            name,
+            f"{repeated.dof} d.f.",
+            correlation(repeated.r),
             range_cell(*(repeated.people or (None, None)), correlation),
-            Cell(NONE),
-            Cell(NONE),
+            NONE,
+            NONE,
             _or_dash(repeated.people_p, p_value),
             _or_dash(adjusted, p_value),
             _without(without),
         )
 
 
-def _or_dash(value: float | None, shown: Callable[[float], str]) -> Cell:
-    return Cell(NONE if value is None else shown(value))
+def _or_dash(value: float | None, shown: Callable[[float], str]) -> str:
+    return NONE if value is None else shown(value)
 
 
-def _without(left_out: Sequence[tuple[str, float]]) -> Cell:
+def _without(left_out: Sequence[tuple[str, float]]) -> str:
     if not left_out:
-        return Cell(NONE)
+        return NONE
     least, greatest = min(left_out, key=lambda one: one[1]), max(left_out, key=lambda one: one[1])
-    return Cell(", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest)))
+    return ", ".join(f"{correlation(r)} ({name})" for name, r in (least, greatest))
 
 
-def _by_descriptor(study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[Row]]) -> list[Group]:
-    return [Group(one.descriptor, tuple(rows(one))) for one in study.descriptors]
+def _by_descriptor(study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[Row]]) -> list[Rows]:
+    return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]

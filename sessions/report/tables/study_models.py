@@ -4,14 +4,14 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 
 from sessions.prediction import BY_NAME, Quantity, shown_unit
-from sessions.prediction.stored import Ends
 from sessions.report.predictions import model_in_short
-from sessions.report.tables.cells import Cell, Group, Notes, Row, Table, range_cell, table
+from sessions.report.tables.cells import Cell, Notes, Row, Table, range_cell, table
 from sessions.report.wording import NONE, digits, p_value, places, plural, sed, significant, tau, three_figures
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel
 from sessions.statistics.pooling.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.pooled import response_term
 from sessions.statistics.pooling.visit import TrialRow, Visit, decided
+from sessions.statistics.scores import bounds
 
 
 def models_table(study: StudyFindings) -> Table | None:
@@ -23,9 +23,7 @@ def models_table(study: StudyFindings) -> Table | None:
     ]
     quantity = BY_NAME[study.response]
     groups = [
-        Group(f"{name}, {_fitted(model)}", _terms(model, quantity))
-        for name, model in models
-        if not isinstance(model, str)
+        (f"{name}, {_fitted(model)}", _terms(model, quantity)) for name, model in models if not isinstance(model, str)
     ]
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
@@ -102,13 +100,7 @@ def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
 
     def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> Row:
         p_text = NONE if p is None else p_value(p)
-        return (
-            Cell(name),
-            Cell(unit),
-            Cell(significant(estimate, 3)),
-            range_cell(low, high, three_figures),
-            Cell(p_text),
-        )
+        return (name, unit, significant(estimate, 3), range_cell(low, high, three_figures), p_text)
 
     rows = [
         row(
@@ -135,13 +127,13 @@ def planted_table(study: StudyFindings) -> Table | None:
     """Return what was planted in a simulated study beside what was found."""
     rows = tuple(
         (
-            Cell(one.descriptor),
-            Cell(one.effect),
-            Cell(UNITS[one.effect]),
-            Cell(significant(one.planted, 3)),
-            Cell(significant(one.estimate, 3)),
+            one.descriptor,
+            one.effect,
+            UNITS[one.effect],
+            significant(one.planted, 3),
+            significant(one.estimate, 3),
             range_cell(one.low, one.high, three_figures),
-            Cell("yes" if one.covered else "no"),
+            "yes" if one.covered else "no",
         )
         for one in study.effects
     )
@@ -154,14 +146,14 @@ def planted_table(study: StudyFindings) -> Table | None:
         "friction (the noise of judgement is added by its variance). Every interval is for other people on these "
         "surfaces; one in twenty misses."
     )
-    return table("table-planted", caption, columns, [Group("", rows)])
+    return table("table-planted", caption, columns, [("", rows)])
 
 
 def flaws_table(study: StudyFindings) -> Table | None:
     """Return what was spoilt in a simulated study, and whether it was found."""
-    rows = tuple((Cell(one.session), Cell(one.expected), Cell("yes" if one.detected else "no")) for one in study.flaws)
+    rows = tuple((one.session, one.expected, "yes" if one.detected else "no") for one in study.flaws)
     caption = "What was spoilt in the simulated sessions, and whether the analysis, which does not know of it, says so."
-    return table("table-planted-flaws", caption, "session | planted | found", [Group("", rows)])
+    return table("table-planted-flaws", caption, "session | planted | found", [("", rows)])
 
 
 _FEW = "too few readings"
@@ -178,10 +170,7 @@ def trials_table(study: StudyFindings) -> Table | None:
         "estimated error [%] | flaws"
     )
     groups = tuple(
-        Group(
-            f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}",
-            tuple(_rows(visit, descriptor, notes)),
-        )
+        (f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}", tuple(_rows(visit, descriptor, notes)))
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
     )
@@ -214,16 +203,13 @@ def _row(row: TrialRow, notes: Notes) -> Row:
     answer = row.score if row.score is not None else row.estimate
     why = row.why or "withheld: the flaws say why"
 
-    def ends(low: float | None, high: float | None) -> Ends | None:
-        return None if low is None or high is None else (low, high)
-
     def estimate(name: str, shown: Callable[[float], str], unit: float = 1.0, without: str = _FEW) -> Cell:
-        interval = ends(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
+        interval = bounds(getattr(row, f"{name}_low"), getattr(row, f"{name}_high"))
         return notes.estimate(getattr(row, name), shown, why, interval, without, unit=unit)
 
     return (
-        Cell(str(row.trial)),
-        Cell(str(row.index)),
+        row.trial,
+        row.index,
         notes.number(answer, places(1), f"no score: {row.outcome}"),
         estimate("mu", places(3)),
         estimate("tau_max", tau, 1e3),
@@ -231,5 +217,5 @@ def _row(row: TrialRow, notes: Notes) -> Row:
         estimate("speed", places(1)),
         estimate("sed", sed, 1e3, row.sed_interval),
         notes.number(row.error_estimate, lambda v: significant(100 * v, 2), why),
-        Cell(", ".join(flaw.replace("_", " ") for flaw in row.flaws) or "none"),
+        ", ".join(flaw.replace("_", " ") for flaw in row.flaws) or "none",
     )

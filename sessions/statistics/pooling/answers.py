@@ -9,10 +9,10 @@ import numpy as np
 
 from sessions.statistics.pooling.visit import TrialRow, Visit
 from sessions.statistics.scales.latent import Judgement, of_comparisons, of_judgements
-from sessions.statistics.scales.paired import Choice, Ends, PairedScale
+from sessions.statistics.scales.paired import Choice, PairedScale
 from sessions.statistics.scales.psychometric import Comparison, Psychometric, comparison, function_of
 from sessions.statistics.scales.stevens import Exponent, stevens_exponent
-from sessions.statistics.scores import mean_interval
+from sessions.statistics.scores import IntervalEstimate, mean_interval
 from sessions.statistics.within_subjects import RepeatedCorrelation, equal_moduli, repeated_correlation
 
 
@@ -137,7 +137,7 @@ def constant_stimuli(trials: Sequence[tuple[Visit, TrialRow]]) -> ConstantStimul
 
 def latent_scales(
     trials: Sequence[tuple[Visit, TrialRow]], scales: Sequence[PairedScale], compared: ConstantStimuli | None
-) -> Mapping[Judgement, Mapping[int, Ends]]:
+) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
     """Return the latent values of each surface by every kind of judgement that has some."""
     scores = [(v.subject, row.index, row.score) for v, row in trials if row.score is not None]
     logs = [(v.subject, row.index, math.log(row.estimate)) for v, row in trials if row.estimate and row.estimate > 0.0]
@@ -146,7 +146,7 @@ def latent_scales(
         if row.standard is not None and row.mu:
             mu[row.index].append(math.log(row.mu))
     jnd = None if compared is None else compared.jnd
-    by_judgement: dict[Judgement, Mapping[int, Ends]] = {
+    by_judgement: dict[Judgement, Mapping[int, IntervalEstimate]] = {
         "scores": of_judgements(scores),
         "estimates": of_judgements(logs),
     }

@@ -11,9 +11,9 @@ from sessions.statistics.pooling.answers import Average, ConstantStimuli, Estima
 from sessions.statistics.pooling.visit import Exclusion, Visit, VisitOptions
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scales.latent import Judgement
-from sessions.statistics.scales.paired import Consistence, Ends, PairedScale
+from sessions.statistics.scales.paired import Consistence, PairedScale
 from sessions.statistics.scales.stevens import Exponent
-from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.scores import IntervalEstimate, MeanScore, Relation
 from sessions.statistics.variance_components import Spread
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
 
@@ -95,7 +95,9 @@ class DescriptorFindings:
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
     paths: tuple[PathFinding, ...]  # () where they were not asked for
     constant_stimuli: ConstantStimuli | None = None  # None where nobody compared with a standard
-    latent: Mapping[Judgement, Mapping[int, Ends]] = field(default_factory=dict[Judgement, Mapping[int, Ends]])
+    latent: Mapping[Judgement, Mapping[int, IntervalEstimate]] = field(
+        default_factory=dict[Judgement, Mapping[int, IntervalEstimate]]
+    )
 
 
 @dataclass(frozen=True, slots=True)

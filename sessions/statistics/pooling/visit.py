@@ -6,7 +6,7 @@ Decisions to leave a subject out stand in a file that people keep beside the ses
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -25,6 +25,7 @@ from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
 from sessions.strokes.friction import FIXED, AreaLaw
+from sessions.strokes.stroke import Meaning
 from sessions.toml_file import NotAllowed, load_toml
 
 EXCLUSIONS = "exclusions.toml"
@@ -64,9 +65,8 @@ def decided(exclusions: tuple[Exclusion, ...], subject: str, descriptor: str) ->
     return next((e for e in exclusions if e.subject == subject and e.descriptor in ("", descriptor)), None)
 
 
+Number = float | None
 FORM = 11  # raised when a row holds something else: what was stored before is then computed anew
-
-
 NO_INTERVAL = "intervals of the SED were not asked for"
 
 
@@ -85,49 +85,62 @@ class VisitOptions:
 
 @dataclass(frozen=True, slots=True)
 class TrialRow:
-    """One trial. None where there is no number; `why` says why no SED."""
+    """One trial, each field with its unit and meaning in tables. None where there is none; `why` says why no SED."""
 
-    trial: int
-    block: str
-    descriptor: str
-    index: int
-    code: str
-    direction: int  # as planned
-    repetition: int
-    place: int  # trials of the block before this one
-    before: int | None  # index stroked just before, in the same block
-    outcome: str
-    score: float | None
-    estimate: float | None = None  # on a scale of the subject's own
-    choice: str | None = None  # of the two compared: first or second
-    standard: int | None = None  # index that all others of the block are compared with
-    rule: str = ""  # which mu the model got
-    mu: float | None = None
-    mu_low: float | None = None  # 95 % bootstrap interval of mu, as of all that was measured: `BootstrapSettings.kind`
-    mu_high: float | None = None
-    mu_dynamic: float | None = None
-    mu_static: float | None = None
-    tau_max: float | None = None  # [MPa]
-    tau_max_low: float | None = None
-    tau_max_high: float | None = None
-    speed: float | None = None  # [mm/s]
-    speed_low: float | None = None
-    speed_high: float | None = None
-    normal_force: float | None = None  # [N]
-    normal_force_low: float | None = None
-    normal_force_high: float | None = None
-    tangential_force: float | None = None  # [N]
-    sed: float | None = None  # [MPa]
-    sed_low: float | None = None  # 95 % interval that friction alone makes, see `sessions.prediction.uncertainty`
-    sed_high: float | None = None
-    sed_interval: str = ""  # how it was found, or why there is none
-    error_estimate: float | None = None  # relative, of sed
+    trial: Annotated[int, Meaning("", "number of the trial in its session, from 1")]
+    block: Annotated[str, Meaning("", "name of its block")]
+    descriptor: Annotated[str, Meaning("", "what was judged")]
+    index: Annotated[int, Meaning("", "its maker's number of the surface on the descriptor, 0 to 100")]
+    code: Annotated[str, Meaning("", "label on the back of the surface")]
+    direction: Annotated[int, Meaning("", "planned: 1 from proximal to distal, -1 back")]
+    repetition: Annotated[int, Meaning("", "how often this surface has been met in the block, from 1")]
+    place: Annotated[int, Meaning("", "trials of the block before this one")]
+    before: Annotated[int | None, Meaning("", "index stroked just before in the same block; empty for the first")]
+    outcome: Annotated[str, Meaning("", "how the trial ended")]
+    score: Annotated[Number, Meaning("", "answer on the line, 0 to 100")]
+    estimate: Annotated[Number, Meaning("", "number on the subject's own scale, where numbers were asked for")] = None
+    choice: Annotated[str | None, Meaning("", "the subject's answer where two were compared: first or second")] = None
+    standard: Annotated[
+        int | None,
+        Meaning("", "index of the surface that all others of the block are compared with; empty where there is none"),
+    ] = None
+    rule: Annotated[str, Meaning("", "which mu the model got: maximum, or mean over the steady window")] = ""
+    mu: Annotated[Number, Meaning("", "coefficient of friction that the model got")] = None
+    mu_low: Annotated[Number, Meaning("", "lower end of its 95 % bootstrap interval")] = None
+    mu_high: Annotated[Number, Meaning("", "upper end")] = None
+    mu_dynamic: Annotated[Number, Meaning("", "mean of T/N over the steady window")] = None
+    mu_static: Annotated[Number, Meaning("", "T/N at a static peak; empty where none stands out")] = None
+    tau_max: Annotated[
+        Number, Meaning("MPa", "greatest tangential force over the contact area: the traction bound")
+    ] = None
+    tau_max_low: Annotated[Number, Meaning("MPa", "lower end of its 95 % bootstrap interval")] = None
+    tau_max_high: Annotated[Number, Meaning("MPa", "upper end")] = None
+    speed: Annotated[Number, Meaning("mm/s", "of the centre of pressure over the steady window")] = None
+    speed_low: Annotated[Number, Meaning("mm/s", "lower end of its 95 % bootstrap interval")] = None
+    speed_high: Annotated[Number, Meaning("mm/s", "upper end")] = None
+    normal_force: Annotated[Number, Meaning("N", "measured, mean over the steady window")] = None
+    normal_force_low: Annotated[Number, Meaning("N", "lower end of its 95 % bootstrap interval")] = None
+    normal_force_high: Annotated[Number, Meaning("N", "upper end")] = None
+    sed: Annotated[Number, Meaning("MPa", "predicted strain-energy density, averaged over the ending")] = None
+    sed_low: Annotated[
+        Number, Meaning("MPa", "lower end of the 95 % interval that the uncertainty of friction alone makes")
+    ] = None
+    sed_high: Annotated[Number, Meaning("MPa", "upper end")] = None
+    sed_interval: Annotated[str, Meaning("", "how that interval was found, or why there is none")] = ""
+    error_estimate: Annotated[Number, Meaning("", "of sed, from its mesh, relative")] = None
+    tangential_force: Annotated[Number, Meaning("N", "measured, mean over the steady window")] = None
     responses: Mapping[str, float] = field(default_factory=dict[str, float])  # each quantity at the ending, by name
-    model_normal_force: float | None = None  # [N]
-    model_normal_force_error: float | None = None  # relative, estimated by the solver
-    matching_depth: float | None = None  # [mm]
-    flaws: tuple[str, ...] = ()
-    why: str = ""
+    model_normal_force: Annotated[
+        Number, Meaning("N", "of the model, pressed to the planned depth, times the finger's width")
+    ] = None
+    model_normal_force_error: Annotated[Number, Meaning("", "its relative error, estimated by the solver")] = None
+    matching_depth: Annotated[
+        Number, Meaning("mm", "depth at which the model would press as hard as the subject did")
+    ] = None
+    flaws: Annotated[
+        tuple[str, ...], Meaning("", "names of the flaws graded doubtful or worse, with blanks between")
+    ] = ()
+    why: Annotated[str, Meaning("", "why there is no SED")] = ""
     paths: Values = ()  # a quantity along each of `sessions.statistics.multiverse.PATHS`, where they were asked for
 
     def response(self, quantity: str) -> float | None:
@@ -248,30 +261,23 @@ def _row(
 
 def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analysis) -> TrialRow:
     """Return the row with what was measured in the trial's stroke."""
-    stroke = analysis.strokes[friction.stroke]
-    intervals = analysis.intervals[friction.stroke]
-    mu_low, mu_high = (intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic) or (None, None)
-    tau_max_low, tau_max_high = intervals.tau_max or (None, None)
-    speed_low, speed_high = intervals.speed or (None, None)
-    normal_low, normal_high = intervals.normal_force or (None, None)
+    stroke, intervals = analysis.strokes[friction.stroke], analysis.intervals[friction.stroke]
+    numbers = {
+        "mu": (friction.mu, intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic),
+        "tau_max": (friction.tau_max, intervals.tau_max),
+        "speed": (friction.speed, intervals.speed),
+        "normal_force": (stroke.normal_force, intervals.normal_force),
+    }
+    bounds = {name: ends for name, (value, ends) in numbers.items() if value is not None and ends is not None}
     return replace(
         row,
         rule=friction.rule,
-        mu=friction.mu,
-        mu_low=mu_low,
-        mu_high=mu_high,
         mu_dynamic=stroke.mu_dynamic,
         mu_static=stroke.mu_static,
-        tau_max=friction.tau_max,
-        tau_max_low=None if friction.tau_max is None else tau_max_low,
-        tau_max_high=None if friction.tau_max is None else tau_max_high,
-        speed=friction.speed,
-        speed_low=None if friction.speed is None else speed_low,
-        speed_high=None if friction.speed is None else speed_high,
-        normal_force=stroke.normal_force,
-        normal_force_low=normal_low,
-        normal_force_high=normal_high,
         tangential_force=stroke.tangential_force,
+        **{name: value for name, (value, _) in numbers.items()},
+        **{f"{name}_low": low for name, (low, _) in bounds.items()},
+        **{f"{name}_high": high for name, (_, high) in bounds.items()},
     )
 
 

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from sessions.statistics.scales.paired import LEAST_SUBJECTS, Ends
+from sessions.statistics.scales.paired import LEAST_SUBJECTS
 from sessions.statistics.scales.psychometric import QUARTILE
-from sessions.statistics.scores import CONFIDENCE
+from sessions.statistics.scores import CONFIDENCE, IntervalEstimate
 
 Array = NDArray[np.float64]
 Judgement = Literal["scores", "estimates", "choices", "comparisons"]
@@ -25,7 +25,7 @@ JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparis
 RESAMPLES = 1000
 
 
-def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Mapping[int, Ends]:
+def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
     Intervals are expanded percentiles of a bootstrap over subjects (Hesterberg 2015, Am. Stat. 69, 371): of few
@@ -53,10 +53,10 @@ def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Ma
     n = len(whole)
     tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, (1.0 - CONFIDENCE) / 2.0)))
     ends = np.nanquantile(answered.values(drawn), [tail, 1.0 - tail], axis=0).T.tolist()
-    return {i: Ends(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
+    return {i: IntervalEstimate(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
 
 
-def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, Ends]:
+def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from its µ and the logarithm of the JND and of its ends.
 
     The JND is a difference of log µ. The interval is the JND's: µ is taken as exact.
@@ -64,10 +64,10 @@ def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float])
     logs = {index: math.log(value) for index, value in mu.items()}
     middle = sum(logs.values()) / max(len(logs), 1)
     value, *ends = (QUARTILE / math.exp(one) for one in log_jnd)
-    out: dict[int, Ends] = {}
+    out: dict[int, IntervalEstimate] = {}
     for index, log_mu in logs.items():
         low, high = sorted((log_mu - middle) * end for end in ends)
-        out[index] = Ends((log_mu - middle) * value, low, high)
+        out[index] = IntervalEstimate((log_mu - middle) * value, low, high)
     return out
 
 

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse import csgraph
 
+from sessions.statistics.scores import IntervalEstimate
+
 Array = NDArray[np.float64]
 Model = Literal["Bradley–Terry", "Thurstone V"]
 MODELS: tuple[Model, ...] = ("Bradley–Terry", "Thurstone V")
@@ -39,23 +41,16 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class Ends:
-    """A value with its 95 % interval, a bootstrap over subjects; None where there is none."""
-
-    value: float
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class PairedScale:
     """The scale of one set of choices. There are no values where `reason` says why."""
 
     model: Model
     choices: int
     subjects: int
-    values: Mapping[int, Ends] = field(default_factory=dict[int, Ends])  # by index, with mean 0, in logits or z
-    first: Ends | None = None  # what coming first adds, in the same unit
+    values: Mapping[int, IntervalEstimate] = field(
+        default_factory=dict[int, IntervalEstimate]
+    )  # by index, with mean 0, in logits or z
+    first: IntervalEstimate | None = None  # what coming first adds, in the same unit
     deviance: float | None = None  # against a model with a chance of its own for every ordered pair
     freedom: int | None = None  # degrees of freedom of that deviance
     p: float | None = None  # of so large a deviance, by chi squared; too small where pairs were met a few times
@@ -88,7 +83,7 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry", se
     if fitted is None:
         return replace(none, reason="the likelihood has no finite maximum")
     draws, why = _bootstrap(counts, model, fitted, seed)
-    ends = [_ends(value, draws[:, n] if why == "" else None) for n, value in enumerate(fitted.tolist())]
+    ends = [_estimate(value, draws[:, n] if why == "" else None) for n, value in enumerate(fitted.tolist())]
     deviance, freedom = _deviance(whole, fitted, model)
     return replace(
         none,
@@ -206,11 +201,8 @@ def _bootstrap(counts: Array, model: Model, begin: Array, seed: int) -> tuple[Ar
     return np.array(scales), ""
 
 
-def _ends(value: float, draws: Array | None) -> Ends:
-    if draws is None:
-        return Ends(value, None, None)
-    low, high = np.quantile(draws, [0.025, 0.975]).tolist()
-    return Ends(value, low, high)
+def _estimate(value: float, draws: Array | None) -> IntervalEstimate:
+    return IntervalEstimate(value, *([None, None] if draws is None else np.quantile(draws, [0.025, 0.975]).tolist()))
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
-from sessions.statistics.scores import CONFIDENCE
+from sessions.statistics.scores import CONFIDENCE, IntervalEstimate
 
 Array = NDArray[np.float64]
 
@@ -50,25 +50,16 @@ class Level:
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
-    """A value with the ends of its 95 % interval; None where the likelihood sets no bound."""
-
-    value: float
-    low: float | None
-    high: float | None
-
-
-@dataclass(frozen=True, slots=True)
 class Psychometric:
     """One psychometric function. There are no values where `reason` says why."""
 
     answers: int
-    pse: Profile | None = None  # log ratio at which both are chosen equally often [-]
+    pse: IntervalEstimate | None = None  # log ratio at which both are chosen equally often [-]
     # From there to three choices of four, lapses taken away, in log ratio; 0 where answers step between two levels [-].
-    jnd: Profile | None = None
-    lapse: Profile | None = None  # share of answers by chance [-]
-    correlation: Profile | None = None  # of answers to one pair in one order; 0: binomial scatter [-]
-    order: Profile | None = None  # log ratio that coming second adds; None where orders are not known [-]
+    jnd: IntervalEstimate | None = None
+    lapse: IntervalEstimate | None = None  # share of answers by chance [-]
+    correlation: IntervalEstimate | None = None  # of answers to one pair in one order; 0: binomial scatter [-]
+    order: IntervalEstimate | None = None  # log ratio that coming second adds; None where orders are not known [-]
     rises: bool = True  # choices go with the magnitude; False: against it
     log_likelihood: float | None = None
     deviance: float | None = None  # of the binomial law, against a chance of its own for every level and order
@@ -148,11 +139,13 @@ class _Task:
         """Say whether all answers are alike, or the JND lies beyond everything that was compared."""
         return self.k.sum() in (0.0, self.n.sum()) or abs(float(self.best[_SLOPE])) * self.reach < QUARTILE
 
-    def profile(self, which: int) -> Profile:
+    def profile(self, which: int) -> IntervalEstimate:
         """Return a parameter with its interval of the profile likelihood."""
         value = float(self.best[which])
         low, high = self._end(which, -1.0), self._end(which, 1.0)
-        return Profile(value, None if low is None else min(low, value), None if high is None else max(high, value))
+        return IntervalEstimate(
+            value, None if low is None else min(low, value), None if high is None else max(high, value)
+        )
 
     def deviance(self) -> float:
         """Return the binomial deviance of the chances that were fitted."""
@@ -262,18 +255,18 @@ class _Task:
         return -half * math.log(float(free.sum() / self.n.sum())), -half * float(by_theta.sum() / free.sum())
 
 
-def _jnd(slope: Profile, steepest: float, reach: float) -> Profile:
+def _jnd(slope: IntervalEstimate, steepest: float, reach: float) -> IntervalEstimate:
     """Return the JND that a slope of either sign makes: 0 where it may be a step, without a bound beyond the reach."""
     steeper, flatter = (slope.high, slope.low) if slope.value > 0.0 else (slope.low, slope.high)
     flat = flatter is None or flatter * slope.value <= 0.0 or abs(flatter) * reach < QUARTILE
     low, value = (0.0 if end is None or abs(end) >= steepest else QUARTILE / abs(end) for end in (steeper, slope.value))
-    return Profile(value, low, None if flat or flatter is None else QUARTILE / abs(flatter))
+    return IntervalEstimate(value, low, None if flat or flatter is None else QUARTILE / abs(flatter))
 
 
-def _correlation(scatter: Profile) -> Profile:
+def _correlation(scatter: IntervalEstimate) -> IntervalEstimate:
     """Return the correlation of answers, theta / (1 + theta)."""
     low, high = (None if end is None else end / (1.0 + end) for end in (scatter.low, scatter.high))
-    return Profile(scatter.value / (1.0 + scatter.value), low, high)
+    return IntervalEstimate(scatter.value / (1.0 + scatter.value), low, high)
 
 
 @dataclass(frozen=True, slots=True)
