@@ -1,8 +1,10 @@
-"""Files that are there whole or not at all."""
+"""Files and folders that are there whole or not at all."""
 
 import json
 import os
-from collections.abc import Mapping
+import shutil
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +23,34 @@ def json_text(document: Mapping[str, Any]) -> str:
 
 def write_whole(path: Path, content: bytes) -> None:
     """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new."""
-    new = path.with_name(f".{path.name}.part")
+    new = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with open_new(new) as file:
             file.write(content)
+        put_in_place(new, path)
     except OSError:  # a full disk, on which a part of the file would only take room
         new.unlink(missing_ok=True)
         raise
-    put_in_place(new, path)
+
+
+def holds_something(folder: Path) -> bool:
+    """Say whether there is anything at `folder` that a new folder would replace."""
+    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Generator[Path]:
+    """Lend a folder that gets the name of `folder`, new or empty, once it is whole; else nothing of it is left."""
+    part = folder.with_name(f".{folder.name}.part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
+        yield part
+        if folder.exists():
+            folder.rmdir()
+        part.replace(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def put_in_place(new: Path, path: Path) -> None:

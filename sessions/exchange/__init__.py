@@ -6,12 +6,12 @@ A newcomer in `FORMATS` is tested before anyone writes a test for it (`docs/how-
 """
 
 import importlib
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sessions.atomic_file import holds_something, whole_folder
 from sessions.file_access import remedy
 from sessions.recording import Recording
 
@@ -44,22 +44,15 @@ def export(source: ExportSource, name: str, folder: Path, progress: Progress | N
 
     The folder appears when it is whole: stopped half-way nothing is left. Raises ExportError.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if holds_something(folder):
         raise ExportError(f"{folder} is not empty; give a new folder, for nothing is written over")
-    part = folder.with_name(f".{folder.name}.part")
     try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
-        importlib.import_module(FORMATS[name]).write(source, part, progress or _unseen)
-        if folder.exists():
-            folder.rmdir()
-        part.replace(folder)
+        with whole_folder(folder) as part:
+            importlib.import_module(FORMATS[name]).write(source, part, progress or _unseen)
     except OSError as error:
         raise ExportError(
             f"{folder} cannot be written ({error.strerror or error}); {remedy(error)}, or give another"
         ) from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return folder
 
 

@@ -1,5 +1,9 @@
 """A session that was exported by this program comes back whole: read, written as a session, and compared."""
 
+import csv
+import errno
+import importlib
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -8,14 +12,17 @@ from typing import Any, cast
 
 from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
-from sessions.atomic_file import write_whole
+from sessions.atomic_file import holds_something, whole_folder, write_whole
+from sessions.exchange import FORMATS
+from sessions.exchange.csv_text import ImportRefused
+from sessions.file_access import remedy
 from sessions.recording.derived import GAIN_ERROR, bytes_of
 from sessions.recording.description import Digest, different, digest_of
 from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
-from sessions.recording.schema import FORMAT, FORMAT_VERSION
+from sessions.recording.schema import FORMAT, FORMAT_VERSION, LIVE_FILE, RecordingError
 from sessions.recording.writer import SessionWriter
 from sessions.strokes.decisions import DECISIONS
 
@@ -129,3 +136,62 @@ def _write(exported: ExportedSession, writer: SessionWriter) -> None:
     writer.readings(waiting)
     for block in blocks:
         writer.readings(block)
+
+
+_DAMAGED = (
+    *(OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, RuntimeError, MemoryError),
+    *(csv.Error, zlib.error),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """What came back."""
+
+    readings: int
+    events: int
+    differences: tuple[str, ...]  # what is not as it was recorded, a sentence each
+
+
+def exported(path: Path) -> ExportedSession | None:
+    """Return the session in an export of ours; None for anything else, such as a CSV file. Raises ImportRefused."""
+    if (path / LIVE_FILE).exists():
+        raise ImportRefused(f"{path} is a session folder already: every verb takes it as it is")
+    for module in map(importlib.import_module, FORMATS.values()):
+        file = module.find(path) if hasattr(module, "find") else None
+        if file is not None:
+            try:
+                return module.read(file)
+            except _DAMAGED as error:
+                sentence = f"{path} cannot be read as an export ({_sentence(error)}); {_remedy(error)}"
+                raise ImportRefused(sentence) from error
+    if path.is_dir():
+        raise ImportRefused(f"{path} holds no export of this program; give one, or a CSV file")
+    return None
+
+
+def import_session(source: ExportedSession, folder: Path) -> Restored:
+    """Make a session folder of an export; nothing is left behind where it is damaged.
+
+    Raises ImportRefused for a damaged export, RecordingError for a folder that cannot be written.
+    """
+    if holds_something(folder):
+        raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
+    try:
+        with whole_folder(folder) as part:
+            differences = restore(source, part)
+    except _DAMAGED as error:
+        raise ImportRefused(f"{source.path} is damaged ({_sentence(error)}); {_remedy(error)}") from error
+    restored = Recording.open(folder)
+    return Restored(sum(len(block) for block in restored.blocks()), len(restored.events), differences)
+
+
+def _remedy(error: Exception) -> str:
+    if isinstance(error, OSError) and error.errno not in (None, errno.ENOENT):
+        return remedy(error)
+    return "export the session anew"
+
+
+def _sentence(error: Exception) -> str:
+    sentence = " ".join(str(error).split())
+    return f"{sentence} is missing" if isinstance(error, KeyError) else sentence

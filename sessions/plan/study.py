@@ -3,7 +3,6 @@
 import base64
 import hashlib
 import json
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
@@ -13,7 +12,7 @@ import msgspec
 
 from sessions.plan.orders import shuffled
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows
+from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows, is_code
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,5 +166,5 @@ def labels_of(key: Key) -> Labels:
 
 def check_code(what: str, code: str) -> None:
     """Raise StudyError unless `code` is one: no name, nothing a file's name could not hold."""
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", code):
+    if not is_code(code):
         raise StudyError(f'{what} "{code}" is not allowed: a code of letters, digits, - and _, never a name')

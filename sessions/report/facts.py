@@ -16,6 +16,7 @@ from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile
+from sessions.report.wording import stopped
 from sessions.statistics.multiverse import PATHS, Values
 from sessions.statistics.scores import ScoreTable, grading, reversed_subjects
 from sessions.strokes.analysis import Analysis
@@ -207,7 +208,7 @@ def excluded(
 ) -> tuple[str, ...]:
     """Return what was kept out of the results, by whom and why, a sentence each."""
     out = [one for one in analysis.decisions if one.leaves_out]
-    sentences = [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in out]
+    sentences = [stopped(f"By {one.sentence}") for one in out]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         sentences += _trial(record)
@@ -224,7 +225,7 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
     kept = [one for one in analysis.decisions if not one.leaves_out]
-    sentences += [f"By {one.sentence}{'' if one.sentence.endswith('.') else '.'}" for one in kept]
+    sentences += [stopped(f"By {one.sentence}") for one in kept]
     for record in recording.trials:
         number = record.trial.number
         if record.outcome == "not answered":

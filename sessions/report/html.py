@@ -2,7 +2,6 @@
 
 import base64
 import io
-import os
 from collections.abc import Sequence
 from functools import partial
 from itertools import chain
@@ -11,8 +10,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
+from sessions.atomic_file import write_whole
 from sessions.exchange.csv_text import write_rows
-from sessions.file_access import open_new, remedy
+from sessions.file_access import remedy
 from sessions.report import study_prose
 from sessions.report import tables as report_tables
 from sessions.report.contents import Report
@@ -170,18 +170,10 @@ def _is_page(path: Path) -> bool:
 
 
 def swap_in(path: Path, text: str) -> None:
-    """Write a file beside its place, then put it there in one step."""
-    new = path.with_name(f".{path.name}.{os.getpid()}.new")
+    """Write a file beside its place, then put it there in one step. Raises ReportError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            with open_new(new) as file:
-                file.write(text.encode())
-                file.flush()
-                os.fsync(file.fileno())
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
+        write_whole(path, text.encode())
     except OSError as error:
         raise ReportError(
             f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, doubt_of
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
-from sessions.prediction.model_facts import model_facts
+from sessions.prediction.stored import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
 from sessions.strokes.friction import AreaLaw
 

@@ -8,7 +8,16 @@ from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import compared_with_standard, psychometric_sentences
 from sessions.report.tables.scores import paths_sentence
-from sessions.report.wording import ShownResponse, correlation, digits, ends_of, plural, shown_response, spread_share
+from sessions.report.wording import (
+    ShownResponse,
+    capital,
+    correlation,
+    digits,
+    ends_of,
+    plural,
+    shown_response,
+    spread_share,
+)
 from sessions.statistics.scores import Relation, relation
 
 REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
@@ -136,7 +145,7 @@ def summary(report: Report) -> tuple[str, ...]:
     if subjects:
         stimuli = sum(len(e.scores) for e in report.experiments)
         sentences.append(
-            f"{_capital(plural(len(subjects), 'subject'))} scored {_plural(stimuli, 'stimulus', 'stimuli')}."
+            f"{capital(plural(len(subjects), 'subject'))} scored {plural(stimuli, 'stimulus', 'stimuli')}."
         )
     if report.course is not None or report.strokes:
         sentences.append(_strokes(report))
@@ -152,7 +161,7 @@ def summary(report: Report) -> tuple[str, ...]:
             sentences.append(paths_sentence(experiment.name, experiment.paths))
     missing = sum(p.sed is None for p in report.predictions)
     if missing:
-        sentences.append(f"{_capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
+        sentences.append(f"{capital(plural(missing, 'trial'))} got no prediction; the tables say why.")
     excluded, flaws = len(report.excluded) or "nothing", len(report.flaws) or "none"
     sentences.append(f"Excluded: {excluded}; flaws found: {flaws}; the appendix names each.")
     return tuple(sentences)
@@ -175,7 +184,7 @@ def _strokes(report: Report) -> str:
     if n == 0:
         return "No stroke was found in the recording; the flaws below say why."
     measured = sum(s.mu_dynamic is not None for s in report.strokes)
-    words = f"{_capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
+    words = f"{capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
     values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
     if len(values) < 2:
         return words + (f", µ = {digits(values[0], 2)}." if values else ".")
@@ -186,7 +195,7 @@ def _predicted(experiment: Experiment, shown: ShownResponse, ends: tuple[float, 
     """Return how prediction and score go together in one experiment; `ends` are in the shown unit."""
     low, high = ends
     decimals, unit = (2, " kPa") if shown.unit == "kPa" else (shown.places, "")
-    words = f"{_capital(experiment.name)}: the {shown.label} predicted{f' at {strain}' if strain else ''}"
+    words = f"{capital(experiment.name)}: the {shown.label} predicted{f' at {strain}' if strain else ''}"
     if high > low:
         words += f" runs from {digits(low, decimals)} to {digits(high, decimals)}{unit}"
         words += f" (a range of {spread_share(low, high)})"
@@ -203,11 +212,3 @@ def related_words(related: Relation | None) -> str:
         return f"; no correlation with the scores: {related.reason}"
     words = f"; against the mean scores r = {correlation(related.pearson)}{ends_of(related)}"
     return words + f", n = {related.n} stimuli"
-
-
-def _plural(n: int, one: str, many: str) -> str:
-    return f"{n} {one if n == 1 else many}"
-
-
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import chain
 
 from sessions.prediction import BY_NAME, SED
-from sessions.prediction.model_facts import UNKNOWNS
+from sessions.prediction.stored import UNKNOWNS
 from sessions.recording.provenance import software_versions
 from sessions.report.contents import Fact
 from sessions.report.facts import area_words, calibration_words, model_words
@@ -16,7 +16,7 @@ from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import compared_in_study, psychometric_sentences, scale_sentences
 from sessions.report.tables.scores import paths_sentence
-from sessions.report.wording import correlation, digits, plural, significant
+from sessions.report.wording import capital, correlation, digits, plural, significant, stopped
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.pooling.visit import Exclusion
 
@@ -60,7 +60,7 @@ def told_apart(study: StudyFindings) -> list[str]:
 
 
 def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:
-    name, label = one.descriptor[:1].upper() + one.descriptor[1:], BY_NAME[study.response].label
+    name, label = capital(one.descriptor), BY_NAME[study.response].label
     strain = study.options.prediction.kinematics
     other = "finite" if strain == "small" else "small"
     if one.repeated is None:
@@ -121,12 +121,12 @@ def excluded(study: StudyFindings) -> list[str]:
         for session, first in study.copies
     ]
     sentences += [
-        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {_stopped(one.why)}"
+        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {stopped(one.why)}"
         for one in study.excluded
         if _fits(study, one)
     ]
     sentences += [
-        f"Session {visit.session}: {_stopped(decision)}"
+        f"Session {visit.session}: {stopped(decision)}"
         for visit in study.visits
         for decision in visit.decisions
         if " is left out: " in decision
@@ -137,7 +137,7 @@ def excluded(study: StudyFindings) -> list[str]:
 def remarks(study: StudyFindings) -> list[str]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [
-        f"Session {visit.session}: {_stopped(decision)}"
+        f"Session {visit.session}: {stopped(decision)}"
         for visit in study.visits
         for decision in visit.decisions
         if " is left out: " not in decision
@@ -215,10 +215,6 @@ def _fits(study: StudyFindings, one: Exclusion) -> bool:
     return any(v.subject == one.subject and one.descriptor in ("", r.descriptor) for v in study.visits for r in v.rows)
 
 
-def _stopped(sentence: str) -> str:
-    return sentence if sentence.endswith(".") else f"{sentence}."
-
-
 def _missing(study: StudyFindings) -> list[str]:
     """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
     sentences: list[str] = []
@@ -230,7 +226,7 @@ def _missing(study: StudyFindings) -> list[str]:
     for places in alike.values():
         first = "" if len({reason for _, reason in places}) == 1 else "of the first: "
         named = _listed([place for place, _ in places])
-        why = f"{first}{_stopped(places[0][1])}"
+        why = f"{first}{stopped(places[0][1])}"
         sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
     return sentences
 

@@ -124,13 +124,23 @@ def direction(sign: int | None) -> str:
     return {1: "proximal to distal", -1: "distal to proximal", None: NONE}[sign]
 
 
-def plural(n: int, noun: str) -> str:
+def plural(n: int, noun: str, several: str = "") -> str:
     """Return a count with its noun.
 
-    >>> plural(1, "subject"), plural(10, "subject")
-    ('1 subject', '10 subjects')
+    >>> plural(1, "subject"), plural(10, "subject"), plural(2, "stimulus", "stimuli")
+    ('1 subject', '10 subjects', '2 stimuli')
     """
-    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+    return f"{n} {noun if n == 1 else several or noun + 's'}"
+
+
+def capital(words: str) -> str:
+    """Return words as they begin a sentence."""
+    return words[:1].upper() + words[1:]
+
+
+def stopped(sentence: str) -> str:
+    """Return a sentence with its full stop."""
+    return sentence if sentence.endswith(".") else f"{sentence}."
 
 
 def identifier(name: str) -> str:

@@ -1,7 +1,9 @@
 """Which readings of a block can be used: what was lost, froze, saturated, or came at uneven times."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,9 @@ from sessions.strokes.invalid_readings import (
     spikes,
 )
 from sessions.strokes.settings import AnalysisSettings
+
+if TYPE_CHECKING:
+    from sessions.recording.reader import Recording
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -238,3 +243,22 @@ def _time_flaws(step: float, even: bool, stalled: int) -> _FlawParts:
         sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
         flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
     return flaws
+
+
+def doubtful_readings(recording: "Recording") -> Iterator[str]:
+    """Yield a sentence, the flaw's name first, for each cause that makes recorded readings doubtful."""
+    if recording.info is None:
+        return
+    count = StatusCount(recording.info.status)
+    for block in recording.blocks():
+        count.take(block.status)
+    words = flagged_words(count.flagged)
+    if faulty := count.verdicts["doubtful"]:
+        yield f"{FlawName.DEVICE_FAULT}: {faulty} readings are doubtful, the device reported a fault: {words}"
+    if saturated := count.verdicts["saturated"]:
+        yield f"{FlawName.SATURATED}: {saturated} readings are invalid, as the device reported: {words}"
+    if unsure := sum(event.data.get("off_units", 0) for event in recording.events if event.kind == "losses"):
+        yield (
+            f"{FlawName.RECORDING}: the last {unsure} readings of a stream are doubtful, the device was found to "
+            "count in other units; leave them out"
+        )

@@ -21,9 +21,8 @@ from recordings import PLAN, plainly_read, with_a_long_answer
 
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS, ExportError, ExportSource, export
-from sessions.exchange.exported import side_files
+from sessions.exchange.exported import exported, import_session, side_files
 from sessions.exchange.import_csv import ImportRefused
-from sessions.exchange.import_session import exported, import_session
 from sessions.exchange.session_tables import tables
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal

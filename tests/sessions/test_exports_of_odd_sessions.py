@@ -9,7 +9,7 @@ import pytest
 from recordings import PLAN, TRIAL, begun, ended, readings
 
 from sessions.exchange import FORMATS, ExportSource, export
-from sessions.exchange.import_session import exported, import_session
+from sessions.exchange.exported import exported, import_session
 from sessions.file_access import packed_lines
 from sessions.recording import Recording
 

@@ -9,7 +9,7 @@ import pytest
 from recordings import begun, change, ended, rows
 
 from daq_app.cli.main import run
-from sessions.exchange.import_session import exported, import_session
+from sessions.exchange.exported import exported, import_session
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
 from sessions.recording.description import digest_of

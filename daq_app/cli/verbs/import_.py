@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, console: Console) -> int:
     """Import the file, seal the session and say what nobody stated."""
-    from sessions.exchange.import_session import exported
+    from sessions.exchange.exported import exported
 
     session = exported(options.file)
     return _foreign(options, console) if session is None else _restored(session, options, console)
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _restored(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
     """Make a session of an export of ours again."""
-    from sessions.exchange.import_session import import_session
+    from sessions.exchange.exported import import_session
     from sessions.recording.archive import seal
 
     stated = [name for name in _OF_FOREIGN if getattr(options, name) not in (None, False)]

@@ -13,7 +13,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems
 from sessions.recording.derived import GAIN_ERROR, gain_error_set
 from sessions.strokes.decisions import DECISIONS, read
-from sessions.strokes.doubtful_readings import doubtful_readings
+from sessions.strokes.signal_quality import doubtful_readings
 from sessions.toml_file import SettingsError
 
 EXAMPLE = "daq-app verify recordings/P07"

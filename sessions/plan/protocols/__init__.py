@@ -1,6 +1,6 @@
 """The protocols we run, a validated TOML file each, their reader, and the plan of a session. The folder is the list."""
 
-from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blinded, design_rows, plan
+from sessions.plan.protocols.planning import Body, StudyPlace, VisitSetting, blinded, design_rows, is_code, plan
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
@@ -21,6 +21,7 @@ __all__ = [
     "VisitSetting",
     "blinded",
     "design_rows",
+    "is_code",
     "plan",
     "protocol",
     "protocol_file",

@@ -79,7 +79,8 @@ def plan(
     planned_phases = protocol.phases if phases is None else phases
     try:
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
-        _check_subject(subject)
+        if not is_code(subject):
+            raise NotAllowed("subject", subject, "a code of letters, digits, - and _, never a name")
         check_seed("seed", seed)
         check_phases(protocol, planned_phases)
         check_body(own, protocol)
@@ -125,9 +126,9 @@ def _order_rule(protocol: Protocol, row: int | None, first: BlockOutline) -> str
     return rule if protocol.order.blocks != "counterbalanced" else f"{rule}; blocks counterbalanced, {first.name} first"
 
 
-def _check_subject(subject: str) -> None:
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject):
-        raise SettingsError(f'subject = "{subject}" is not allowed: a code of letters, digits, - and _, never a name')
+def is_code(text: str) -> bool:
+    """Say whether a text is a code: no name, nothing a file's name could not hold."""
+    return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", text) is not None
 
 
 def design_rows(protocol: Protocol) -> int | None:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from textwrap import fill
 
 from sessions.report.tables.cells import Cell, Notes, Row, Table, table
-from sessions.report.wording import NONE, correlation, digits, p_value, places
+from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
 from sessions.statistics.dependent_correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
@@ -76,7 +76,7 @@ def _alike(name: str, model: str, rivals: Sequence[Rival]) -> list[str]:
     needed = sorted((rival.needed, rival.name) for rival in alike if rival.needed is not None)
     each = [f"{_rounded(count)} ({name})" for count, name in dict.fromkeys((*needed[:1], *needed[-1:]))]
     opening = (
-        f"{name[:1].upper()}{name[1:]}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
+        f"{capital(name)}: {names} {order} these {alike[0].n} surfaces as the {model} does, so no order "
         f"of scores can tell {them} apart from it; "
     )
     if not each:

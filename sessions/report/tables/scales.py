@@ -7,7 +7,7 @@ import numpy as np
 
 from sessions.report.contents import Report
 from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, table
-from sessions.report.wording import NONE, digits, p_value, places
+from sessions.report.wording import NONE, capital, digits, p_value, places
 from sessions.statistics.pooling.answers import Average
 from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scales.latent import JUDGEMENTS, Judgement
@@ -80,7 +80,7 @@ def _value(scale: PairedScale, interval: IntervalEstimate | None, notes: Notes) 
 def scale_sentences(one: DescriptorFindings) -> list[str]:
     """Return what choices and estimates of a descriptor say beside their tables."""
     sentences: list[str] = []
-    name = one.descriptor[:1].upper() + one.descriptor[1:]
+    name = capital(one.descriptor)
     if one.scales and one.scales[0].p is not None:
         fits = [
             f"{scale.model} {digits(scale.deviance, 1)} on {scale.freedom} degrees of freedom (p {_p(scale.p)})"
@@ -153,7 +153,7 @@ def compared_in_study(study: StudyFindings) -> list[Judged]:
 def psychometric_sentences(judged: Judged) -> list[str]:
     """Return what comparisons with a standard say: of one subject, or of subjects at large."""
     name, functions, (pse, jnd) = judged
-    title = name[:1].upper() + name[1:]
+    title = capital(name)
     fitted = [one for one in functions.values() if one.pse is not None and one.jnd is not None]
     sentences: list[str] = []
     if len(functions) == 1:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from sessions.report.contents import Report
 from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, range_cell, table
-from sessions.report.wording import NONE, correlation, digits, identifier, places, shown_response, significant
+from sessions.report.wording import NONE, capital, correlation, digits, identifier, places, shown_response, significant
 from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
 from sessions.statistics.scores import MeanScore, Relation, sd_interval, slope_interval
 
@@ -136,7 +136,7 @@ def paths_table(named: Iterable[Named]) -> Table | None:
 def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
     """Return the distribution in a sentence."""
     whole = spread(correlations(findings))
-    start = f"{name[:1].upper()}{name[1:]}: of {len(findings)} paths of the analysis"
+    start = f"{capital(name)}: of {len(findings)} paths of the analysis"
     if whole is None:
         return f"{start} none gives a correlation."
     return (

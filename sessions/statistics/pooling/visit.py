@@ -12,8 +12,8 @@ import msgspec
 
 from sessions.plan.plan import Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
-from sessions.prediction.model_facts import model_facts
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
+from sessions.prediction.stored import model_facts
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set
