@@ -15,11 +15,11 @@ from solver._kernels import hooke, multifrontal
 from solver._kernels.arguments import RecoveryArrays
 from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import Array, Indices, Narrow
-from solver.body.stiffness import Elastic, Probes, condensed_elements
+from solver.body.stiffness import Elastic, condensed_elements, inverse
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import Elasticity
 from solver.linalg import factors_of, symbolic_factorization
-from solver.mesh import GAUSS_4, Q2P1, Mesh, line
+from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
 from solver.tolerances import UNHELD
 
 _ALONE = Lock()  # held while the memory of `_memory` is in use
@@ -298,10 +298,9 @@ class LinearBody:
     @cached_property
     def _corners(self) -> Array:
         """The gradients (e, 8, 9) of shape functions, along x and y at each corner of each element."""
-        count = len(self.mesh.elements)
-        element, local = np.repeat(np.arange(count), 4), np.tile(Q2P1.corners, (count, 1))
-        gradient = Probes.at(self.mesh, self.elastic, element, local).gradient
-        return np.ascontiguousarray(np.swapaxes(gradient, 1, 2).reshape(count, 8, 9))
+        slopes = Q2P1.shape(Q2P1.corners)[1]  # (4, 9, 2)
+        gradient = slopes @ inverse(jacobians(self.mesh, Q2P1.corners)[0])
+        return np.ascontiguousarray(np.swapaxes(gradient, 2, 3).reshape(-1, 8, 9))
 
 
 def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:

@@ -88,12 +88,20 @@ class LinearPatches:
         starts = (np.diff(element, prepend=-1) != 0) | (np.diff(patch, prepend=-1) != 0)
         part, first = np.cumsum(starts) - 1, np.flatnonzero(starts)
         place = np.arange(len(part)) - first[part]
-        shear, lame = self.elastic.shear[element], self.elastic.lame[element]
-        moduli = self.endings.weights[order] * [shear, shear, shear, lame / 2.0]  # W = G eps:eps + lambda/2 theta^2
-        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 4, 18))
-        roots[part, place] = probes.strain[order] * np.sqrt(moduli.T)[:, :, None]
-        roots = roots.reshape(len(first), -1, 18)
-        return element[first], patch[first], np.swapaxes(roots, 1, 2) @ roots
+        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx and d/dy of shape functions, modes
+        sizes = np.sqrt(self.endings.weights[order])[:, None]
+        roots[part, place, :18] = np.swapaxes(probes.gradient[order], 1, 2).reshape(-1, 18) * sizes
+        roots[part, place, 18:] = probes.modes[order] * sizes
+        sums = np.swapaxes(roots, 1, 2) @ roots
+        xx, yx, yy, element = sums[:, :9, :9], sums[:, 9:18, :9], sums[:, 9:18, 9:18], element[first]
+        form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
+        form[:, :, 0, :, 0], form[:, :, 0, :, 1] = xx + yy / 2.0, yx / 2.0
+        form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
+        theta = self.elastic.dilatation[element]
+        volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
+        shear, lame = (modulus[element, None, None] for modulus in (self.elastic.shear, self.elastic.lame))
+        # W = G eps:eps + lambda/2 theta^2
+        return element, patch[first], shear * form.reshape(-1, 18, 18) + lame / 2.0 * volume
 
     def responses(self, displacement: Array) -> Array:
         """Do as `Patches` says."""

@@ -77,9 +77,6 @@ class Probes:
     element: Indices  # (p,)
     gradient: Array  # (p, 9, 2) of the shape functions there [1/mm]
     modes: Array  # (p, 3) volume-strain modes there
-    strain: (
-        Array  # (p, 4, 18) of the element's nodes: strain xx, yy, xy times root of 2, volume; (0, 4, 18) if not known
-    )
 
     @staticmethod
     def at(mesh: Mesh, elements: Centred, element: Indices, local: Array) -> "Probes":
@@ -89,8 +86,7 @@ class Probes:
         jacobian = np.swapaxes(corners, 1, 2) @ slopes
         place = (values[:, None] @ corners)[:, 0] - elements.centre[element]
         modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
-        gradient = slopes @ inverse(jacobian)
-        return Probes(element, gradient, modes, _strains(elements, element, gradient, modes))
+        return Probes(element, slopes @ inverse(jacobian), modes)
 
     def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
         """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
@@ -99,31 +95,25 @@ class Probes:
         slopes = np.swapaxes(self.gradient, 1, 2) @ moved.reshape(len(moved), 9, -1)
         return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
 
-    def strains(self, mesh: Mesh, displacement: Array) -> Array:
-        """Return strains xx, yy, xy times root of 2, and volume strain (p, 4, ...) for displacements (nodes, 2, ...).
-
-        For probes of an elastic body alone.
-        """
-        held, place = np.unique(self.element, return_inverse=True)
-        local = displacement[mesh.elements[held]]
-        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
-        return (self.strain @ local[place]).reshape(len(self.element), 4, *displacement.shape[2:])
-
     def state(self, mesh: Mesh, elastic: Elastic, displacement: Array, tangent: Array | None = None) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
 
         `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
         """
-        strain = self.strains(mesh, displacement)
-        wide = (slice(None), *([None] * (strain.ndim - 2)))
-        half = strain[:, 2] / np.sqrt(2.0)
+        gradient = self.displacement_gradient(mesh, displacement)
+        held, place = np.unique(self.element, return_inverse=True)
+        local = displacement[mesh.elements[held]]
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)
+        volume = (self.modes[:, None] @ (elastic.dilatation[held] @ local)[place])[:, 0]
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        half = (gradient[:, 0, 1] + gradient[:, 1, 0]) / 2.0
         along = np.array([[1.0, 0.0]]) if tangent is None else tangent
         return LocalState(
-            xx=strain[:, 0],
+            xx=gradient[:, 0, 0],
             xy=half,
             yx=half,
-            yy=strain[:, 1],
-            dilatation=strain[:, 3],
+            yy=gradient[:, 1, 1],
+            dilatation=volume.reshape(half.shape),
             shear=elastic.shear[self.element][wide],
             lame=elastic.lame[self.element][wide],
             stiffening=np.array(PLAIN),
@@ -135,21 +125,10 @@ class Probes:
         return SED.small(self.state(mesh, elastic, displacement))
 
 
-def _strains(elements: Centred, element: Indices, gradient: Array, modes: Array) -> Array:
-    """Return what makes strains (p, 4, 18) of the displacements of nodes, for an elastic body."""
-    if not isinstance(elements, Elastic):
-        return np.empty((0, 4, 18))
-    out = np.zeros((len(element), 4, 18))
-    out[:, 0, ::2], out[:, 1, 1::2] = gradient[:, :, 0], gradient[:, :, 1]
-    out[:, 2, ::2], out[:, 2, 1::2] = gradient[:, :, 1] / np.sqrt(2.0), gradient[:, :, 0] / np.sqrt(2.0)
-    out[:, 3] = (modes[:, None] @ elements.dilatation[element])[:, 0]
-    return out
-
-
 def inverse(matrices: Array) -> Array:
-    """Return the inverses of matrices (p, 2, 2), in closed form."""
-    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
-    return np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), 2, 0)
+    """Return the inverses of matrices (..., 2, 2), in closed form."""
+    (a, b), (c, d) = np.moveaxis(matrices, (-2, -1), (0, 1))
+    return np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), (0, 1), (-2, -1))
 
 
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:

@@ -183,11 +183,12 @@ class LinearFinger(Finger[LinearPatches]):
     @cached_property
     def ending_by_skin(self) -> Array:
         """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
-        endings, elastic = self.ending.endings, self.body.elastic
-        shear, lame = (modulus[endings.probes.element] for modulus in (elastic.shear, elastic.lame))
-        lines = endings.probes.strains(self.geometry.mesh, self.body.every_step())  # (p, 4, 2 k)
-        lines *= np.sqrt(endings.weights / endings.areas * [shear, shear, shear, lame / 2.0]).T[:, :, None]
-        _, sizes, turns = np.linalg.svd(lines.reshape(-1, lines.shape[2]), full_matrices=False)
+        endings = self.ending.endings
+        at = endings.probes.state(self.geometry.mesh, self.body.elastic, self.body.every_step())  # (p, 2 k)
+        whole = np.sqrt(endings.weights / endings.areas)[:, None]
+        strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, np.sqrt(2.0) * at.xy])
+        lines = np.vstack([*(whole * strain), whole * np.sqrt(at.lame / 2.0) * at.dilatation])
+        _, sizes, turns = np.linalg.svd(lines, full_matrices=False)
         large = sizes**2 > NO_ENERGY * sizes[0] ** 2
         return sizes[large, None] * turns[large]
 
