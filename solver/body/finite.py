@@ -123,12 +123,6 @@ class FiniteBody:
         """Number of unknown displacements, centres included."""
         return self.plan.size + 2 * len(self.nodes)
 
-    def nodal(self, local: Array) -> Array:
-        """Return the forces (nodes, 2) on nodes that forces (e, 18) on those of the elements add up to."""
-        out = np.zeros(self.mesh.nodes.shape)
-        np.add.at(out, self.nodes, local.reshape(-1, 9, 2))
-        return out
-
     def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - all nodes are there anyway
         """Do as `Body` says."""
         return u
@@ -182,7 +176,7 @@ class FiniteBody:
         pressure = self.lame[:, None] * (self.modes @ volume[:, :, None])[:, :, 0]
         stress = self.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
         gradient = np.stack([self.grad_x, self.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
-        return self.nodal((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
+        return self.mesh.assemble((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
 
     def _gradient(self, u: Array) -> Array:
         """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""

@@ -212,7 +212,7 @@ class LinearBody:
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
             pushed = whole.elastic.stiffness @ moved[mesh.elements].reshape(-1, 18, 1)
-            np.subtract.at(force, mesh.elements, pushed.reshape(-1, 9, 2))
+            force -= mesh.assemble(pushed)
         carried = whole.condense(force) if force.any() else whole.unloaded
         condensed = _condensed(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
@@ -268,32 +268,39 @@ class LinearBody:
 
     def forces(self, displacement: Array) -> Array:
         """Do as `Body` says."""
-        local = displacement[self.mesh.elements]
-        # what moves an element as a whole strains nothing, but would drown small strains in round-off
-        local = (local - local[:, 8:]).reshape(len(local), 18, 1)
-        out = np.zeros(displacement.shape)
-        np.add.at(out, self.mesh.elements, (self.elastic.stiffness @ local).reshape(len(local), 9, 2))
-        return out
+        return self.mesh.assemble(self.elastic.stiffness @ self._local(displacement).reshape(-1, 18, 1))
 
     def energy_growth(self, displacement: Array) -> float:
         """Do as `Body` says."""
-        return float(np.sum(self.forces(displacement) * displacement))
+        local = self._local(displacement).reshape(-1, 18, 1)
+        return float(np.sum(local * (self.elastic.stiffness @ local)))
+
+    def _local(self, displacement: Array) -> Array:
+        """Return the displacements (e, 9, 2) of the elements' nodes beyond that of the centre.
+
+        What moves an element as a whole strains nothing, but would drown small strains in round-off.
+        """
+        local = displacement[self.mesh.elements]
+        return local - local[:, 8:]
 
     def smallest_det(self, displacement: Array) -> float:
         """Do as `Body` says, of the corners of elements, where strains are largest."""
-        return float(np.prod(self.stretches(displacement), axis=0).min())
+        return float(_determinant(self._at_corners(displacement)).min())
 
     def stretches(self, displacement: Array) -> Array:
         """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
 
         They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
         """
-        local = displacement[self.mesh.elements]
-        f = (self._corners @ (local - local[:, 8:])).reshape(-1, 2, 2) + np.eye(2)  # transposed, of the same stretches
-        det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+        f = self._at_corners(displacement)
+        det = _determinant(f)
         total = np.sum(f * f, axis=(1, 2))
         plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
         return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
+
+    def _at_corners(self, displacement: Array) -> Array:
+        """Return F transposed (p, 2, 2) at every corner of every element."""
+        return (self._corners @ self._local(displacement)).reshape(-1, 2, 2) + np.eye(2)
 
     @cached_property
     def _corners(self) -> Array:
@@ -301,6 +308,11 @@ class LinearBody:
         slopes = Q2P1.shape(Q2P1.corners)[1]  # (4, 9, 2)
         gradient = slopes @ inverse(jacobians(self.mesh, Q2P1.corners)[0])
         return np.ascontiguousarray(np.swapaxes(gradient, 2, 3).reshape(-1, 8, 9))
+
+
+def _determinant(f: Array) -> Array:
+    """Return the determinants (p,) of matrices (p, 2, 2)."""
+    return f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
 
 
 def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:

@@ -72,8 +72,8 @@ class LinearPatches:
         local = displacement[self.mesh.elements[element]]
         local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
         energy = np.einsum("mic,mic->mc", local, form @ local)
-        total = np.zeros((self.endings.count, energy.shape[1]))
-        np.add.at(total, patch, energy)
+        total, first = np.zeros((self.endings.count, energy.shape[1])), np.flatnonzero(np.diff(patch, prepend=-1))
+        total[patch[first]] = np.add.reduceat(energy, first)
         return (total / self.endings.areas[:, None]).reshape(-1, *displacement.shape[2:])
 
     @cached_property

@@ -93,8 +93,7 @@ class RelaxingBody:
             moved[self.mesh.driven] = prescribed[self.mesh.driven]
             local = moved[self.mesh.elements].reshape(len(load), 18)
             load -= np.einsum("eij,ej->ei", form.elastic.stiffness, local)
-        nodes = np.zeros(self.mesh.nodes.shape)
-        np.add.at(nodes, self.mesh.elements, load.reshape(-1, 9, 2))
+        nodes = self.mesh.assemble(load)
         nodes[self.mesh.driven] = 0.0
         body, recover = form.under(nodes)
         self._next = lambda u: recover(u) + moved, step
@@ -116,9 +115,7 @@ class RelaxingBody:
         local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
         inner = np.einsum("eij,ej->ei", self._relaxed.stiffness, local)
         inner += np.einsum("eij,ejm,em->ei", self.elastic.stiffness, self._left, self._g)
-        out = np.zeros(self.mesh.nodes.shape)
-        np.add.at(out, self.mesh.elements, inner.reshape(-1, 9, 2))
-        return out
+        return self.mesh.assemble(inner)
 
     def energy(self, probes: Probes) -> Array:
         """Return the stored energy density (p,) [MPa]."""

@@ -121,6 +121,11 @@ class Mesh:
         out[self.fixed] = True
         return out.reshape(-1, 2)
 
+    def assemble(self, local: Array) -> Array:
+        """Return the sums (n, 2) over elements at each node of `local` (e, 18): x, y of an element's nodes in turn."""
+        node, along = self.elements.ravel(), local.reshape(-1, 2).T
+        return np.stack([np.bincount(node, one, len(self.nodes)) for one in along], axis=1, dtype=np.float64)
+
 
 # offsets along the grid's two directions of an element's nodes, for grids whose first direction turns to the second
 # clockwise (as from proximal to distal, then outwards to the skin)

@@ -317,7 +317,9 @@ def _balanced(
 
 def _audits(finger: FiniteFinger, newton: Newton, state: EquilibriumState) -> dict[str, float]:
     body = newton.condensed
-    over: Array | None = finger.body.nodal(body.excess(state.u)) if isinstance(body, CondensedRelaxing) else None
+    over: Array | None = (
+        finger.body.mesh.assemble(body.excess(state.u)) if isinstance(body, CondensedRelaxing) else None
+    )
     return audit.audits(finger, state, state.u, over)
 
 
