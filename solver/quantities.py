@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive.hyperelastic import log1p, shape, slopes
+from solver.constitutive import log1p, shape, slopes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ def _small_energy(at: LocalState) -> Array:
 
 
 def _finite_energy(at: LocalState) -> Array:
-    """Return W of `solver.constitutive.hyperelastic` [MPa], ln J being the element's best fit of it."""
+    """Return W of `solver.constitutive` [MPa], ln J being the element's best fit of it."""
     return at.shear / 2.0 * shape(at.stiffening, at.excess) + at.lame / 2.0 * at.dilatation**2
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from solver.arrays import Array, Indices
 from solver.body.receptor import Patches
-from solver.constitutive.hyperelastic import HUMAN_SKIN
+from solver.constitutive import HUMAN_SKIN
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
 from solver.failures import NoSteadyState, SolveFailure

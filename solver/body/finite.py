@@ -13,7 +13,7 @@ from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, S
 from solver._kernels.compiling import HELD_X, HELD_Y, bind_arguments
 from solver.arrays import Array, Indices, Narrow
 from solver.body.validation import check_body, check_driven, check_laws
-from solver.constitutive.hyperelastic import Law, log1p, shape, slopes
+from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization
 from solver.mesh import Q2P1, Mesh
 from solver.tolerances import IMAGINARY

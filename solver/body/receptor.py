@@ -11,7 +11,7 @@ from solver._kernels.arguments import ProbeArrays
 from solver.arrays import Array, Indices, Narrow
 from solver.body.finite import FiniteBody
 from solver.body.stiffness import Centred, Elastic, Probes
-from solver.constitutive.hyperelastic import log1p
+from solver.constitutive import log1p
 from solver.mesh import GAUSS_3, Mesh, distinct
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import QUANTITIES, LocalState

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from solver._kernels import hooke
 from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
 from solver.arrays import Array, Indices
-from solver.constitutive import Elasticity
-from solver.constitutive.hyperelastic import PLAIN
+from solver.constitutive import PLAIN, Elasticity
 from solver.mesh import Q2P1, Mesh
 from solver.quantities import SED, LocalState
 

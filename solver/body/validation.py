@@ -6,8 +6,7 @@ from math import isfinite
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import Elasticity, Prony
-from solver.constitutive.hyperelastic import Law
+from solver.constitutive import Elasticity, Law, Prony
 from solver.mesh import Q2P1, Mesh, jacobians
 from solver.scene.tables import STIFFENING
 from solver.tolerances import CUT
@@ -79,9 +78,7 @@ def check_laws(laws: Sequence[Law]) -> None:
     """Raise BodyError unless `laws` are those of finite strain, their exponents within what the scene file allows."""
     for number, law in enumerate(laws):
         if not hasattr(law, "stiffening"):
-            raise BodyError(
-                f"material {number}, {law}, is no law of finite strain; give one of solver.constitutive.hyperelastic"
-            )
+            raise BodyError(f"material {number}, {law}, is no law of finite strain; give one of solver.constitutive")
         low, high = STIFFENING
         if not low <= law.stiffening <= high:
             raise BodyError(

@@ -1,11 +1,22 @@
-"""Energy and stress of the tissues, a class each; the list of materials is at the foot."""
+"""Energy, stress and tangent of the tissues, a class each; the lists of materials and of laws are at the foot.
+
+At small strain gradients are those of the displacement. At finite strain, in plane strain, F is (..., 2, 2) and
+F_zz = 1. W is energy per undeformed volume [MPa], P = dW/dF the nominal stress (first Piola-Kirchhoff) and A = dP/dF.
+Every law at finite strain is W = shape(Q) + lambda/2 (ln J)^2 with Q = tr C - 3 - 2 ln J >= 0, so that elements may
+replace ln J in the last term by a best fit of it.
+"""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 
 from solver.arrays import Array
+
+PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
+HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
+NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by differences
+TERMS = 14  # of it: enough up to an exponent of 20
 
 
 def shear_modulus(E: float, nu: float) -> float:
@@ -173,4 +184,134 @@ def kept(times: Array) -> Array:
     return -np.expm1(-times) / times
 
 
+class Law(Elasticity, Protocol):
+    """What an element asks of a law at finite strain."""
+
+    name: ClassVar[str]
+
+    @property
+    def stiffening(self) -> float:
+        """Ogden's exponent, by which the shear modulus grows with strain; PLAIN where it stays [-]."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class NeoHooke(Isotropic):
+    """W = G/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984, Comput. Meth. Appl. Mech. Eng. 46, 201).
+
+    P = G (F - F^-T) + lambda ln J F^-T. A dermis held at its sides and pressed to 0.8 of its height:
+
+    >>> float(energy(NeoHooke(0.08, 0.48), np.diag([1.0, 0.8])).round(6))
+    0.017315
+    """
+
+    name: ClassVar[str] = "neo-Hooke"
+
+    @property
+    def stiffening(self) -> float:
+        """No stiffening."""
+        return PLAIN
+
+
+@dataclass(frozen=True, slots=True)
+class Ogden(Isotropic):
+    """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, that stiffens as it is strained.
+
+    Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches as
+    long as the volume stays; made compressible like the neo-Hookean law, which it is for a = 2. That human skin has
+    a = 9 is ascribed to Shergold and Fleck (2004, Proc. R. Soc. Lond. A 460, 3037).
+    P = G f(Q) (F - F^-T) + lambda ln J F^-T with f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length,
+    with a = 4: 2 G/16 (16 + 1/16 - 2):
+
+    >>> law = Ogden(0.08, 0.48, 4.0)
+    >>> float((energy(law, np.diag([2.0, 0.5])) / law.shear).round(6))
+    1.757812
+    """
+
+    name: ClassVar[str] = "Ogden"
+    stiffening: float = HUMAN_SKIN  # a [-]
+
+
+def log1p(x: Array) -> Array:
+    """Return ln(1 + x), of complex numbers for the smallest imaginary parts: NumPy's own loses a small x's digits."""
+    log = np.log1p(x.real)
+    return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
+
+
+def shape(exponent: Array, Q: Array) -> Array:
+    """Return W by G/2 (...) of Ogden's exponents, without the term of ln J: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
+    some = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
+    if np.all(exponent == PLAIN):
+        return some
+    return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(some) / 2.0)) ** 2
+
+
+def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
+    """Return f = dW/dQ by G/2, by which the shear modulus has grown, and df/dQ (...).
+
+    f is Gauss's series 2F1(1 + a/2, 1 - a/2; 3/2; -Q/4), of which the first terms serve where Q is small.
+
+    >>> [float(number) for number in slopes(np.array(4.0), np.array(0.01))]  # 1 + Q/2
+    [1.005, 0.5]
+    """
+    a, x = exponent, -Q / 4.0
+    value, slope, term = np.ones_like(x), np.zeros_like(x), np.ones_like(x)
+    for n in range(TERMS):
+        factor = (1.0 + a / 2.0 + n) * (1.0 - a / 2.0 + n) / ((1.5 + n) * (n + 1.0))
+        slope = slope - (n + 1.0) / 4.0 * factor * term
+        term = term * factor * x
+        value = value + term
+    far = np.real(Q) > NEAR
+    s = np.arcsinh(np.sqrt(np.where(far, Q, 1.0)) / 2.0)
+    one, two = np.sinh(a * s), np.sinh(2.0 * s)
+    wide = 2.0 / a * one / two
+    bend = (2.0 * np.cosh(a * s) - 2.0 * wide * np.cosh(2.0 * s)) / (4.0 * two**2)
+    return np.where(far, wide, value), np.where(far, bend, slope)
+
+
+def _parts(F: Array) -> tuple[Array, Array, Array]:
+    """Return J (...), F^-T (..., 2, 2) and Q (...)."""
+    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+    adjugate = np.empty_like(F)
+    adjugate[..., 0, 0], adjugate[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
+    adjugate[..., 0, 1], adjugate[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
+    Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
+    return J, adjugate / J[..., None, None], Q
+
+
+def energy(law: Law, F: Array) -> Array:
+    """Return W (...) [MPa] at deformation gradients F (..., 2, 2); nan where det F is not positive."""
+    J, _, Q = _parts(F)
+    grown = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
+    return law.shear / 2.0 * grown + law.lame / 2.0 * np.log(J) ** 2
+
+
+def stress(law: Law, F: Array) -> Array:
+    """Return the nominal stress P (..., 2, 2) [MPa], tension positive; the Cauchy stress is P F^T / J.
+
+    >>> F = np.diag([1.0, 0.8])
+    >>> (stress(NeoHooke(0.08, 0.48), F) @ F.T / 0.8).round(6)[1, 1].item()  # sides held
+    -0.193089
+    """
+    J, inverse, Q = _parts(F)
+    shear = (law.shear * slopes(np.array(law.stiffening), Q)[0])[..., None, None]
+    return shear * (F - inverse) + law.lame * np.log(J)[..., None, None] * inverse
+
+
+def tangent(law: Law, F: Array) -> Array:
+    """Return dP_aA/dF_bB (..., a, A, b, B) [MPa]."""
+    J, inverse, Q = _parts(F)
+    wide = (..., None, None, None, None)
+    grown, growth = slopes(np.array(law.stiffening), Q)
+    shear, more = (law.shear * grown)[wide], (2.0 * law.shear * growth)[wide]
+    pressure = law.lame * np.log(J)[wide]
+    excess = F - inverse
+    unit = np.einsum("ab,AB->aAbB", np.eye(2), np.eye(2))
+    crossed = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
+    stretched = np.einsum("...aA,...bB->...aAbB", excess, excess)
+    squeezed = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
+    return shear * (unit + crossed) + more * stretched - pressure * crossed + law.lame * squeezed
+
+
 MATERIALS = (Hooke, Prony)
+LAWS = (NeoHooke, Ogden)

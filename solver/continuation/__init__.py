@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array
-from solver.constitutive.hyperelastic import Law, stress, tangent
+from solver.constitutive import Law, stress, tangent
 from solver.contact import SkinCompression
 from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadState, Newton
 from solver.failures import NotConverged
@@ -280,7 +280,7 @@ def folds_at(law: Law) -> float:
 
     Biot's root for neo-Hookean tissue that keeps its volume, 0.5437:
 
-    >>> from solver.constitutive.hyperelastic import NeoHooke
+    >>> from solver.constitutive import NeoHooke
     >>> round(folds_at(NeoHooke(1.0, 0.4999999)), 4)
     0.5437
     """

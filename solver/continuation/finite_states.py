@@ -8,7 +8,7 @@ import numpy as np
 
 from solver._kernels import skin as skin_loops
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import Law
+from solver.constitutive import Law
 from solver.contact import SkinCompression
 from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep

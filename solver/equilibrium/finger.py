@@ -23,8 +23,7 @@ from solver.body.finite import VALUES, FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.receptor import Endings, FinitePatches, LinearPatches, Patches, endings, middle
 from solver.body.stiffness import Centred
-from solver.constitutive import Moduli, Prony
-from solver.constitutive.hyperelastic import Law, NeoHooke, Ogden
+from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
 from solver.contact import SkinCompression, width
 from solver.equilibrium import EquilibriumState, Newton
 from solver.failures import MIXED, NotConverged

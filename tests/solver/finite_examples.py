@@ -8,8 +8,7 @@ from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 from solver.body.finite import FiniteBody
 from solver.body.receptor import FinitePatches, endings
 from solver.body.stiffness import Elastic
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.mesh import Mesh

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import LAWS, energy, stress
+from solver.constitutive import LAWS, energy, stress
 from solver.equilibrium import LoadState
 from solver.equilibrium.full_slip import settled
 from solver.mesh import block, quality

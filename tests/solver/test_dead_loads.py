@@ -8,8 +8,7 @@ import pytest
 from solver._kernels.compiling import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke, stress
+from solver.constitutive import Hooke, NeoHooke, stress
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.load_stepping import loaded
 from tests.solver.finite_examples import block

@@ -12,9 +12,8 @@ from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.body.receptor import Endings, FinitePatches
 from solver.body.stiffness import Elastic, Probes
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke, Ogden
-from solver.constitutive.hyperelastic import shape as grown
+from solver.constitutive import Hooke, NeoHooke, Ogden
+from solver.constitutive import shape as grown
 from solver.continuation.small_states import settled
 from solver.equilibrium import LoadState, Newton, load_stepping
 from solver.equilibrium import full_slip as sliding

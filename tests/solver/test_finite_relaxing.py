@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from solver import Materials, Relaxation, Solve, solve
 from solver.accuracy.audits import course_audits
 from solver.body.finite import FiniteBody
-from solver.constitutive import Hooke, Prony, overstress
-from solver.constitutive.hyperelastic import NeoHooke
-from solver.constitutive.hyperelastic import stress as relaxed_stress
-from solver.constitutive.hyperelastic import tangent as relaxed_tangent
+from solver.constitutive import Hooke, NeoHooke, Prony, overstress
+from solver.constitutive import stress as relaxed_stress
+from solver.constitutive import tangent as relaxed_tangent
 from solver.constitutive.overstress import Past
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing

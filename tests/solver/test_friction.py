@@ -11,7 +11,7 @@ from solver._kernels import active_set
 from solver._kernels.arguments import ContactStates, LoadArguments
 from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import NeoHooke
 from solver.contact import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
 from solver.equilibrium import (
     BY_DEPTH,

@@ -6,8 +6,7 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
-from solver.constitutive import Hooke, Prony
-from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.constitutive import Hooke, NeoHooke, Ogden, Prony
 from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled

@@ -14,7 +14,7 @@ from solver._kernels import elements as element_loops
 from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.finite import CondensedFinite, FiniteBody
-from solver.constitutive.hyperelastic import LAWS, NeoHooke
+from solver.constitutive import LAWS, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle

@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState, NotConverged, Scene, Solve
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import NeoHooke, Ogden
+from solver.constitutive import NeoHooke, Ogden
 from solver.continuation import existence, finite_states, folds_at, follow
 from solver.continuation import existence as reach
 from solver.equilibrium import BY_FRICTION, LoadState, Newton

@@ -9,8 +9,7 @@ from solver.accuracy.error_estimate import PARTS, estimated
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.stiffness import Elastic
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import ForceLoad, LoadState, Newton
 from solver.equilibrium.full_slip import settled, slide_under
 from solver.equilibrium.load_stepping import march

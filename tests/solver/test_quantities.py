@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke, Ogden, energy, stress
+from solver.constitutive import Hooke, NeoHooke, Ogden, energy, stress
 from solver.quantities import FIELDS, QUANTITIES, LocalState
 
 E, NU = 0.08, 0.48

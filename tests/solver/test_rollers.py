@@ -8,8 +8,7 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.body.validation import BodyError
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import LoadState, Newton
 from solver.equilibrium.load_stepping import loaded, march
 from solver.mesh import Mesh

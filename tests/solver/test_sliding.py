@@ -8,7 +8,7 @@ import pytest
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import NeoHooke
 from solver.equilibrium import LoadState, Newton
 from solver.equilibrium.full_slip import settled
 from tests.solver.finite_examples import block, finger

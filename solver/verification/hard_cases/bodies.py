@@ -7,8 +7,7 @@ import numpy as np
 
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody
-from solver.constitutive import Hooke
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.equilibrium.full_slip import settled

@@ -9,7 +9,7 @@ import numpy as np
 from solver._kernels.compiling import STICK
 from solver.arrays import Array
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import NeoHooke
+from solver.constitutive import NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_stepping import march

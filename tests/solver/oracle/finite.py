@@ -8,7 +8,7 @@ import numpy as np
 from solver._kernels.contact_system import STEEP
 from solver.arrays import Array, Flags, Indices
 from solver.body.finite import FiniteBody
-from solver.constitutive.hyperelastic import shape, slopes
+from solver.constitutive import shape, slopes
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
