@@ -13,9 +13,8 @@ from typing import Final
 import numpy as np
 
 from solver._kernels import multifrontal
-from solver._kernels.arguments import Factors, SymbolicFactorization
 from solver._kernels.compiling import bind_arguments
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, Factors, Indices, Narrow, SymbolicFactorization
 from solver.mesh import Mesh, distinct
 
 

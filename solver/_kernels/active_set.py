@@ -6,17 +6,6 @@ contradict the solution change all at once; where that goes round in circles, th
 
 import numpy as np
 
-from solver._kernels.arguments import (
-    CondensedArrays,
-    ContactStates,
-    ContactSystem,
-    ForceControl,
-    LoadArguments,
-    Skin,
-    SkinPosition,
-    Slack,
-    StateChanges,
-)
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver._kernels.contact_system import (
     COLUMNS,
@@ -26,7 +15,19 @@ from solver._kernels.contact_system import (
     bounded_length,
     solve,
 )
-from solver.arrays import Array, Narrow
+from solver.arrays import (
+    Array,
+    CondensedArrays,
+    ContactStates,
+    ContactSystem,
+    ForceControl,
+    LoadArguments,
+    Narrow,
+    Skin,
+    SkinPosition,
+    Slack,
+    StateChanges,
+)
 
 SLACK = 1e-12  # a contradiction smaller than this, relative to the largest of its kind, is round-off
 DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # what drives the body: its depth, its normal force, its drag too

@@ -1,23 +1,16 @@
 """How numba compiles the loops, once on a machine, and the types and constants they share."""
 
-import gc
 import os
-import signal
-import threading
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
 from hashlib import blake2b
 from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
-from types import FrameType
 from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
-
-from solver.progress import aside
 
 States = NDArray[np.int8]
 Loop = TypeVar("Loop", bound=Callable[..., Any])
@@ -27,6 +20,7 @@ HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
 OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # states of a node of the skin
 _FAST = {"contract", "reassoc", "arcp", "nsz"}  # nan and infinity keep their meaning
 _FOLDER = Path(__file__).parent
+_ARRAYS = _FOLDER.parent / "arrays.py"  # what the loops take
 
 
 def _cache_folder() -> Path:
@@ -40,7 +34,7 @@ def _cache_folder() -> Path:
     from platformdirs import user_cache_path
 
     sources = blake2b(digest_size=8)
-    for file in sorted(_FOLDER.glob("*.py")):
+    for file in (*sorted(_FOLDER.glob("*.py")), _ARRAYS):
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
     named = os.environ.get("NUMBA_CACHE_DIR")
@@ -67,7 +61,7 @@ def only_mine(folder: Path) -> bool:
 os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, when it is imported
 _numba: Any = import_module("numba")
 _caching: Any = import_module("numba.core.caching")
-_event: Any = import_module("numba.core.event")
+events: Any = import_module("numba.core.event")
 
 
 class _SharedCache(_caching.FunctionCache):
@@ -95,69 +89,6 @@ def _alone(folder: Path) -> Generator[None]:
         except (ImportError, OSError):  # no such locks here: code may be compiled once more
             pass
         yield
-
-
-class _Compilation(_event.Listener):
-    """Says which loop is being compiled, and makes sure that Ctrl-C is not lost meanwhile.
-
-    Python delivers Ctrl-C between two of its own steps. One that comes while LLVM calls Python is printed and lost, so
-    it is raised once more when the loop is compiled.
-    """
-
-    def __init__(self) -> None:
-        """Listen to nothing yet."""
-        self._count = 0
-        self._open: ExitStack | None = None
-        self._loop: object = None
-        self._stopped = False
-
-    def on_start(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
-        """Report the loop whose compilation begins, unless it is part of another's."""
-        loop = event.data["dispatcher"]
-        if self._open is not None or loop.py_func.__module__.rpartition(".")[0] != __name__.rpartition(".")[0]:
-            return
-        _warn()
-        self._count += 1
-        self._loop, self._open = loop, ExitStack()
-        doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
-        self._open.enter_context(aside(doing))
-        if gc.isenabled():  # numba makes millions of objects that stay: to look through them is a sixth of its time
-            gc.disable()
-            self._open.callback(gc.enable)
-        self._hear_ctrl_c()
-
-    def on_end(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
-        """Report again what was reported before; raise KeyboardInterrupt where Ctrl-C came meanwhile."""
-        if self._open is None or event.data["dispatcher"] is not self._loop:
-            return
-        opened, self._open = self._open, None
-        opened.close()
-        if self._stopped:
-            self._stopped = False
-            raise KeyboardInterrupt
-
-    def _hear_ctrl_c(self) -> None:
-        mine = threading.current_thread() is threading.main_thread()
-        if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler or self._open is None:
-            return
-
-        def stop(number: int, frame: FrameType | None) -> None:
-            self._stopped = True
-            signal.default_int_handler(number, frame)
-
-        signal.signal(signal.SIGINT, stop)
-        self._open.callback(signal.signal, signal.SIGINT, signal.default_int_handler)
-
-
-@cache
-def _warn() -> None:
-    """Say, once a process, why the first run ever takes so long."""
-    import logging
-
-    logging.getLogger(__name__).warning("Compiling the loops, once on this machine: half a minute if it is not busy.")
-
-
-_event.register("numba:compile", _Compilation())
 
 
 def compiled(function: Loop) -> Loop:

@@ -5,9 +5,18 @@ First the length of skin that each node of it stands for.
 
 import numpy as np
 
-from solver._kernels.arguments import CondensedArrays, ContactStates, ContactSystem, LoadArguments, Skin, SkinPosition
 from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import (
+    Array,
+    CondensedArrays,
+    ContactStates,
+    ContactSystem,
+    Indices,
+    LoadArguments,
+    Narrow,
+    Skin,
+    SkinPosition,
+)
 
 COLUMNS = 4  # of the right-hand side
 ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off

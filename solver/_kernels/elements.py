@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, ElementWork, ProbeArrays
 from solver._kernels.compiling import compiled
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, BodyState, ElementArrays, ElementSystem, ElementWork, Indices, Narrow, ProbeArrays
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 

@@ -2,19 +2,22 @@
 
 import numpy as np
 
-from solver._kernels.arguments import (
+from solver._kernels.compiling import compiled
+from solver._kernels.elements import displacement_gradient, gather
+from solver._kernels.multifrontal import back_substitute_part
+from solver.arrays import (
+    Array,
     Factors,
+    Flags,
+    Indices,
     LinearElements,
     LinearMesh,
     LinearWork,
+    Narrow,
     RecoveryArrays,
     ShapeFunctions,
     SymbolicFactorization,
 )
-from solver._kernels.compiling import compiled
-from solver._kernels.elements import displacement_gradient, gather
-from solver._kernels.multifrontal import back_substitute_part
-from solver.arrays import Array, Flags, Indices, Narrow
 
 
 @compiled

@@ -7,9 +7,8 @@ U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows 
 
 import numpy as np
 
-from solver._kernels.arguments import Factors, SymbolicFactorization
 from solver._kernels.compiling import compiled
-from solver.arrays import Array, Narrow
+from solver.arrays import Array, Factors, Narrow, SymbolicFactorization
 
 
 @compiled

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from solver._kernels.arguments import ElementArrays, ElementSystem, OverstressWork
 from solver._kernels.compiling import compiled
 from solver._kernels.elements import displacement_gradient, gather
-from solver.arrays import Array, Narrow
+from solver.arrays import Array, ElementArrays, ElementSystem, Narrow, OverstressWork
 
 
 @compiled

@@ -9,9 +9,8 @@ from typing import cast
 import numpy as np
 
 from solver._kernels import elements as element_loops
-from solver._kernels.arguments import BodyState, ElementArrays, ElementSystem, SymbolicFactorization
 from solver._kernels.compiling import HELD_X, HELD_Y, bind_arguments
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, BodyState, ElementArrays, ElementSystem, Indices, Narrow, SymbolicFactorization
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.linalg import LinAlgError
 
 from solver._kernels import hooke, multifrontal
-from solver._kernels.arguments import RecoveryArrays
 from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, Indices, Narrow, RecoveryArrays
 from solver.body.stiffness import Elastic, condensed_elements, inverse
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import Elasticity

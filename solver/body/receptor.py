@@ -7,8 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from solver._kernels import elements as element_loops
-from solver._kernels.arguments import ProbeArrays
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, Indices, Narrow, ProbeArrays
 from solver.body.finite import FiniteBody
 from solver.body.stiffness import Centred, Elastic, Probes
 from solver.constitutive import log1p

@@ -9,8 +9,7 @@ from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
 from solver._kernels import hooke
-from solver._kernels.arguments import LinearElements, LinearMesh, ShapeFunctions
-from solver.arrays import Array, Indices
+from solver.arrays import Array, Indices, LinearElements, LinearMesh, ShapeFunctions
 from solver.constitutive import PLAIN, Elasticity
 from solver.mesh import Q2P1, Mesh
 from solver.quantities import SED, LocalState

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from solver._kernels import active_set
 from solver._kernels.active_set import DEPTH_GIVEN, DRAG_GIVEN, PUSH_GIVEN, SINGULAR, UNSETTLED
-from solver._kernels.arguments import (
+from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
+from solver.arrays import (
+    Array,
     CondensedArrays,
     ContactStates,
     ContactSystem,
@@ -23,8 +25,6 @@ from solver._kernels.arguments import (
     Skin,
     SkinPosition,
 )
-from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
-from solver.arrays import Array
 from solver.body import CondensedBody
 from solver.body.validation import finite
 from solver.contact import FrictionLaw

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from solver import _kernels
 from solver._kernels import compiling
 from solver._kernels import contact_system as skin_loops
 from solver._kernels.compiling import bind_arguments
@@ -105,7 +106,7 @@ def ctrl_c():
 
 
 def test_ctrl_c_that_is_lost_in_llvm_stops_when_the_loop_is_compiled(ctrl_c):
-    watch, event = compiling._Compilation(), SimpleNamespace(data={"dispatcher": skin_loops.tributary})
+    watch, event = _kernels._Compilation(), SimpleNamespace(data={"dispatcher": skin_loops.tributary})
     heard = []
     with listening(lambda doing, _: heard.append(doing)):
         report_progress("solving")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver._kernels import active_set
-from solver._kernels.arguments import ContactStates, LoadArguments
+from solver.arrays import ContactStates, LoadArguments
 from solver.body.finite import FiniteBody
 from solver.body.linear import CondensedLinear
 from solver.constitutive import NeoHooke
