@@ -7,7 +7,7 @@ import numpy as np
 from solver._kernels.compiling import SHEAR_LIMITED
 from solver._kernels.contact_system import bounded_length
 from solver.arrays import Array
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, Newton
 from solver.equilibrium.finger import Finger

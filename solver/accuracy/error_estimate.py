@@ -22,7 +22,7 @@ import numpy as np
 
 from solver._kernels.active_set import SINGULAR
 from solver.arrays import Array
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, ForceLoad, Newton
 from solver.equilibrium.finger import Finger
 from solver.equilibrium.load_path import end

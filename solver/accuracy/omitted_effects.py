@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.constitutive import HUMAN_SKIN
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
@@ -149,7 +149,7 @@ def _finite_strain(finger: LinearFinger, displacement: Array) -> dict[str, Any]:
     if det.min() > 0.0:
         log = np.log(det)
         finite = shear / 2.0 * (np.sum(f * f, axis=(1, 2)) - 2.0 - 2.0 * log) + lame / 2.0 * log**2
-        hooke = probes.energy(mesh, elastic, displacement[:, :, None])[:, 0]
+        hooke = elastic.energy(mesh, probes, displacement[:, :, None])[:, 0]
         estimate = abs(float(weights @ finite) / float(weights @ hooke) - 1.0)
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
     at_ending = float(np.abs(np.linalg.eigvalsh(strain)).max())

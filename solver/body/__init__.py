@@ -1,10 +1,17 @@
-"""A body: what is asked of it as a whole, and as Newton sees it, condensed to the k nodes of skin that may touch."""
+"""A body: what is asked of it as a whole, as Newton sees it, condensed to its skin, and of places inside it."""
 
 from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.linalg import LinAlgError
+from numpy.typing import NDArray
+
 from solver.arrays import Array, Indices, Narrow
-from solver.mesh import Mesh
+from solver.mesh import Q2P1, Mesh
+from solver.tolerances import UNHELD
 
 
 class CondensedBody(Protocol):
@@ -77,6 +84,11 @@ class Body(Protocol):
         """Number of unknown displacements."""
         ...
 
+    @property
+    def centre(self) -> Array:
+        """Where the pressure modes of its elements are counted from (e, 2) [mm]."""
+        ...
+
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
         """Return the displacements (n, 2, ...) of all nodes for those of one state or of several.
 
@@ -99,3 +111,174 @@ class Body(Protocol):
     def smallest_det(self, displacement: Array) -> float:
         """Return the least det F [-] at `displacement` (n, 2); not positive where tissue is inside out."""
         ...
+
+
+class CondensedLinear:
+    """A body at small strain, whose states are those of its skin: u (k, 2) [mm] are the displacements of that alone."""
+
+    def __init__(self, rest: Array, stiffness: Array, load: Array, length: Array, held: Narrow) -> None:
+        """Take skin that lies at `rest` (k, 2), of a `length` (k,) at each node, `held` as CondensedBody has it.
+
+        `stiffness` (2 k, 2 k) and dead `load` (2 k,) are those of x, y of one node, x, y of the next.
+        """
+        self.constant, self.bulk = True, 0.0
+        self.rest, self.stiffness, self.load = rest, stiffness, load
+        self.fixed_length, self.held = length, held
+        self.middle = np.zeros(len(rest), np.int32)
+        self.motions = np.zeros((2 * len(rest), 0))  # of the body as a whole that the surface alone balances
+        self.springs = self.motions  # all that nothing holds, orthonormal
+        self.force = -load
+        self.equilibrium: Array | None = None
+        self._compliance: Array | None = None
+
+    @property
+    def compliance(self) -> Array:
+        """The inverse of the stiffness (2 k, 2 k), 0 for what is held. Raises LinAlgError where that is none."""
+        if self._compliance is None:
+            self._compliance = self._inverse()
+        return self._compliance
+
+    def _inverse(self) -> Array:
+        free = np.flatnonzero(self.stiffness.diagonal() > 0.0)
+        # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
+        # surface's forces balance the loads along every motion.
+        spring = self.stiffness.trace() / max(len(free), 1)
+        inside = (self.stiffness + spring * self.springs @ self.springs.T)[np.ix_(free, free)]
+        inverse = np.asarray(np.linalg.inv(inside), np.float64)
+        if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
+            raise LinAlgError("the body is neither held nor balanced")
+        out = np.zeros(self.stiffness.shape)
+        out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
+        return out
+
+    def loaded(self, load: Array) -> "CondensedLinear":
+        """Return the same body under another dead `load` (2 k,) [N/mm]."""
+        other = copy(self)
+        other.load, other.force, other._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
+        return other
+
+    def undeformed(self) -> tuple[Array, Array]:
+        """Return displacements (k, 2) of the skin at rest, and no pressures."""
+        return np.zeros(self.rest.shape), np.zeros((0, 3))
+
+    def untouched(self) -> Array:
+        """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
+        return (self.compliance @ self.load).reshape(-1, 2)
+
+    def held_by(self, reaction: Array) -> Array:
+        """Return the displacements (k, 2) that forces `reaction` (k, 2) of the surface hold."""
+        return (self.compliance @ (self.load + reaction.ravel())).reshape(-1, 2)
+
+    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
+        """Return the energy stored once forces `reaction` (k, 2) alone hold the body [N mm per mm]."""
+        return 0.5 * float(np.sum(reaction * self.held_by(reaction)))
+
+    def work(self, way: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
+        """Do as `CondensedBody` says: forces grow in proportion, so that the rule is exact."""
+        return trapezoid
+
+    def place(self, u: Array) -> Array:
+        """Return where the skin's nodes are (k, 2) for displacements `u` (k, 2) [mm]."""
+        return self.rest + u
+
+    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - as every body is asked
+        """Set the `force` at a state."""
+        return self.relinearise(u)
+
+    def relinearise(self, u: Array) -> bool:
+        """Do the same: the stiffness is that of every state."""
+        self.force = self.stiffness @ u.ravel() - self.load if u.any() else -self.load
+        return True
+
+    def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
+        """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
+        return u + scale * step.reshape(u.shape), pressure, float(np.abs(step).max(initial=0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Probes:
+    """Places inside elements where the strain energy is wanted; p of them."""
+
+    element: Indices  # (p,)
+    gradient: Array  # (p, 9, 2) of the shape functions there [1/mm]
+    modes: Array  # (p, 3) volume-strain modes there
+
+    @staticmethod
+    def at(mesh: Mesh, centre: Array, element: Indices, local: Array) -> "Probes":
+        """Place probes at `local` (p, 2) coordinates of `element` (p,), whose modes are about `centre` (e, 2)."""
+        values, slopes = Q2P1.shape(local)
+        corners = mesh.nodes[mesh.elements[element]]
+        jacobian = np.swapaxes(corners, 1, 2) @ slopes
+        place = (values[:, None] @ corners)[:, 0] - centre[element]
+        modes = np.concatenate([np.ones((len(element), 1)), place], axis=1)
+        return Probes(element, slopes @ inverse(jacobian), modes)
+
+    def displacement_gradient(self, mesh: Mesh, displacement: Array) -> Array:
+        """Return du_a/dx_b (p, 2, 2, ...) for displacements (nodes, 2, ...)."""
+        moved = displacement[mesh.elements[self.element]]  # (p, 9, 2, ...)
+        moved = moved - moved[:, 8:]  # what moves an element as a whole would drown small strains in round-off
+        slopes = np.swapaxes(self.gradient, 1, 2) @ moved.reshape(len(moved), 9, -1)
+        return np.swapaxes(slopes.reshape(len(moved), 2, *moved.shape[2:]), 1, 2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Endings:
+    """Probes of several patches: r of them, p probes in all."""
+
+    probes: Probes
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,) number of the patch each probe belongs to
+    count: int
+    tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
+
+    @property
+    def areas(self) -> Array:
+        """Area of each patch (r,) [mm2]; nan where there is no patch."""
+        area = np.bincount(self.patch, self.weights, self.count)
+        return np.where(area > 0.0, area, np.nan)
+
+
+class Patches(Protocol):
+    """Endings of one body, r of them."""
+
+    def nodes(self) -> Indices:
+        """Return the numbers of the nodes whose displacements count."""
+        ...
+
+    def average(self, displacement: Array) -> Array:
+        """Return the SED averaged over each (r, ...) [MPa] for displacements (nodes, 2, ...); nan where no patch."""
+        ...
+
+    def responses(self, displacement: Array) -> Array:
+        """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
+        ...
+
+
+def patch_means(values: Array, weights: Array, patch: Indices, areas: Array) -> Array:
+    """Return values (p, ...) averaged over patches (r, ...) by weights (p,); `patch` (p,) says whose each is.
+
+    `areas` (r,) are the sums of weights, nan where there is no patch.
+    """
+    wide = (slice(None), *([None] * (values.ndim - 1)))
+    total = np.zeros((len(areas), *values.shape[1:]), values.dtype)
+    np.add.at(total, patch, values * weights[wide])
+    return total / areas[wide]
+
+
+def inverse(matrices: Array) -> Array:
+    """Return the inverses of matrices (..., 2, 2), in closed form."""
+    (a, b), (c, d) = np.moveaxis(matrices, (-2, -1), (0, 1))
+    return np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), (0, 1), (-2, -1))
+
+
+def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
+    """Return the local coordinates (p, 2) of `points` (p, 2) in elements with nodes `corners` (p, 9, 2), by Newton."""
+    local: NDArray[np.float64] = start.copy()
+    for _ in range(8):
+        values, slopes = Q2P1.shape(local)
+        missing = points - (values[:, None] @ corners)[:, 0]
+        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), missing)
+        local += step
+        if np.abs(step).max(initial=0.0) < 1e-7:  # what is left is the square of this step
+            break
+    return local

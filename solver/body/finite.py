@@ -10,11 +10,22 @@ import numpy as np
 
 from solver._kernels import elements as element_loops
 from solver._kernels.compiling import HELD_X, HELD_Y, bind_arguments
-from solver.arrays import Array, BodyState, ElementArrays, ElementSystem, Indices, Narrow, SymbolicFactorization
+from solver.arrays import (
+    Array,
+    BodyState,
+    ElementArrays,
+    ElementSystem,
+    Indices,
+    Narrow,
+    ProbeArrays,
+    SymbolicFactorization,
+)
+from solver.body import Endings, patch_means
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization
-from solver.mesh import Q2P1, Mesh
+from solver.mesh import Q2P1, Mesh, distinct
+from solver.quantities import QUANTITIES, LocalState
 from solver.tolerances import IMAGINARY
 
 VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
@@ -215,7 +226,7 @@ class CondensedFinite:
         """Set memory aside for `body`."""
         count = len(body.nodes)
         self.body, self.constant = body, False
-        self.load = np.zeros(body.size)  # dead loads on the body, of `load_stepping.loaded`
+        self.load = np.zeros(body.size)  # dead loads on the body, of `finite_states.loaded`
         self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
         self.inside = Elimination(body.plan)
         self.system = ElementSystem(
@@ -285,3 +296,95 @@ class CondensedFinite:
         """
         halfway = (self.body.energy_slope((one + other) / 2.0, other - one) for one, other in pairwise(way))
         return (trapezoid + 2.0 * sum(halfway)) / 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FinitePatches:
+    """Endings of a body at finite strain: p places inside elements, averaged with weights over r patches."""
+
+    body: FiniteBody
+    element: Narrow  # (p,)
+    grad_x: Array  # (p, 9)
+    grad_y: Array  # (p, 9)
+    modes: Array  # (p, 3)
+    weights: Array  # (p,) areas [mm2]
+    patch: Indices  # (p,)
+    areas: Array  # (r,) [mm2]; nan where there is no patch
+    tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
+
+    @staticmethod
+    def of(body: FiniteBody, endings: Endings) -> "FinitePatches":
+        """Carry the probes of `endings` over to `body`, element by element."""
+        probes = endings.probes
+        order = np.argsort(probes.element, kind="stable")
+        element = probes.element[order]
+        modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
+        gradient = probes.gradient[order]
+        return FinitePatches(
+            body,
+            element.astype(np.int32),
+            np.ascontiguousarray(gradient[..., 0]),
+            np.ascontiguousarray(gradient[..., 1]),
+            modes,
+            endings.weights[order],
+            endings.patch[order],
+            endings.areas,
+            endings.tangent[order],
+        )
+
+    def nodes(self) -> Indices:
+        """Do as `Patches` says."""
+        return distinct(self.body.mesh.elements[distinct(self.element)])
+
+    def energy(self, displacement: Array) -> Array:
+        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...), ln J being each element's best fit of it."""
+        if displacement.ndim > 2:
+            every = [self.energy(np.ascontiguousarray(one)) for one in np.moveaxis(displacement, -1, 0)]
+            return np.stack(every, axis=-1)
+        out = np.empty(len(self.element))
+        probes = ProbeArrays(self.element, self.grad_x, self.grad_y, self.modes)
+        element_loops.energies(displacement, self.body.elements, probes, out)
+        return out
+
+    def deformation(self, displacement: Array) -> Array:
+        """Return F (p, 2, 2) for displacements (nodes, 2)."""
+        local = displacement[self.body.nodes[self.element]]
+        gradient = np.stack([self.grad_x, self.grad_y], axis=-1)
+        return np.eye(2) + np.einsum("pia,piA->paA", local, gradient)
+
+    def average(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        return patch_means(self.energy(displacement), self.weights, self.patch, self.areas)
+
+    def responses(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        state = self.state(displacement)
+        values = (quantity.finite(state) for quantity in QUANTITIES)
+        return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
+
+    def state(self, displacement: Array) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
+        body = self.body
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        held, place = np.unique(self.element, return_inverse=True)
+        local = displacement[body.nodes[held]]  # (e, 9, 2, ...)
+        log = _log_volume(body.grad_x[held], body.grad_y[held], local)
+        fit = np.einsum("eq,eqm,eq...->em...", body.weight[held], body.modes[held], log)[place]
+        gradient = [np.einsum("pi,pi...->p...", grad, local[place]) for grad in (self.grad_x, self.grad_y)]
+        return LocalState(
+            xx=gradient[0][:, 0],
+            xy=gradient[1][:, 0],
+            yx=gradient[0][:, 1],
+            yy=gradient[1][:, 1],
+            dilatation=np.einsum("pm,pm...->p...", self.modes, fit),
+            shear=body.shear[self.element][wide],
+            lame=body.lame[self.element][wide],
+            stiffening=body.stiffening[self.element][wide],
+            tangent=(self.tangent[:, 0][wide], self.tangent[:, 1][wide]),
+        )
+
+
+def _log_volume(grad_x: Array, grad_y: Array, local: Array) -> Array:
+    """Return ln J (e, q, ...) at the quadrature points of elements for displacements of their nodes (e, 9, 2, ...)."""
+    along_x, along_y = (np.einsum("eqi,eia...->aeq...", grad, local) for grad in (grad_x, grad_y))
+    return log1p(along_x[0] + along_y[1] + along_x[0] * along_y[1] - along_x[1] * along_y[0])

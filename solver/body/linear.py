@@ -1,7 +1,6 @@
 """A body at small strain reduced to its skin: assembled and eliminated by the compiled loops."""
 
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import prod
@@ -13,18 +12,90 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels import hooke, multifrontal
 from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import Array, Indices, Narrow, RecoveryArrays
-from solver.body.stiffness import Elastic, condensed_elements, inverse
+from solver.arrays import Array, Indices, LinearElements, LinearMesh, RecoveryArrays, ShapeFunctions
+from solver.body import CondensedLinear, Endings, Probes, inverse, patch_means
 from solver.body.validation import check_body, check_held, check_loads, loose
-from solver.constitutive import Elasticity
+from solver.constitutive import PLAIN, Elasticity
 from solver.linalg import factors_of, symbolic_factorization
-from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
-from solver.tolerances import UNHELD
+from solver.mesh import GAUSS_4, Q2P1, Mesh, distinct, jacobians, line
+from solver.quantities import QUANTITIES, SED, LocalState
 
+_Q_VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+_SHAPES = ShapeFunctions(
+    _Q_VALUES, np.ascontiguousarray(_GRADIENTS[..., 0]), np.ascontiguousarray(_GRADIENTS[..., 1]), Q2P1.weights
+)
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 
 
 Carried = tuple[Array, Array]  # a load condensed on the unknowns (n,), and the moves (e, 2) of centres under it alone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Elastic:
+    """Elements made of Hooke materials: e of them, displacements ordered x, y, x, y, ... within each."""
+
+    stiffness: Array  # (e, 18, 18) [N/mm per mm]
+    dilatation: Array  # (e, 3, 18): displacements to the volume strain's modes 1, x - xc, y - yc
+    centre: Array  # (e, 2) xc, yc of the modes [mm]
+    shear: Array  # (e,) [MPa]
+    lame: Array  # (e,) [MPa]
+
+    @staticmethod
+    def of(mesh: Mesh, materials: Sequence[Elasticity]) -> "Elastic":
+        """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
+
+        K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
+        is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke). Raises
+        LinAlgError where an element is folded.
+        """
+        return condensed_elements(mesh, materials, np.empty((len(mesh.elements), 16, 16)))[0]
+
+    def state(self, mesh: Mesh, probes: Probes, displacement: Array, tangent: Array | None = None) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
+
+        `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
+        """
+        gradient = probes.displacement_gradient(mesh, displacement)
+        held, place = np.unique(probes.element, return_inverse=True)
+        local = displacement[mesh.elements[held]]
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)
+        volume = (probes.modes[:, None] @ (self.dilatation[held] @ local)[place])[:, 0]
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        half = (gradient[:, 0, 1] + gradient[:, 1, 0]) / 2.0
+        along = np.array([[1.0, 0.0]]) if tangent is None else tangent
+        return LocalState(
+            xx=gradient[:, 0, 0],
+            xy=half,
+            yx=half,
+            yy=gradient[:, 1, 1],
+            dilatation=volume.reshape(half.shape),
+            shear=self.shear[probes.element][wide],
+            lame=self.lame[probes.element][wide],
+            stiffening=np.array(PLAIN),
+            tangent=(along[:, 0][wide], along[:, 1][wide]),
+        )
+
+    def energy(self, mesh: Mesh, probes: Probes, displacement: Array) -> Array:
+        """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...)."""
+        return SED.small(self.state(mesh, probes, displacement))
+
+
+def condensed_elements(mesh: Mesh, materials: Sequence[Elasticity], outer: Array) -> tuple[Elastic, Array]:
+    """Return the elements of `mesh`, and the matrices (e, 2, 16) that recover their centre nodes.
+
+    Filled: `outer` (e, 16, 16), lower half, their stiffness when the centre nodes are eliminated. Raises LinAlgError
+    where an element is folded.
+    """
+    count = len(mesh.elements)
+    shear = np.array([m.shear for m in materials])[mesh.region]
+    lame = np.array([m.lame for m in materials])[mesh.region]
+    filled = LinearElements(
+        np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2)), np.empty((count, 2, 16))
+    )
+    if not hooke.stiffen(LinearMesh(mesh.nodes, mesh.elements, shear, lame), _SHAPES, filled, outer):
+        raise LinAlgError("an element is folded")
+    stiffness, dilatation, centre, recovery_matrix = filled
+    return Elastic(stiffness, dilatation, centre, shear, lame), recovery_matrix
 
 
 class LinearElimination:
@@ -93,88 +164,6 @@ _POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
 
 
-class CondensedLinear:
-    """A body at small strain, whose states are those of its skin: u (k, 2) [mm] are the displacements of that alone."""
-
-    def __init__(self, rest: Array, stiffness: Array, load: Array, length: Array, held: Narrow) -> None:
-        """Take skin that lies at `rest` (k, 2), of a `length` (k,) at each node, `held` as CondensedBody has it.
-
-        `stiffness` (2 k, 2 k) and dead `load` (2 k,) are those of x, y of one node, x, y of the next.
-        """
-        self.constant, self.bulk = True, 0.0
-        self.rest, self.stiffness, self.load = rest, stiffness, load
-        self.fixed_length, self.held = length, held
-        self.middle = np.zeros(len(rest), np.int32)
-        self.motions = np.zeros((2 * len(rest), 0))  # of the body as a whole that the surface alone balances
-        self.springs = self.motions  # all that nothing holds, orthonormal
-        self.force = -load
-        self.equilibrium: Array | None = None
-        self._compliance: Array | None = None
-
-    @property
-    def compliance(self) -> Array:
-        """The inverse of the stiffness (2 k, 2 k), 0 for what is held. Raises LinAlgError where that is none."""
-        if self._compliance is None:
-            self._compliance = self._inverse()
-        return self._compliance
-
-    def _inverse(self) -> Array:
-        free = np.flatnonzero(self.stiffness.diagonal() > 0.0)
-        # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
-        # surface's forces balance the loads along every motion.
-        spring = self.stiffness.trace() / max(len(free), 1)
-        inside = (self.stiffness + spring * self.springs @ self.springs.T)[np.ix_(free, free)]
-        inverse = np.asarray(np.linalg.inv(inside), np.float64)
-        if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
-            raise LinAlgError("the body is neither held nor balanced")
-        out = np.zeros(self.stiffness.shape)
-        out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
-        return out
-
-    def loaded(self, load: Array) -> "CondensedLinear":
-        """Return the same body under another dead `load` (2 k,) [N/mm]."""
-        other = copy(self)
-        other.load, other.force, other._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
-        return other
-
-    def undeformed(self) -> tuple[Array, Array]:
-        """Return displacements (k, 2) of the skin at rest, and no pressures."""
-        return np.zeros(self.rest.shape), np.zeros((0, 3))
-
-    def untouched(self) -> Array:
-        """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
-        return (self.compliance @ self.load).reshape(-1, 2)
-
-    def held_by(self, reaction: Array) -> Array:
-        """Return the displacements (k, 2) that forces `reaction` (k, 2) of the surface hold."""
-        return (self.compliance @ (self.load + reaction.ravel())).reshape(-1, 2)
-
-    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
-        """Return the energy stored once forces `reaction` (k, 2) alone hold the body [N mm per mm]."""
-        return 0.5 * float(np.sum(reaction * self.held_by(reaction)))
-
-    def work(self, way: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
-        """Do as `CondensedBody` says: forces grow in proportion, so that the rule is exact."""
-        return trapezoid
-
-    def place(self, u: Array) -> Array:
-        """Return where the skin's nodes are (k, 2) for displacements `u` (k, 2) [mm]."""
-        return self.rest + u
-
-    def linearise(self, u: Array, pressure: Array) -> bool:  # noqa: ARG002 - as every body is asked
-        """Set the `force` at a state."""
-        return self.relinearise(u)
-
-    def relinearise(self, u: Array) -> bool:
-        """Do the same: the stiffness is that of every state."""
-        self.force = self.stiffness @ u.ravel() - self.load if u.any() else -self.load
-        return True
-
-    def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
-        """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
-        return u + scale * step.reshape(u.shape), pressure, float(np.abs(step).max(initial=0.0))
-
-
 @dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
 class LinearBody:
     """An elastic body whose skin may touch a flat rigid surface that lies below it along y = 0."""
@@ -231,6 +220,11 @@ class LinearBody:
         skin = u.reshape(2 * len(self.mesh.skin), prod(u.shape[2:]))
         out = self.elimination.displacement(skin, self.carried, only) + self.prescribed[:, :, None]
         return out.reshape(*self.mesh.nodes.shape, *u.shape[2:])
+
+    @property
+    def centre(self) -> Array:
+        """Do as `Body` says."""
+        return self.elastic.centre
 
     def every_step(self) -> Array:
         """Return the displacements (nodes, 2, 2 k) that one of the skin's unknowns after the other makes."""
@@ -312,6 +306,64 @@ class LinearBody:
 def _determinant(f: Array) -> Array:
     """Return the determinants (p,) of matrices (p, 2, 2)."""
     return f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+
+
+@dataclass(frozen=True, eq=False)  # without slots: the energy forms are made when they are first needed
+class LinearPatches:
+    """Endings of an elastic body at small strain."""
+
+    mesh: Mesh
+    elastic: Elastic
+    endings: Endings
+
+    def nodes(self) -> Indices:
+        """Do as `Patches` says."""
+        return distinct(self.mesh.elements[distinct(self.endings.probes.element)])
+
+    def average(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        element, patch, form = self._energy_forms
+        local = displacement[self.mesh.elements[element]]
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
+        energy = np.einsum("mic,mic->mc", local, form @ local)
+        total, first = np.zeros((self.endings.count, energy.shape[1])), np.flatnonzero(np.diff(patch, prepend=-1))
+        total[patch[first]] = np.add.reduceat(energy, first)
+        return (total / self.endings.areas[:, None]).reshape(-1, *displacement.shape[2:])
+
+    @cached_property
+    def _energy_forms(self) -> tuple[Indices, Indices, Array]:
+        """The parts of patches within one element (m,): element, patch, and the energy as a quadratic form (m, 18, 18).
+
+        Each form is of the displacements of the element's nodes [N/mm per mm2].
+        """
+        probes, patch = self.endings.probes, self.endings.patch
+        order = np.lexsort((probes.element, patch))
+        element, patch = probes.element[order], patch[order]
+        starts = (np.diff(element, prepend=-1) != 0) | (np.diff(patch, prepend=-1) != 0)
+        part, first = np.cumsum(starts) - 1, np.flatnonzero(starts)
+        place = np.arange(len(part)) - first[part]
+        roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx and d/dy of shape functions, modes
+        sizes = np.sqrt(self.endings.weights[order])[:, None]
+        roots[part, place, :18] = np.swapaxes(probes.gradient[order], 1, 2).reshape(-1, 18) * sizes
+        roots[part, place, 18:] = probes.modes[order] * sizes
+        sums = np.swapaxes(roots, 1, 2) @ roots
+        xx, yx, yy, element = sums[:, :9, :9], sums[:, 9:18, :9], sums[:, 9:18, 9:18], element[first]
+        form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
+        form[:, :, 0, :, 0], form[:, :, 0, :, 1] = xx + yy / 2.0, yx / 2.0
+        form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
+        theta = self.elastic.dilatation[element]
+        volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
+        shear, lame = (modulus[element, None, None] for modulus in (self.elastic.shear, self.elastic.lame))
+        # W = G eps:eps + lambda/2 theta^2
+        return element, patch[first], shear * form.reshape(-1, 18, 18) + lame / 2.0 * volume
+
+    def responses(self, displacement: Array) -> Array:
+        """Do as `Patches` says."""
+        state = self.elastic.state(self.mesh, self.endings.probes, displacement, self.endings.tangent)
+        return np.stack([self._means(quantity.small(state)) for quantity in QUANTITIES])
+
+    def _means(self, values: Array) -> Array:
+        return patch_means(values, self.endings.weights, self.endings.patch, self.endings.areas)
 
 
 def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:

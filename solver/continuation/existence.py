@@ -18,7 +18,7 @@ from solver.arrays import Array
 from solver.continuation import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Scene

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver._kernels import skin as skin_loops
+from solver.arrays import Array
 from solver.body.finite import FiniteBody
+from solver.body.validation import check_loads
 from solver.constitutive import Law
 from solver.contact import SkinCompression
 from solver.continuation import LARGEST_MU, continue_branch, folds_at, jumped_branch
 from solver.continuation.existence import APART, Reach, all_at_the_bound, of_depth, stands, steady, steep
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
-from solver.equilibrium import full_slip as sliding
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import balanced, sliding_load
@@ -84,7 +85,7 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
     load = sliding_load(scene)
     for begin in dict.fromkeys((near, None)):
         try:
-            return sliding.settled(finger.newton, load, begin, FORCE_SEARCH.leading)
+            return load_stepping.settled(finger.newton, load, begin, FORCE_SEARCH.leading)
         except NotConverged:
             if begin is None:
                 raise
@@ -168,7 +169,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
-        state = sliding.settled(newton, state.load._replace(depth=depth), state)
+        state = load_stepping.settled(newton, state.load._replace(depth=depth), state)
         if abs(state.force[1] / force - 1.0) < FORCE_MET:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
@@ -212,6 +213,58 @@ def _risen_to(finger: FiniteFinger, state: EquilibriumState, proof: Reach, force
     return state
 
 
+def loaded(
+    body: FiniteBody,
+    loads: Array | None = None,
+    prescribed: Array | None = None,
+    load: LoadState | None = None,
+    start: EquilibriumState | None = None,
+    steps: int = 4,
+) -> EquilibriumState:
+    """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], what is held displaced by `prescribed` [mm].
+
+    `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
+    the first guess), in `steps` equal parts; one that fails is halved. `load` (its default: no contact depth, no
+    friction) stays the same meanwhile. The loads stay on the body for what follows. Raises BodyError for
+    arrays of another shape, ValueError for a load on the centre of an element and for a load state that is none,
+    NotConverged where no equilibrium is found.
+    """
+    newton, condensed = Newton(body.condensed), body.condensed
+    check_loads(body.mesh, loads, prescribed)
+    loads, prescribed = (None if array is None else np.asarray(array, np.float64) for array in (loads, prescribed))
+    state = EquilibriumState.undeformed(condensed) if start is None else start
+    load = (state.load if load is None else load).checked()
+    state = replace(state, load=load)
+    vector = np.zeros(body.size) if loads is None else _on_unknowns(body, loads)
+    driven = body.mesh.driven
+    held_at = state.u[driven]
+    moved = 0.0 if prescribed is None else prescribed[driven] - held_at
+    before = condensed.load.copy()
+
+    def step(part: float) -> None:
+        nonlocal state
+        condensed.load[:] = before + part * (vector - before)
+        u = state.u.copy()
+        u[driven] = held_at + part * moved
+        state = newton.settle(replace(state, u=u), load)
+
+    def refusal(done: float, _part: float, reason: NotConverged) -> NotConverged:
+        return NotConverged(f"no equilibrium was found beyond {done:.3g} of the loads: {reason}")
+
+    load_stepping.advance(step, refusal, load_stepping.StepControl(first=1.0 / steps))
+    return state
+
+
+def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
+    """Return the loads (n,) in the order of the unknowns."""
+    if loads[body.nodes[:, 8]].any():
+        raise ValueError("a dead load on the centre of an element cannot be taken: put it on corners and mid-sides")
+    out = np.zeros(body.size)
+    free = body.unknown >= 0
+    out[body.unknown[free]] = loads[body.nodes[:, :8]][free]
+    return out
+
+
 def steady_body(
     whole: FiniteBody,
     load: LoadState,
@@ -227,14 +280,14 @@ def steady_body(
     """
     newton = Newton(whole.condensed)
     body = _OwnBody(whole, newton)
-    bare = sliding.settled(newton, load._replace(mu=0.0), start)
+    bare = load_stepping.settled(newton, load._replace(mu=0.0), start)
     branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.limited and (branch.lost or body.spoilt(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
-    state = sliding.settled(newton, load, branch.last)
+    state = load_stepping.settled(newton, load, branch.last)
     if jumped_branch(body, branch.last, state):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return state

@@ -19,10 +19,9 @@ from solver.body.linear import LinearBody
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.expected_depth import DEEPEST, within_reach
 from solver.equilibrium.finger import LinearFinger, settled_moduli
-from solver.equilibrium.full_slip import settled as full_slip
-from solver.equilibrium.full_slip import slide_beside, slide_under
 from solver.equilibrium.load_path import march, slide_or_hold
-from solver.equilibrium.load_stepping import forces_of, sliding_load
+from solver.equilibrium.load_stepping import forces_of, slide_beside, slide_under, sliding_load
+from solver.equilibrium.load_stepping import settled as full_slip
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing, finger_mesh
 from solver.scene import Scene

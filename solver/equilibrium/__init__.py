@@ -81,6 +81,17 @@ class LoadState(NamedTuple):
         """Whether a state depends on the way to it: friction on each node then opposes how that node moved last."""
         return self.sense == 0 and not self.frictionless
 
+    def towards(self, other: "LoadState", part: float) -> "LoadState":
+        """Return what lies `part` of the way to `other`; a bound that was not there before takes its value at once."""
+        if part == 1.0:
+            return other
+        tau = self.tau + part * (other.tau - self.tau) if max(self.tau, other.tau) < np.inf else other.tau
+        depth, travel = (
+            self.depth + part * (other.depth - self.depth),
+            self.travel + part * (other.travel - self.travel),
+        )
+        return LoadState(depth, self.mu + part * (other.mu - self.mu), tau, other.sense, travel)
+
     def checked(self) -> "LoadState":
         """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
         law = FrictionLaw(float(self.mu), float(self.tau))

@@ -6,8 +6,7 @@ from functools import lru_cache
 
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.full_slip import slide_under
-from solver.equilibrium.load_stepping import sliding_load
+from solver.equilibrium.load_stepping import slide_under, sliding_load
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene

@@ -18,11 +18,10 @@ from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import SLIP, STICK
 from solver._kernels.contact_system import tributary
 from solver.arrays import Array, Flags, Indices
-from solver.body import Body
-from solver.body.finite import VALUES, FiniteBody
-from solver.body.linear import LinearBody
-from solver.body.receptor import Endings, FinitePatches, LinearPatches, Patches, endings, middle
-from solver.body.stiffness import Centred
+from solver.body import Body, Endings, Patches
+from solver.body.finite import VALUES, FiniteBody, FinitePatches
+from solver.body.linear import LinearBody, LinearPatches
+from solver.body.receptor import endings, middle
 from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
 from solver.contact import SkinCompression, width
 from solver.equilibrium import EquilibriumState, Newton
@@ -69,14 +68,9 @@ class Finger(ABC, Generic[Placed]):
     def patches(self, placed: Endings) -> Placed:
         """Return endings that were `placed` on its mesh, as its body feels them."""
 
-    @property
-    @abstractmethod
-    def centred(self) -> Centred:
-        """The elements of its body, with the places that their pressure modes are counted from."""
-
     def endings(self, arcs: Array) -> Placed:
         """Return endings like the scene's at arc positions `arcs` (r,) [mm]."""
-        return self.patches(endings(self.geometry, self.centred, self.scene.receptor, arcs))
+        return self.patches(endings(self.geometry, self.body.centre, self.scene.receptor, arcs))
 
     @cached_property
     def ending(self) -> Placed:
@@ -86,7 +80,7 @@ class Finger(ABC, Generic[Placed]):
     @cached_property
     def point(self) -> Placed:
         """The middle of the reference ending."""
-        return self.patches(middle(self.geometry, self.centred, self.scene.receptor))
+        return self.patches(middle(self.geometry, self.body.centre, self.scene.receptor))
 
     @cached_property
     def row(self) -> Placed:
@@ -170,11 +164,6 @@ class LinearFinger(Finger[LinearPatches]):
         body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - begun)
 
-    @property
-    def centred(self) -> Centred:
-        """Do as `Finger` says."""
-        return self.body.elastic
-
     def patches(self, placed: Endings) -> LinearPatches:
         """Do as `Finger` says."""
         return LinearPatches(self.geometry.mesh, self.body.elastic, placed)
@@ -183,7 +172,7 @@ class LinearFinger(Finger[LinearPatches]):
     def ending_by_skin(self) -> Array:
         """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
         endings = self.ending.endings
-        at = endings.probes.state(self.geometry.mesh, self.body.elastic, self.body.every_step())  # (p, 2 k)
+        at = self.body.elastic.state(self.geometry.mesh, endings.probes, self.body.every_step())  # (p, 2 k)
         whole = np.sqrt(endings.weights / endings.areas)[:, None]
         strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, np.sqrt(2.0) * at.xy])
         lines = np.vstack([*(whole * strain), whole * np.sqrt(at.lame / 2.0) * at.dilatation])
@@ -213,11 +202,6 @@ class FiniteFinger(Finger[FinitePatches]):
         """Do as `Finger` says."""
         body = FiniteBody.of(geometry.mesh, finite_laws(scene.materials), checked=True)
         return cls(scene, geometry, Newton(body.condensed), body)
-
-    @property
-    def centred(self) -> Centred:
-        """Do as `Finger` says."""
-        return self.body
 
     def patches(self, placed: Endings) -> FinitePatches:
         """Do as `Finger` says."""

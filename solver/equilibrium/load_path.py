@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from solver._kernels.compiling import OPEN, STICK
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of

@@ -22,10 +22,9 @@ import numpy as np
 
 from solver._kernels import overstress as overstress_loops
 from solver.arrays import Array, Indices
-from solver.body.finite import CondensedFinite, FiniteBody
-from solver.body.linear import CondensedLinear, LinearBody
-from solver.body.receptor import Endings, FinitePatches, patch_means
-from solver.body.stiffness import Elastic, Probes
+from solver.body import CondensedLinear, Endings, Probes, patch_means
+from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
+from solver.body.linear import Elastic, LinearBody
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
 from solver.constitutive import Moduli, Prony, kept, overstress
 from solver.constitutive.overstress import Past

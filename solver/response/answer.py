@@ -9,7 +9,7 @@ from solver.accuracy.audits import rounding
 from solver.accuracy.error_estimate import Steps, errors, responses, row_errors
 from solver.accuracy.omitted_effects import model, warnings
 from solver.arrays import Array
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.contact import STATE_NAMES
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger

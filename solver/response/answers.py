@@ -15,7 +15,7 @@ from solver.accuracy import audits as audit
 from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked, steps_of_press
 from solver.arrays import Array
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import settled
 from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined

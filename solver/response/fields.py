@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body.finite import FiniteBody
-from solver.body.receptor import Endings, FinitePatches
-from solver.body.stiffness import Elastic, Probes, local_coordinates
+from solver.body import Endings, Probes, local_coordinates
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
@@ -95,7 +95,7 @@ class Sketch:
             elements=place[:, _AROUND],
             region=np.repeat(mesh.region, len(_SPLIT)),
             skin=SkinLine(arcs, place[element], shape),
-            probes=Probes.at(mesh, elastic, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
+            probes=Probes.at(mesh, elastic.centre, np.repeat(np.arange(count), 9), np.tile(Q2P1.positions, (count, 1))),
             elastic=elastic,
             _kept=kept % len(mesh.nodes),
             _place=place,
@@ -105,7 +105,7 @@ class Sketch:
 
     def values(self, displacement: Array) -> Array:
         """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
-        state = self.probes.state(self.mesh, self.elastic, displacement)
+        state = self.elastic.state(self.mesh, self.probes, displacement)
         return np.stack([field.small(state) for field in FIELDS])
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
@@ -151,7 +151,7 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
     # In a sharp corner, as where bone ends at the skin, an element's own shape functions may turn its node inside out,
     # although no point over which the element is integrated is. The nearest such point then stands for the node.
     points = np.tile(_INSIDE * Q2P1.positions, (len(sketch.mesh.elements), 1))
-    return np.where(sound, fields, values(Probes.at(sketch.mesh, sketch.elastic, sketch.probes.element, points)))
+    return np.where(sound, fields, values(Probes.at(sketch.mesh, sketch.elastic.centre, sketch.probes.element, points)))
 
 
 def _patch(outline: Outline, scene: Scene) -> Array:

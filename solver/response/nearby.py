@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.contact_system import assemble_contact_system, bounded_length, tributary
 from solver.arrays import Array, ContactStates, SkinPosition
-from solver.body.receptor import Patches
+from solver.body import Patches
 from solver.contact import STATE_NAMES
 from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
@@ -27,12 +27,10 @@ from solver.equilibrium import (
     ForceLoad,
     LoadState,
     Newton,
-    full_slip,
     load_arguments,
 )
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.full_slip import slide_beside
-from solver.equilibrium.load_stepping import balanced, sliding_load
+from solver.equilibrium.load_stepping import balanced, settled, slide_beside, sliding_load
 from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
@@ -192,7 +190,7 @@ class Nearby:
         newton, here = self.finger.newton, self.here
         load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
-            return full_slip.settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
+            return settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
         return balanced(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
 
     def _on_branch(self, there: EquilibriumState) -> bool:

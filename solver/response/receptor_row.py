@@ -11,9 +11,10 @@ import numpy as np
 from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.accuracy.error_estimate import PARTS, Steps, edge_changes, half_width
 from solver.arrays import Array
-from solver.body.finite import FiniteBody
-from solver.body.receptor import FinitePatches, LinearPatches, Patches, endings
-from solver.body.stiffness import Elastic
+from solver.body import Patches
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.linear import Elastic, LinearPatches
+from solver.body.receptor import endings
 from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import WIDE, direct, nearest
@@ -68,7 +69,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     scene, sizing = prediction.scene, replace(prediction.geometry.sizing, halved=True)
 
     def probed(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
-        row = finger.patches(endings(finger.geometry, finger.centred, receptor, arcs))
+        row = finger.patches(endings(finger.geometry, finger.body.centre, receptor, arcs))
         return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
 
     nested, state, coarse = _nested(prediction, sizing)
@@ -98,7 +99,7 @@ def _probed(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:
     """Return endings like that of `receptor` on the mesh of a prediction."""
     mesh, materials = prediction.geometry.mesh, prediction.scene.materials
     elastic = Elastic.of(mesh, settled_moduli(materials))
-    row = endings(prediction.geometry, elastic, receptor, arcs)
+    row = endings(prediction.geometry, elastic.centre, receptor, arcs)
     if prediction.scene.solve.kinematics == "small":
         return LinearPatches(mesh, elastic, row)
     return FinitePatches.of(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)

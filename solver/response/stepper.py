@@ -14,8 +14,7 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.arrays import Array
-from solver.body.receptor import Endings, Patches
-from solver.body.stiffness import Probes
+from solver.body import Endings, Patches, Probes
 from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
@@ -281,7 +280,7 @@ class LivePicture:
         mesh, count = finger.geometry.mesh, 4 * len(finger.geometry.mesh.elements)
         self.faces, self.rest = mesh.elements[:, QUARTERS].reshape(-1, 4), mesh.nodes
         each = np.arange(count)
-        probes = Probes.at(mesh, finger.centred, each // 4, MIDDLES[each % 4])
+        probes = Probes.at(mesh, finger.body.centre, each // 4, MIDDLES[each % 4])
         middles = Endings(probes, np.ones(count), each, count, np.tile([1.0, 0.0], (count, 1)))
         self._finger, self._middles = finger, finger.patches(middles)
 

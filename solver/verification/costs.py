@@ -24,7 +24,9 @@ from solver.verification.truth import KINEMATICS, cases
 PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
-    "accuracy": "audits", "body.receptor": "receptor", "equilibrium.finger": "carrying states",
+    "accuracy": "audits", "body.receptor": "receptor", "body.linear.average": "receptor",
+    "body.linear._energy_forms": "receptor", "body.linear.responses": "receptor", "body.finite.average": "receptor",
+    "body.finite.responses": "receptor", "equilibrium.finger": "carrying states",
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "accuracy.adaptivity": "iteration",
     "_kernels.elements": "assembly", "_kernels.elements.energies": "receptor", "_kernels.hooke": "assembly",

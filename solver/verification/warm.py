@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide, settled
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Scene
 from solver.scene.tables import Friction

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 
 from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
-from solver.body.finite import FiniteBody
-from solver.body.receptor import FinitePatches, endings
-from solver.body.stiffness import Elastic
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.linear import Elastic
+from solver.body.receptor import endings
 from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import FiniteFinger
@@ -23,7 +23,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     moduli = [tissue.E for tissue in (tissues.epidermis, tissues.dermis, tissues.fat)]
     body = FiniteBody.of(made.mesh, [NeoHooke(E, nu) for E in moduli])
     elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
-    probes = FinitePatches.of(body, endings(made, elastic, Receptor(), np.zeros(1)))
+    probes = FinitePatches.of(body, endings(made, elastic.centre, Receptor(), np.zeros(1)))
     return Newton(body.condensed), probes, made.whole
 
 

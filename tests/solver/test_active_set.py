@@ -11,9 +11,8 @@ from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
-from solver.equilibrium.full_slip import settled, slide_beside
 from solver.equilibrium.load_path import Aim, Way
-from solver.equilibrium.load_stepping import balanced
+from solver.equilibrium.load_stepping import balanced, settled, slide_beside
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain

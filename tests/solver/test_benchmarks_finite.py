@@ -8,7 +8,7 @@ import pytest
 from solver.body.finite import FiniteBody
 from solver.constitutive import LAWS, energy, stress
 from solver.equilibrium import LoadState
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.mesh import block, quality
 from solver.verification.published.bodies import distorted
 from solver.verification.published.finite_contacts import ELEMENT, light_finite

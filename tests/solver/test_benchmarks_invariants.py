@@ -11,9 +11,8 @@ from solver._kernels.compiling import SHEAR_LIMITED, SLIP
 from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.full_slip import settled
 from solver.equilibrium.load_path import march
-from solver.equilibrium.load_stepping import sliding_load
+from solver.equilibrium.load_stepping import settled, sliding_load
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 

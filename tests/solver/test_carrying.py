@@ -6,7 +6,7 @@ import pytest
 from solver import Finger, Receptor
 from solver.equilibrium import LoadState
 from solver.equilibrium.finger import MeshTransfer, Places
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
 

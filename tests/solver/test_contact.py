@@ -10,8 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.equilibrium.full_slip import settled, slide_beside, slide_under
-from solver.equilibrium.load_stepping import balanced
+from solver.equilibrium.load_stepping import balanced, settled, slide_beside, slide_under
 from solver.mesh import block
 
 RADIUS = 5.0

@@ -9,8 +9,8 @@ from solver._kernels.compiling import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke, stress
+from solver.continuation.finite_states import loaded
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.load_stepping import loaded
 from tests.solver.finite_examples import block
 
 DERMIS = NeoHooke(0.08, 0.48)

@@ -8,15 +8,14 @@ import pytest
 
 from solver import Friction, Loading, Scene, Solve
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
-from solver.body.finite import FiniteBody
-from solver.body.linear import CondensedLinear
-from solver.body.receptor import Endings, FinitePatches
-from solver.body.stiffness import Elastic, Probes
+from solver.body import CondensedLinear, Endings, Probes
+from solver.body.finite import FiniteBody, FinitePatches
+from solver.body.linear import Elastic
 from solver.constitutive import Hooke, NeoHooke, Ogden
 from solver.constitutive import shape as grown
 from solver.continuation.small_states import settled
 from solver.equilibrium import LoadState, Newton, load_stepping
-from solver.equilibrium import full_slip as sliding
+from solver.equilibrium import load_stepping as sliding
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.quantities import QUANTITIES
@@ -224,7 +223,7 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
     body = FiniteBody.of(mesh, [law])
     elements = np.repeat(np.arange(len(mesh.elements)), 2)
     local = np.random.default_rng(1).uniform(-0.9, 0.9, (len(elements), 2))
-    places = Probes.at(mesh, Elastic.of(mesh, [Hooke(0.08, 0.48)]), elements, local)
+    places = Probes.at(mesh, Elastic.of(mesh, [Hooke(0.08, 0.48)]).centre, elements, local)
     count = len(elements)
     probes = FinitePatches.of(
         body, Endings(places, np.linspace(1.0, 2.0, count), np.arange(count) % 3, 3, np.tile([1.0, 0.0], (count, 1)))

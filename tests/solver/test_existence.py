@@ -7,7 +7,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.continuation.existence import steady
 from solver.equilibrium import LoadState
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1

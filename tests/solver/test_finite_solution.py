@@ -10,7 +10,7 @@ from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve,
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium import LoadState
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.response import answers
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene

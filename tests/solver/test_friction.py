@@ -9,8 +9,8 @@ import pytest
 
 from solver._kernels import active_set
 from solver.arrays import ContactStates, LoadArguments
+from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody
-from solver.body.linear import CondensedLinear
 from solver.constitutive import NeoHooke
 from solver.contact import LAWS, OPEN, SHEAR_LIMITED, SLIP, STATE_NAMES, STICK, FrictionLaw
 from solver.equilibrium import (
@@ -21,7 +21,7 @@ from solver.equilibrium import (
     LoadState,
     Newton,
 )
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.mesh import block
 from solver.response.stepper import SmallStepper
 from tests.solver.oracle import finite as oracle

@@ -8,9 +8,9 @@ from solver.body.linear import LinearBody
 from solver.body.validation import BodyError
 from solver.constitutive import Hooke, NeoHooke, Ogden, Prony
 from solver.contact import FrictionLaw
+from solver.continuation.finite_states import loaded
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import loaded, march
+from solver.equilibrium.load_stepping import march, settled
 from solver.equilibrium.relaxation import CondensedRelaxing, RelaxingBody
 from solver.mesh import Mesh, MeshError, block
 

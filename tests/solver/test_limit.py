@@ -12,7 +12,7 @@ from solver.continuation import existence, finite_states, folds_at, follow
 from solver.continuation import existence as reach
 from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.mesh import grid_mesh, mesher
 from tests.solver.finite_examples import published
 

@@ -29,11 +29,13 @@ def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(fing
     mesh, elastic = finger.geometry.mesh, finger.body.elastic
     assert picture.nodes(state) == pytest.approx(mesh.nodes + moved - [0.0, 1.5], abs=1e-9)
 
-    from solver.body.stiffness import Probes
+    from solver.body import Probes
 
     third = 7  # an element; its quarters' middles are probed by the solver's own energy
-    probes = Probes.at(mesh, elastic, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]))
-    expected = probes.energy(mesh, elastic, moved[:, :, None])[:, 0]
+    probes = Probes.at(
+        mesh, elastic.centre, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    )
+    expected = elastic.energy(mesh, probes, moved[:, :, None])[:, 0]
     assert picture.sed(state)[4 * third : 4 * third + 4] == pytest.approx(expected, rel=1e-9)
 
 

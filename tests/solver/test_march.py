@@ -8,8 +8,7 @@ import pytest
 from solver._kernels.compiling import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import march, press_and_slide
+from solver.equilibrium.load_stepping import march, press_and_slide, settled
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 

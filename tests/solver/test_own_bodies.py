@@ -7,12 +7,10 @@ import pytest
 
 from solver.accuracy.error_estimate import PARTS, estimated
 from solver.body.finite import FiniteBody
-from solver.body.linear import LinearBody, edge_load
-from solver.body.stiffness import Elastic
+from solver.body.linear import Elastic, LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import ForceLoad, LoadState, Newton
-from solver.equilibrium.full_slip import settled, slide_under
-from solver.equilibrium.load_stepping import march
+from solver.equilibrium.load_stepping import march, settled, slide_under
 from solver.mesh import HalvedMesh, block, quality
 
 SLIDES = LoadState(0.15, 0.3, sense=-1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Material, Materials, Relaxation, Solve, solve
-from solver.body.stiffness import Probes
+from solver.body import Probes
 from solver.constitutive import Prony
 from solver.equilibrium import relaxation as relaxing
 from solver.equilibrium.relaxation import RelaxingBody
@@ -30,7 +30,11 @@ def held_all_round(law):
     mesh = replace(mesh, held=boundary, skin=mesh.skin[:0])
     body = RelaxingBody(mesh, [law])
     count = len(mesh.elements)
-    return body, Probes.at(mesh, body.elastic, np.arange(count), np.full((count, 2), 0.3)), mesh.nodes * mesh.driven
+    return (
+        body,
+        Probes.at(mesh, body.elastic.centre, np.arange(count), np.full((count, 2), 0.3)),
+        mesh.nodes * mesh.driven,
+    )
 
 
 def course(law, gradient):

@@ -10,7 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.equilibrium import LoadState, Newton
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 

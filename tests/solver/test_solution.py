@@ -27,7 +27,7 @@ from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
 from solver.equilibrium import LoadState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.full_slip import settled
+from solver.equilibrium.load_stepping import settled
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes

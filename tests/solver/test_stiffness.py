@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from solver import Finger, Receptor
-from solver.body.linear import LinearBody
-from solver.body.stiffness import Elastic, Probes, local_coordinates
+from solver.body import Probes, local_coordinates
+from solver.body.linear import Elastic, LinearBody
 from solver.constitutive import MATERIALS, Hooke
 from solver.linalg import Tree, places
 from solver.mesh import Q2P1, block
@@ -53,9 +53,9 @@ def test_energy_of_probes_adds_up_to_that_of_the_stiffness():
     at = np.stack([across.ravel(), up.ravel()], axis=1)
     total = 0.0
     for element, corners in enumerate(mesh.elements[:, :4]):
-        probes = Probes.at(mesh, elastic, np.full(16, element), at)
+        probes = Probes.at(mesh, elastic.centre, np.full(16, element), at)
         area = np.prod(np.ptp(mesh.nodes[corners], axis=0)) / 4.0
-        total += area * (np.outer(weights, weights).ravel() @ probes.energy(mesh, elastic, moved[:, :, None])[:, 0])
+        total += area * (np.outer(weights, weights).ravel() @ elastic.energy(mesh, probes, moved[:, :, None])[:, 0])
     assert total == pytest.approx(stored, rel=1e-12)
 
 

@@ -10,8 +10,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import march
+from solver.equilibrium.load_stepping import march, settled
 from solver.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.prediction import percent

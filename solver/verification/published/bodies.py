@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
+from solver.body import Probes, local_coordinates
 from solver.body.linear import LinearBody
-from solver.body.stiffness import Probes, local_coordinates
 from solver.contact import OPEN, SLIP
 from solver.equilibrium import Newton
 from solver.mesh import Q2P1, Mesh, grid_mesh, with_middles
@@ -176,7 +176,7 @@ def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
     mesh, elastic = body.mesh, body.elastic
     element, local = placed(mesh, points)
-    probes = Probes.at(mesh, elastic, element, local)
+    probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
     strain = (strain + np.swapaxes(strain, 1, 2)) / 2
     moved = displacement[mesh.elements[element]].reshape(len(points), 18)

@@ -14,8 +14,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.contact import OPEN, STICK, FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.equilibrium.full_slip import settled, slide_beside
-from solver.equilibrium.load_stepping import balanced
+from solver.equilibrium.load_stepping import balanced, settled, slide_beside
 from solver.verification.published.bodies import chain, disc, graded, mirrored, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 

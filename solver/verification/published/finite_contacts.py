@@ -11,8 +11,7 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.full_slip import settled
-from solver.equilibrium.load_stepping import march
+from solver.equilibrium.load_stepping import march, settled
 from solver.verification.published.bodies import graded, mirrored, mound
 from solver.verification.published.zones import half_above, half_width
 

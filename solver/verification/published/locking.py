@@ -3,8 +3,8 @@
 import numpy as np
 
 from solver.arrays import Array, Indices
+from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
-from solver.body.stiffness import Probes
 from solver.constitutive import Hooke
 from solver.mesh import Q2P1, Mesh
 from solver.verification.published.bodies import distorted, membrane, ring
@@ -53,7 +53,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     moved = np.asarray(np.linalg.lstsq(rigid, off, rcond=None)[0], np.float64)
     off = np.asarray(off - rigid @ moved, np.float64)
     element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
-    probes = Probes.at(mesh, body.elastic, element, np.tile(_POINTS, (len(mesh.elements), 1)))
+    probes = Probes.at(mesh, body.elastic.centre, element, np.tile(_POINTS, (len(mesh.elements), 1)))
     gradient = probes.displacement_gradient(mesh, displacement)
     shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.shear[element]
     at = _placed(mesh, element)

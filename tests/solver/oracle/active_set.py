@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from solver import ContactLost
-from solver.body.linear import CondensedLinear
+from solver.body import CondensedLinear
 from solver.body.validation import finite
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
 

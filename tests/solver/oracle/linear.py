@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver.body.stiffness import Elastic
+from solver.body.linear import Elastic
 from solver.mesh import Q2P1
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
