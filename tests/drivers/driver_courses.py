@@ -174,17 +174,22 @@ class Metronome:
         self._thread.join()
 
 
-def undisturbed_course(name, folder):
-    """Go through the undisturbed course with one driver, again where the machine stood still meanwhile."""
+def uninterrupted(run):
+    """Return what `run` returns; it runs again where the machine stood still meanwhile."""
     for _ in range(1 + AGAIN):
         with Metronome() as metronome:
-            course = uninterrupted_course(name, folder)
+            came = run()
         if metronome.longest < PAUSE:
             break
-    return course
+    return came
 
 
-def uninterrupted_course(name, folder):
+def undisturbed_course(name, folder):
+    """Go through the undisturbed course with one driver."""
+    return uninterrupted(lambda: undisturbed_run(name, folder))
+
+
+def undisturbed_run(name, folder):
     """Go through the undisturbed course with one driver, once."""
     clock, threads = PacedClock(simulator(name).factor), set(threading.enumerate())
     with pytest.MonkeyPatch.context() as monkeypatch:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from driver_courses import uninterrupted
 
 from drivers import digital_ft as digital_ft_device
 from drivers import serial_ft as serial_ft_device
@@ -242,12 +243,16 @@ def test_the_bias_of_a_controller_is_dropped_so_that_raw_stays_raw():
 
 
 def test_times_follow_the_bench_though_the_rate_is_half_a_percent_off():
-    device = digital_ft(rate_error=0.005)
-    transducer = device.open()
-    transducer.start()
-    block = readings(device, transducer, device.box.now() + 2.0)
-    transducer.close()
-    device.box.close()
+    def run():
+        device = digital_ft(rate_error=0.005)
+        transducer = device.open()
+        transducer.start()
+        block = readings(device, transducer, device.box.now() + 2.0)
+        transducer.close()
+        device.box.close()
+        return transducer, block
+
+    transducer, block = uninterrupted(run)
     assert transducer.info.rate == 7000.0
     assert transducer.health.lost == 0
     half = len(block) // 2
