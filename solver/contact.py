@@ -68,21 +68,6 @@ class FrictionLaw:
         """Return the largest tangential force (n,) [N/mm] whatever the pressure, on `length` (n,) [mm] of skin."""
         return np.full(length.shape, np.inf) if self.tau_max == np.inf else self.tau_max * length
 
-    def slopes(self, state: NDArray[np.integer], sense: Array) -> tuple[Array, Array]:
-        """Return how friction forces grow with the normal force (n,) [-] and with the skin's length (n,) [MPa].
-
-        Of points in `state` (n,), with friction forces along `sense` (n,), +1 along +x. Open and sticking points have
-        none: the first bear no force, and that of the others is unknown. The forces are the slopes times force and
-        length, so that this is the law's consistent tangent too.
-
-        >>> one, other = FrictionLaw(0.5, 0.02).slopes(np.arange(4), np.array([1, 1, 1, -1.0]))
-        >>> one.tolist(), other.tolist()
-        ([0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.0, -0.02])
-        """
-        return np.where(state == SLIP, sense * self.mu, 0.0), np.where(
-            state == SHEAR_LIMITED, sense * self.tau_max, 0.0
-        )
-
     @property
     def frictionless(self) -> bool:
         """True where no tangential force is possible."""

@@ -20,11 +20,11 @@ from solver.arrays import (
     ProbeArrays,
     SymbolicFactorization,
 )
-from solver.body import Endings, patch_means
+from solver.body import Endings, inverse, patch_means
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization
-from solver.mesh import Q2P1, Mesh, distinct
+from solver.mesh import Q2P1, Mesh, distinct, jacobians
 from solver.quantities import QUANTITIES, LocalState
 from solver.tolerances import IMAGINARY
 
@@ -40,18 +40,9 @@ class FiniteBody:
     """
 
     mesh: Mesh
-    grad_x: Array  # (e, 9, 9) of the shape functions at the quadrature points [1/mm]
-    grad_y: Array  # (e, 9, 9)
-    weight: Array  # (e, 9) areas of the quadrature points [mm2]
-    modes: Array  # (e, 9, 3) pressure modes there, orthonormal over the element [1/mm]
-    laplace: Array  # (e, 9, 9) integrals of the shear modulus times grad N_i . grad N_j [N/mm per mm]
+    elements: ElementArrays  # as loops take them; modes are orthonormal over the element
     centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre
     combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
-    shear: Array  # (e,) [MPa]
-    stiffening: Array  # (e,) Ogden's exponent [-]
-    lame: Array  # (e,) [MPa]
-    nodes: Narrow  # (e, 9)
-    unknown: Narrow  # (e, 8, 2) of the outer nodes, -1 where fixed
     plan: SymbolicFactorization  # of the elimination
     held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
@@ -66,15 +57,9 @@ class FiniteBody:
             check_body(mesh, laws)
             check_laws(laws)
             check_driven(mesh)
-        corners = mesh.nodes[mesh.elements]  # (e, 9, 2)
-        jacobian = np.swapaxes(corners, 1, 2)[:, None] @ _SLOPES  # (e, q, 2, 2)
-        det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
-        inverse = np.empty_like(jacobian)
-        inverse[..., 0, 0], inverse[..., 1, 1] = jacobian[..., 1, 1] / det, jacobian[..., 0, 0] / det
-        inverse[..., 0, 1], inverse[..., 1, 0] = -jacobian[..., 0, 1] / det, -jacobian[..., 1, 0] / det
-        gradient = _SLOPES @ inverse  # (e, q, 9, 2)
-        weight = det * Q2P1.weights
-        place = VALUES @ corners
+        jacobian, det = jacobians(mesh, Q2P1.points)  # (e, q, 2, 2), (e, q)
+        gradient, weight = _SLOPES @ inverse(jacobian), det * Q2P1.weights  # (e, q, 9, 2), (e, q)
+        place = VALUES @ mesh.nodes[mesh.elements]
         centre = place.mean(axis=1)
         raw = np.concatenate([np.ones((*place.shape[:2], 1)), place - centre[:, None]], axis=2)
         mass = np.swapaxes(raw * weight[:, :, None], 1, 2) @ raw
@@ -86,33 +71,15 @@ class FiniteBody:
         stiff = (weight * shear[:, None])[:, :, None]
         laplace = np.swapaxes(stiff * grad_x, 1, 2) @ grad_x + np.swapaxes(stiff * grad_y, 1, 2) @ grad_y
         plan = symbolic_factorization(mesh)
-        at_middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
-        return FiniteBody(
-            mesh,
-            grad_x,
-            grad_y,
-            weight,
-            np.ascontiguousarray(modes),
-            laplace,
-            centre,
-            combination,
-            shear,
-            np.array([law.stiffening for law in laws])[mesh.region],
-            np.array([law.lame for law in laws])[mesh.region],
-            mesh.elements.astype(np.int32),
-            plan.unknown.reshape(-1, 8, 2),
-            plan,
-            (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32),
-            at_middle,
-        )
-
-    @property
-    def elements(self) -> ElementArrays:
-        """The elements as loops take them."""
-        return ElementArrays(
-            self.grad_x, self.grad_y, self.weight, self.modes, self.laplace, self.shear, self.stiffening, self.lame,
-            self.nodes, self.unknown,
+        elements = ElementArrays(
+            grad_x, grad_y, weight, np.ascontiguousarray(modes), laplace, shear,
+            np.array([law.stiffening for law in laws])[mesh.region], np.array([law.lame for law in laws])[mesh.region],
+            mesh.elements.astype(np.int32), plan.unknown.reshape(-1, 8, 2),
         )  # fmt: skip
+        held = (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
+        return FiniteBody(
+            mesh, elements, centre, combination, plan, held, (np.arange(len(mesh.skin)) % 2).astype(np.int32)
+        )
 
     @property
     def condensed(self) -> "CondensedFinite":
@@ -131,7 +98,7 @@ class FiniteBody:
     @property
     def dofs(self) -> int:
         """Number of unknown displacements, centres included."""
-        return self.plan.size + 2 * len(self.nodes)
+        return self.plan.size + 2 * len(self.elements.nodes)
 
     def displacement(self, u: Array, only: Indices | None = None) -> Array:  # noqa: ARG002 - all nodes are there anyway
         """Do as `Body` says."""
@@ -142,10 +109,10 @@ class FiniteBody:
         inside = self.condensed.inside
         unknowns = np.stack([inside.back_substitute(one, still=True) for one in skin.T.copy()], axis=1)
         out = np.zeros((*self.mesh.nodes.shape, unknowns.shape[1]))
-        outer = np.where((self.unknown >= 0)[..., None], unknowns[self.unknown], 0.0)  # (e, 8, 2, c)
-        out[self.nodes[:, :8]] = outer
+        outer = np.where((self.elements.unknown >= 0)[..., None], unknowns[self.elements.unknown], 0.0)  # (e, 8, 2, c)
+        out[self.elements.nodes[:, :8]] = outer
         recovery = self.condensed.system.recovery_matrix[:, :, :16]
-        out[self.nodes[:, 8]] = -recovery @ outer.reshape(len(outer), 16, -1)
+        out[self.elements.nodes[:, 8]] = -recovery @ outer.reshape(len(outer), 16, -1)
         return out
 
     def deformation(self, u: Array) -> Array:
@@ -158,7 +125,7 @@ class FiniteBody:
 
     def pressure(self, u: Array) -> Array:
         """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
-        return self.lame[:, None] * self._logarithm(self._gradient(u))[1]
+        return self.elements.lame[:, None] * self._logarithm(self._gradient(u))[1]
 
     def energy(self, u: Array) -> float:
         """Return the energy stored in the body [N mm per mm]."""
@@ -182,27 +149,29 @@ class FiniteBody:
         H = self._gradient(displacement)
         log, volume = self._logarithm(H)
         inverse, exceeds = _turned(H)
-        G = self.shear[:, None] * slopes(self.stiffening[:, None], _excess(H, log))[0]
-        pressure = self.lame[:, None] * (self.modes @ volume[:, :, None])[:, :, 0]
-        stress = self.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
-        gradient = np.stack([self.grad_x, self.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
+        G = self.elements.shear[:, None] * slopes(self.elements.stiffening[:, None], _excess(H, log))[0]
+        pressure = self.elements.lame[:, None] * (self.elements.modes @ volume[:, :, None])[:, :, 0]
+        stress = self.elements.weight[:, :, None, None] * (
+            G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse
+        )
+        gradient = np.stack([self.elements.grad_x, self.elements.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
         return self.mesh.assemble((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
 
     def _gradient(self, u: Array) -> Array:
         """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
-        local = u[self.nodes]  # (e, 9, 2)
-        return np.stack([self.grad_x @ local, self.grad_y @ local], axis=-1)
+        local = u[self.elements.nodes]  # (e, 9, 2)
+        return np.stack([self.elements.grad_x @ local, self.elements.grad_y @ local], axis=-1)
 
     def _logarithm(self, H: Array) -> tuple[Array, Array]:
         """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
         log = log1p(H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0]))
-        return log, np.einsum("eq,eqm,eq->em", self.weight, self.modes, log)
+        return log, np.einsum("eq,eqm,eq->em", self.elements.weight, self.elements.modes, log)
 
     def _stored(self, H: Array) -> complex:
         log, volume = self._logarithm(H)
-        grown = shape(self.stiffening[:, None], _excess(H, log))
-        shear = np.sum(self.weight * self.shear[:, None] / 2.0 * grown)
-        return complex(shear + np.sum(self.lame / 2.0 * (volume**2).T))
+        grown = shape(self.elements.stiffening[:, None], _excess(H, log))
+        shear = np.sum(self.elements.weight * self.elements.shear[:, None] / 2.0 * grown)
+        return complex(shear + np.sum(self.elements.lame / 2.0 * (volume**2).T))
 
 
 def _turned(H: Array) -> tuple[Array, Array]:
@@ -224,7 +193,7 @@ class CondensedFinite:
 
     def __init__(self, body: FiniteBody) -> None:
         """Set memory aside for `body`."""
-        count = len(body.nodes)
+        count = len(body.elements.nodes)
         self.body, self.constant = body, False
         self.load = np.zeros(body.size)  # dead loads on the body, of `finite_states.loaded`
         self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
@@ -235,7 +204,7 @@ class CondensedFinite:
         )  # fmt: skip
         self.stiffness, self.force = self.inside.stiffness, self.inside.skin_force
         self.compliance, self.motions = np.zeros((0, 0)), np.zeros((0, 0))
-        self.bulk = float((body.lame / body.shear).max())
+        self.bulk = float((body.elements.lame / body.elements.shear).max())
         self.held, self.middle, self.fixed_length = body.held, body.middle, np.zeros(len(body.mesh.skin))
         elements = body.elements
         self._assemble = bind_arguments(element_loops.assemble, elements, self.system)
@@ -245,7 +214,7 @@ class CondensedFinite:
 
     def undeformed(self) -> tuple[Array, Array]:
         """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
-        return np.zeros(self.body.mesh.nodes.shape), np.zeros((len(self.body.nodes), 3))
+        return np.zeros(self.body.mesh.nodes.shape), np.zeros((len(self.body.elements.nodes), 3))
 
     def place(self, u: Array) -> Array:
         """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
@@ -348,7 +317,7 @@ class FinitePatches:
 
     def deformation(self, displacement: Array) -> Array:
         """Return F (p, 2, 2) for displacements (nodes, 2)."""
-        local = displacement[self.body.nodes[self.element]]
+        local = displacement[self.body.elements.nodes[self.element]]
         gradient = np.stack([self.grad_x, self.grad_y], axis=-1)
         return np.eye(2) + np.einsum("pia,piA->paA", local, gradient)
 
@@ -367,9 +336,9 @@ class FinitePatches:
         body = self.body
         wide = (slice(None), *([None] * (displacement.ndim - 2)))
         held, place = np.unique(self.element, return_inverse=True)
-        local = displacement[body.nodes[held]]  # (e, 9, 2, ...)
-        log = _log_volume(body.grad_x[held], body.grad_y[held], local)
-        fit = np.einsum("eq,eqm,eq...->em...", body.weight[held], body.modes[held], log)[place]
+        local = displacement[body.elements.nodes[held]]  # (e, 9, 2, ...)
+        log = _log_volume(body.elements.grad_x[held], body.elements.grad_y[held], local)
+        fit = np.einsum("eq,eqm,eq...->em...", body.elements.weight[held], body.elements.modes[held], log)[place]
         gradient = [np.einsum("pi,pi...->p...", grad, local[place]) for grad in (self.grad_x, self.grad_y)]
         return LocalState(
             xx=gradient[0][:, 0],
@@ -377,9 +346,9 @@ class FinitePatches:
             yx=gradient[0][:, 1],
             yy=gradient[1][:, 1],
             dilatation=np.einsum("pm,pm...->p...", self.modes, fit),
-            shear=body.shear[self.element][wide],
-            lame=body.lame[self.element][wide],
-            stiffening=body.stiffening[self.element][wide],
+            shear=body.elements.shear[self.element][wide],
+            lame=body.elements.lame[self.element][wide],
+            stiffening=body.elements.stiffening[self.element][wide],
             tangent=(self.tangent[:, 0][wide], self.tangent[:, 1][wide]),
         )
 

@@ -19,24 +19,6 @@ NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by d
 TERMS = 14  # of it: enough up to an exponent of 20
 
 
-def shear_modulus(E: float, nu: float) -> float:
-    """Return G = E / (2 (1 + nu)) [MPa].
-
-    >>> round(shear_modulus(0.08, 0.48), 8)
-    0.02702703
-    """
-    return E / (2.0 * (1.0 + nu))
-
-
-def lame_modulus(E: float, nu: float) -> float:
-    """Return Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa].
-
-    >>> round(lame_modulus(0.08, 0.48), 8)
-    0.64864865
-    """
-    return E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
-
-
 class Elasticity(Protocol):
     """What elements ask of a material."""
 
@@ -53,43 +35,29 @@ class Elasticity(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Isotropic:
-    """An elastic tissue of two constants, those of its small strains."""
+    """An elastic tissue of two constants, those of its small strains.
+
+    >>> round(Isotropic(0.08, 0.48).shear, 8), round(Isotropic(0.08, 0.48).lame, 8)
+    (0.02702703, 0.64864865)
+    """
 
     E: float  # Young's modulus [MPa]
     nu: float  # Poisson's ratio [-]
 
     @property
     def shear(self) -> float:
-        """Shear modulus [MPa]."""
-        return shear_modulus(self.E, self.nu)
+        """Shear modulus G = E / (2 (1 + nu)) [MPa]."""
+        return self.E / (2.0 * (1.0 + self.nu))
 
     @property
     def lame(self) -> float:
-        """Lamé's first constant [MPa]."""
-        return lame_modulus(self.E, self.nu)
+        """Lamé's first constant, lambda = E nu / ((1 + nu) (1 - 2 nu)) [MPa]."""
+        return self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
 
 
 @dataclass(frozen=True, slots=True)
 class Hooke(Isotropic):
-    """Isotropic linear elasticity at small strain, in plane strain."""
-
-    def energy(self, gradient: Array) -> Array:
-        """Return the strain-energy density (...) [MPa] for displacement gradients (..., 2, 2).
-
-        W = G eps:eps + lambda/2 (tr eps)^2, with eps_zz = 0. Simple shear 0.1 of a dermis stores G 0.1^2 / 2:
-
-        >>> float(Hooke(0.08, 0.48).energy(np.array([[0.0, 0.1], [0.0, 0.0]])).round(9))
-        0.000135135
-        """
-        strain = (gradient + np.swapaxes(gradient, -1, -2)) / 2.0
-        trace = np.trace(strain, axis1=-2, axis2=-1)
-        return self.shear * np.sum(strain * strain, axis=(-2, -1)) + self.lame / 2.0 * trace**2
-
-    def stress(self, gradient: Array) -> Array:
-        """Return the in-plane stress (..., 2, 2) [MPa], sigma = 2 G eps + lambda tr(eps) 1, tension positive."""
-        strain = (gradient + np.swapaxes(gradient, -1, -2)) / 2.0
-        trace = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
-        return 2.0 * self.shear * strain + self.lame * trace * np.eye(2)
+    """Isotropic elasticity: W = G eps:eps + lambda/2 (tr eps)^2, sigma = 2 G eps + lambda tr(eps) 1 with eps_zz = 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,31 +79,14 @@ class Moduli:
 
 
 @dataclass(frozen=True, slots=True)
-class Prony:
+class Prony(Isotropic):
     """Linear viscoelasticity at small strain: Hooke at once, whose shear modulus relaxes in terms (g, tau).
 
     G(t) = G (1 - sum g + sum g exp(-t/tau)), the bulk modulus staying as it is: a generalised Maxwell solid, as in Simo
-    and Hughes (1998), Computational Inelasticity, sec. 10.2.
+    and Hughes (1998), Computational Inelasticity, sec. 10.2. Its two constants are those at once.
     """
 
-    E: float  # Young's modulus at once [MPa]
-    nu: float  # Poisson's ratio at once [-]
     terms: tuple[tuple[float, float], ...] = ()  # g [-] and tau [s] of each
-
-    @property
-    def instantaneous(self) -> Hooke:
-        """The elastic solid that it is in a moment."""
-        return Hooke(self.E, self.nu)
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus at once [MPa]."""
-        return self.instantaneous.shear
-
-    @property
-    def lame(self) -> float:
-        """Lamé's first constant at once [MPa]."""
-        return self.instantaneous.lame
 
     @property
     def bulk(self) -> float:
@@ -170,14 +121,6 @@ class Prony:
         shear = part * self.shear
         return Moduli(shear, self.bulk - 2.0 / 3.0 * shear)
 
-    def energy(self, gradient: Array) -> Array:
-        """Return the energy density (...) [MPa] stored at once, as `Hooke.energy`."""
-        return self.instantaneous.energy(gradient)
-
-    def stress(self, gradient: Array) -> Array:
-        """Return the stress (..., 2, 2) [MPa] at once, as `Hooke.stress`."""
-        return self.instantaneous.stress(gradient)
-
 
 def kept(times: Array) -> Array:
     """Return what is left of a strain that grew evenly over so many relaxation times (> 0): (1 - exp(-x)) / x."""
@@ -199,10 +142,7 @@ class Law(Elasticity, Protocol):
 class NeoHooke(Isotropic):
     """W = G/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2 (Simo and Pister 1984, Comput. Meth. Appl. Mech. Eng. 46, 201).
 
-    P = G (F - F^-T) + lambda ln J F^-T. A dermis held at its sides and pressed to 0.8 of its height:
-
-    >>> float(energy(NeoHooke(0.08, 0.48), np.diag([1.0, 0.8])).round(6))
-    0.017315
+    P = G (F - F^-T) + lambda ln J F^-T.
     """
 
     name: ClassVar[str] = "neo-Hooke"
@@ -223,8 +163,7 @@ class Ogden(Isotropic):
     P = G f(Q) (F - F^-T) + lambda ln J F^-T with f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length,
     with a = 4: 2 G/16 (16 + 1/16 - 2):
 
-    >>> law = Ogden(0.08, 0.48, 4.0)
-    >>> float((energy(law, np.diag([2.0, 0.5])) / law.shear).round(6))
+    >>> float((shape(np.array(4.0), np.array(2.0**2 + 0.5**2 - 2.0)) / 2.0).round(6))
     1.757812
     """
 
@@ -277,13 +216,6 @@ def _parts(F: Array) -> tuple[Array, Array, Array]:
     adjugate[..., 0, 1], adjugate[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
     return J, adjugate / J[..., None, None], Q
-
-
-def energy(law: Law, F: Array) -> Array:
-    """Return W (...) [MPa] at deformation gradients F (..., 2, 2); nan where det F is not positive."""
-    J, _, Q = _parts(F)
-    grown = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
-    return law.shear / 2.0 * grown + law.lame / 2.0 * np.log(J) ** 2
 
 
 def stress(law: Law, F: Array) -> Array:

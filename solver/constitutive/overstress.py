@@ -36,7 +36,7 @@ def unstrained(F: Array) -> Array:
     return np.stack([scale * yy / J**2, scale * xx / J**2, -scale * xy / J**2, scale + 0.0 * J], axis=-1)
 
 
-def _turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
+def turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
     J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
     adjugate = np.empty_like(F)
@@ -45,12 +45,6 @@ def _turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
     pulled = F @ plane
     return J, adjugate / J[..., None, None], pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
-
-
-def energy(T: Array, F: Array) -> Array:
-    """Return 1/2 J^-2/3 T:C (...) [MPa], of which `stress` is the derivative within a step."""
-    J, _, _, whole = _turned(F, T)
-    return 0.5 * J ** (-2.0 / 3.0) * whole
 
 
 def stress(T: Array, F: Array) -> Array:
@@ -62,21 +56,8 @@ def stress(T: Array, F: Array) -> Array:
     >>> (stress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
     0.5
     """
-    J, inverse, pulled, whole = _turned(F, T)
+    J, inverse, pulled, whole = turned(F, T)
     return (J ** (-2.0 / 3.0))[..., None, None] * (pulled - (whole / 3.0)[..., None, None] * inverse)
-
-
-def tangent(T: Array, F: Array) -> Array:
-    """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
-    J, inverse, pulled, whole = _turned(F, T)
-    wide = (..., None, None, None, None)
-    plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    across = np.einsum("...aA,...bB->...aAbB", pulled, inverse)
-    out = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
-    out = out - 2.0 / 3.0 * (across + np.einsum("...aA,...bB->...aAbB", inverse, pulled))
-    out += 2.0 / 9.0 * whole[wide] * np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    out += whole[wide] / 3.0 * np.einsum("...aB,...bA->...aAbB", inverse, inverse)
-    return (J ** (-2.0 / 3.0))[wide] * out
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -257,11 +257,11 @@ def loaded(
 
 def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
     """Return the loads (n,) in the order of the unknowns."""
-    if loads[body.nodes[:, 8]].any():
+    if loads[body.elements.nodes[:, 8]].any():
         raise ValueError("a dead load on the centre of an element cannot be taken: put it on corners and mid-sides")
     out = np.zeros(body.size)
-    free = body.unknown >= 0
-    out[body.unknown[free]] = loads[body.nodes[:, :8]][free]
+    free = body.elements.unknown >= 0
+    out[body.elements.unknown[free]] = loads[body.elements.nodes[:, :8]][free]
     return out
 
 

@@ -339,7 +339,7 @@ class MeshTransfer:
         slopes = np.einsum("em,emc->ec", pressure, old.combination)[host]  # (e, 9, 3) by 1, x, y
         away = self.new.points - old.centre[host]
         field = slopes[..., 0] + slopes[..., 1] * away[..., 0] + slopes[..., 2] * away[..., 1]
-        pressure_new = np.einsum("eq,eq,eqm->em", new.weight, field, new.modes)
+        pressure_new = np.einsum("eq,eq,eqm->em", new.elements.weight, field, new.elements.modes)
         u_new[self.driven] = 0.0
         return u_new, pressure_new
 

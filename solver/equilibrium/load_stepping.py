@@ -83,21 +83,6 @@ def forces_of(scene: Scene, load: LoadState) -> ForceLoad | None:
     return ForceLoad(force, held, load.travel)
 
 
-def press_and_slide(
-    depth: float, mu: float, tau: float, direction: int, press: int, slides: int, distance: float
-) -> list[LoadState]:
-    """Return the course of a bone driven `depth` [mm] down in `press` steps, then `distance` [mm] along in `slides`.
-
-    `direction` is that of the bone, +1 along +x: the surface goes the other way.
-
-    >>> [(p.depth, p.travel) for p in press_and_slide(1.0, 0.3, 0.02, +1, press=2, slides=2, distance=4.0)]
-    [(0.5, 0.0), (1.0, 0.0), (1.0, -2.0), (1.0, -4.0)]
-    """
-    down = [LoadState(depth * (i + 1) / press, mu, tau) for i in range(press)]
-    along = [LoadState(depth, mu, tau, travel=-direction * distance * (i + 1) / slides) for i in range(slides)]
-    return down + along
-
-
 def march(
     newton: Newton,
     course: Iterable[LoadState | ForceLoad],

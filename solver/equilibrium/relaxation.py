@@ -180,8 +180,8 @@ class CondensedRelaxing(CondensedFinite):
         super().__init__(body)
         check_moduli(body.mesh, laws)
         check_terms(laws)
-        self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.weight.shape[1])))
-        self.tensor = np.zeros((*body.weight.shape, 4))
+        self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.elements.weight.shape[1])))
+        self.tensor = np.zeros((*body.elements.weight.shape, 4))
 
     def ready(self, step: float) -> None:
         """Prepare a step in time [s]."""
@@ -213,12 +213,14 @@ class CondensedRelaxing(CondensedFinite):
         """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
         body = self.body
         stress = overstress.stress(self.tensor, body.deformation(u))
-        gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
-        return np.einsum("eq,eqaA,eqiA->eia", body.weight, stress, gradient).reshape(len(body.nodes), 18)
+        gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
+        return np.einsum("eq,eqaA,eqiA->eia", body.elements.weight, stress, gradient).reshape(
+            len(body.elements.nodes), 18
+        )
 
     def stored(self, u: Array, reaction: Array) -> float:
         """Return the energy stored at `u`, with what the terms hold at the last instant remembered."""
-        return super().stored(u, reaction) + float(self.past.energy() @ self.body.weight.ravel())
+        return super().stored(u, reaction) + float(self.past.energy() @ self.body.elements.weight.ravel())
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:

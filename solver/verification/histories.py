@@ -3,7 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from solver.equilibrium.load_stepping import march, press_and_slide
+from solver.equilibrium import LoadState
+from solver.equilibrium.load_stepping import march
 from solver.scene import Scene
 from solver.verification.methods import MESHED, Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
@@ -31,6 +32,21 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Marched | 
     names = ("slipperiness 100", "stickiness 0") if request.quick else JUDGED
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
     return rows_within(request, scenes, "courses of 200 substeps", lambda scene: [_marched(scene)])
+
+
+def press_and_slide(
+    depth: float, mu: float, tau: float, direction: int, press: int, slides: int, distance: float
+) -> list[LoadState]:
+    """Return the course of a bone driven `depth` [mm] down in `press` steps, then `distance` [mm] along in `slides`.
+
+    `direction` is that of the bone, +1 along +x: the surface goes the other way.
+
+    >>> [(p.depth, p.travel) for p in press_and_slide(1.0, 0.3, 0.02, +1, press=2, slides=2, distance=4.0)]
+    [(0.5, 0.0), (1.0, 0.0), (1.0, -2.0), (1.0, -4.0)]
+    """
+    down = [LoadState(depth * (i + 1) / press, mu, tau) for i in range(press)]
+    along = [LoadState(depth, mu, tau, travel=-direction * distance * (i + 1) / slides) for i in range(slides)]
+    return down + along
 
 
 def _marched(scene: Scene) -> Marched:

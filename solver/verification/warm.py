@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.load_stepping import march, press_and_slide, settled
+from solver.equilibrium.load_stepping import march, settled
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Scene
 from solver.scene.tables import Friction
+from solver.verification.histories import press_and_slide
 from solver.verification.methods import MESHED, Kinematics
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
 from solver.verification.truth import KINEMATICS, cases

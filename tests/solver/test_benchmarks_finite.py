@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solver.body.finite import FiniteBody
-from solver.constitutive import LAWS, energy, stress
+from solver.constitutive import LAWS, stress
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import settled
 from solver.mesh import block, quality
@@ -15,6 +15,7 @@ from solver.verification.published.finite_contacts import ELEMENT, light_finite
 from solver.verification.published.problems import CAPPED, FINITE_PARTS
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
+from tests.solver.oracle.laws import energy
 
 MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999999)]
 
@@ -55,11 +56,13 @@ def test_a_homogeneous_state_is_an_equilibrium_of_any_mesh_with_the_energy_and_f
     body = FiniteBody.of(mesh, [law])
     u = mesh.nodes @ (gradient - np.eye(2)).T
     det = np.linalg.det(oracle.deformation(body, u))
-    pressure = body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(det))
+    pressure = body.elements.lame[:, None] * np.einsum(
+        "eq,eqm,eq->em", body.elements.weight, body.elements.modes, np.log(det)
+    )
     found, _ = oracle.forces_and_tangents(body, u, pressure)
     force = np.zeros(mesh.nodes.shape)
     np.add.at(force, mesh.elements, found.reshape(-1, 9, 2))
-    area = body.weight.sum()
+    area = body.elements.weight.sum()
     scale = np.abs(stress(law, gradient)).max() * 2.0
     inner = np.setdiff1d(np.arange(len(force)), edge)
     assert np.abs(force[inner]).max() < 1e-11 * scale * (5e6 if law.nu > 0.49 else 1.0)

@@ -31,7 +31,7 @@ def test_a_mesh_carries_a_state_to_itself_unchanged():
 def test_a_linear_pressure_and_a_displacement_of_the_whole_are_the_same_on_another_mesh():
     old, new = places(5), places(8)
     pressures = [
-        np.einsum("eq,eqm,eq->em", one.body.weight, one.body.modes, 1.0 + one.points @ [2.0, -3.0])
+        np.einsum("eq,eqm,eq->em", one.body.elements.weight, one.body.elements.modes, 1.0 + one.points @ [2.0, -3.0])
         for one in (old, new)
     ]
     everywhere = np.tile([0.3, -0.2], (len(old.body.mesh.nodes), 1))

@@ -239,14 +239,14 @@ def test_how_the_sed_of_a_patch_bends_is_a_complex_step_of_its_energy(law):
 
 def average(body, probes, u):
     """Return the SED of patches as `FinitePatches.average` does, of displacements that may be complex."""
-    inside = np.stack([body.grad_x, body.grad_y], axis=-1)
-    log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.nodes], inside)))
-    volume = np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
+    inside = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
+    log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.elements.nodes], inside)))
+    volume = np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
     here = np.stack([probes.grad_x, probes.grad_y], axis=-1)
-    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.nodes[probes.element]], here)
+    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[probes.element]], here)
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(determinant(F))
-    shear, lame = body.shear[probes.element], body.lame[probes.element]
-    stretched = Q if body.stiffening[0] == 2.0 else grown(body.stiffening[probes.element], Q)
+    shear, lame = body.elements.shear[probes.element], body.elements.lame[probes.element]
+    stretched = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[probes.element], Q)
     energy = shear / 2.0 * stretched + lame / 2.0 * np.sum(probes.modes * volume[probes.element], axis=1) ** 2
     totals = [np.sum((energy * probes.weights)[probes.patch == n]) for n in range(3)]
     return np.array(totals) / np.bincount(probes.patch, probes.weights)

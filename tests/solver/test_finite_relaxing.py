@@ -21,6 +21,7 @@ from solver.progress import listening
 from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
 from tests.solver.oracle import finite as oracle
+from tests.solver.oracle.laws import overstress_energy, overstress_tangent
 from tests.solver.test_relaxing import TABLE, TIMES
 
 entries = st.floats(-0.4, 0.4)
@@ -43,10 +44,10 @@ def test_within_a_step_the_stress_is_the_derivative_of_an_energy_and_the_tangent
         return
     small = 1e-30
     stepped = F + 1j * small * direction
-    slope = overstress.energy(T, stepped).imag / small
+    slope = overstress_energy(T, stepped).imag / small
     np.testing.assert_allclose(np.sum(overstress.stress(T, F) * direction), slope, rtol=1e-10, atol=1e-12)
     bend = overstress.stress(T, stepped).imag / small
-    turned = np.einsum("aAbB,bB->aA", overstress.tangent(T, F), direction)
+    turned = np.einsum("aAbB,bB->aA", overstress_tangent(T, F), direction)
     np.testing.assert_allclose(turned, bend, rtol=1e-9, atol=1e-11)
 
 
@@ -140,7 +141,7 @@ def test_at_once_the_tissue_has_its_own_moduli_and_in_the_end_the_relaxed_ones()
     law = Prony(0.08, 0.48, ((0.2, 0.07), (0.4, 1.4)))
     past = Past.at_rest(np.array([[g * law.shear for g, _ in law.terms]]), np.array([[tau for _, tau in law.terms]]))
     end = NeoHooke(*law.relaxed.engineering)
-    A = relaxed_tangent(end, np.eye(2)) + overstress.tangent(past.over(1e-9)[0], np.eye(2))
+    A = relaxed_tangent(end, np.eye(2)) + overstress_tangent(past.over(1e-9)[0], np.eye(2))
     hooke = Hooke(0.08, 0.48)
     np.testing.assert_allclose([A[0, 0, 0, 0], A[0, 0, 1, 1], A[0, 1, 0, 1]],
                                [hooke.lame + 2 * hooke.shear, hooke.lame, hooke.shear], rtol=1e-7)  # fmt: skip
@@ -178,16 +179,16 @@ def whole(newton, u, pressure):
     """Forces (e, 18) and tangents (e, 18, 18) in plain NumPy."""
     body, T = newton.condensed.body, newton.condensed.tensor
     force, tangent = oracle.forces_and_tangents(body, u, pressure)
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
-    bend = overstress.tangent(T, oracle.deformation(body, u))
-    count = len(body.nodes)
-    more = np.einsum("eq,eqaAbB,eqiA,eqjB->eiajb", body.weight, bend, gradient, gradient)
+    gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
+    bend = overstress_tangent(T, oracle.deformation(body, u))
+    count = len(body.elements.nodes)
+    more = np.einsum("eq,eqaAbB,eqiA,eqjB->eiajb", body.elements.weight, bend, gradient, gradient)
     return force + newton.condensed.excess(u), tangent + more.reshape(count, 18, 18)
 
 
 def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differences():
     newton, start, rng = relaxing_block()
-    body, pressure = newton.condensed.body, np.zeros((len(newton.condensed.body.nodes), 3))
+    body, pressure = newton.condensed.body, np.zeros((len(newton.condensed.body.elements.nodes), 3))
     u = start.u + 0.3 * start.u[::-1]
     u[body.mesh.held] = 0.0
     assert newton.condensed.assemble(u, pressure) > 0.0
@@ -196,7 +197,7 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     across = tangent[:, :16, 16:] @ inside
     outer = tangent[:, :16, :16] - across @ tangent[:, 16:, :16]
     expected = np.zeros(body.size + 1)
-    np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
+    np.add.at(expected, body.elements.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
     scale = np.abs(tangent).max()
     np.testing.assert_allclose(np.tril(newton.condensed.system.tangent), np.tril(outer), atol=1e-12 * scale)
     np.testing.assert_allclose(newton.condensed.all_forces, expected[:-1], atol=1e-13 * scale)
@@ -205,10 +206,10 @@ def test_compiled_forces_and_tangents_agree_with_the_plain_ones_and_with_differe
     assert newton.condensed.resist(other) > 0.0
     force, _ = whole(newton, other, pressure)
     expected[:] = 0.0
-    np.add.at(expected, body.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
+    np.add.at(expected, body.elements.unknown.reshape(-1, 16), force[:, :16] - (across @ force[:, 16:, None])[:, :, 0])
     np.testing.assert_allclose(newton.condensed.all_forces, expected[:-1], atol=1e-13 * scale)
     way, h = rng.normal(size=u.shape), 1e-6
-    local = way[body.nodes].reshape(len(body.nodes), 18)
+    local = way[body.elements.nodes].reshape(len(body.elements.nodes), 18)
     ahead, behind = (newton.condensed.excess(u + sign * h * way) for sign in (1.0, -1.0))
     plain = oracle.forces_and_tangents(body, u, pressure)[1]
     change = np.einsum("eij,ej->ei", tangent - plain, local)
@@ -224,9 +225,9 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
     for depth, step in ((0.1, 0.1), (0.2, 0.1), (0.2, 0.5), (0.2, 5.0)):
         newton.condensed.ready(step)
         shape = newton.settle(shape, LoadState(depth, 0.3), 1e-9)
-        force, _ = oracle.forces_and_tangents(body, shape.u, np.zeros((len(body.nodes), 3)))
+        force, _ = oracle.forces_and_tangents(body, shape.u, np.zeros((len(body.elements.nodes), 3)))
         total = np.zeros(body.mesh.nodes.shape)
-        np.add.at(total, body.nodes, (force + newton.condensed.excess(shape.u)).reshape(-1, 9, 2))
+        np.add.at(total, body.elements.nodes, (force + newton.condensed.excess(shape.u)).reshape(-1, 9, 2))
         total[body.mesh.skin] -= shape.reaction
         total[body.mesh.held] = 0.0
         assert np.abs(total).max() < 1e-9 * shape.force[1]
@@ -238,7 +239,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
 def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissue_loses():
     """Lost: g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues of A B^-1, over the block and in time."""
     newton, _, _ = relaxing_block(distortion=0.0)
-    body, weight = newton.condensed.body, newton.condensed.body.weight.ravel()
+    body, weight = newton.condensed.body, newton.condensed.body.elements.weight.ravel()
     newton.condensed.past = Past.at_rest(newton.condensed.past.shear, newton.condensed.past.tau)
     shape, way, rates, steps, time = EquilibriumState.undeformed(body.condensed), [], [0.0], 24, 0.5
     for number in range(1, steps + 1):

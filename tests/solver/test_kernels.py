@@ -40,7 +40,7 @@ MEMBERS = [law(0.08, nu) for law in LAWS for nu in (0.48, 0.4999)]
 @pytest.mark.parametrize("law", MEMBERS, ids=str)
 def test_compiled_forces_and_tangent_agree_with_the_plain_ones(law):
     body, u = distorted(law)
-    pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.nodes), 3))
+    pressure = np.random.default_rng(2).normal(0.0, 0.01, (len(body.elements.nodes), 3))
     condensed, least = assembled(body, u, pressure)
     force, _ = oracle.system(body, u, pressure)
     _, tangent = oracle.without_centres(body, u, pressure)
@@ -58,9 +58,9 @@ def test_forces_for_a_tangent_kept_from_another_state_agree_with_the_plain_ones(
     least = element_loops.forces(other, body.elements, condensed.system)
     force, _ = oracle.forces_and_tangents(body, other, newton_pressure(body, other))
     centre = np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])
-    expected, free = np.zeros(body.size), body.unknown.reshape(-1, 16) >= 0
+    expected, free = np.zeros(body.size), body.elements.unknown.reshape(-1, 16) >= 0
     left = force[:, :16] - (tangent[:, :16, 16:] @ centre)[:, :, 0]
-    np.add.at(expected, body.unknown.reshape(-1, 16)[free], left[free])
+    np.add.at(expected, body.elements.unknown.reshape(-1, 16)[free], left[free])
     np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-13 * np.abs(tangent).max())
     np.testing.assert_allclose(condensed.system.recovery_matrix[:, :, 16], centre[:, :, 0], atol=1e-12)
     assert least == pytest.approx(np.linalg.det(oracle.deformation(body, other)).min(), rel=1e-12)
@@ -71,10 +71,10 @@ def test_forces_of_a_strain_that_is_nearly_nothing_keep_their_own_digits(law):
     """They are those of the undeformed body's stiffness, but for the strain itself: stiff bone has such."""
     body, u = distorted(law)
     small = 1e-12 * u
-    _, tangent = oracle.without_centres(body, np.zeros_like(u), np.zeros((len(body.nodes), 3)))
+    _, tangent = oracle.without_centres(body, np.zeros_like(u), np.zeros((len(body.elements.nodes), 3)))
     condensed, _ = assembled(body, small, newton_pressure(body, small))
-    at = body.unknown.reshape(-1, 16)
-    moved = np.where(at >= 0, small[body.nodes[:, :8]].reshape(-1, 16), 0.0)
+    at = body.elements.unknown.reshape(-1, 16)
+    moved = np.where(at >= 0, small[body.elements.nodes[:, :8]].reshape(-1, 16), 0.0)
     expected = np.zeros(body.size)
     np.add.at(expected, at[at >= 0], (tangent @ moved[:, :, None])[:, :, 0][at >= 0])
     np.testing.assert_allclose(condensed.all_forces, expected, atol=1e-10 * np.abs(expected).max())
@@ -86,7 +86,7 @@ def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_for
     way = np.random.default_rng(3).normal(size=u.shape)
     pressure = newton_pressure(body, u)
     force, tangent = oracle.forces_and_tangents(body, u, pressure)
-    local = way[body.nodes].reshape(len(body.nodes), 18)
+    local = way[body.elements.nodes].reshape(len(body.elements.nodes), 18)
     h = 1e-6
     slope = (oracle.energy(body, u + h * way) - oracle.energy(body, u - h * way)) / (2 * h)
     assert np.sum(force * local) == pytest.approx(slope, rel=1e-7)
@@ -101,8 +101,8 @@ def test_forces_are_the_derivative_of_the_energy_and_the_tangent_that_of_the_for
 def test_the_body_eliminated_part_by_part_is_the_body_solved_at_once(columns, held):
     body = FiniteBody.of(block(columns=columns, rows=3, distortion=0.1, held=held), [NeoHooke(0.08, 0.48)])
     u = np.zeros(body.mesh.nodes.shape)
-    condensed, _ = assembled(body, u, np.zeros((len(body.nodes), 3)))
-    _, tangent = oracle.system(body, u, np.zeros((len(body.nodes), 3)))
+    condensed, _ = assembled(body, u, np.zeros((len(body.elements.nodes), 3)))
+    _, tangent = oracle.system(body, u, np.zeros((len(body.elements.nodes), 3)))
     force = np.random.default_rng(0).normal(size=body.size)
     skin = np.random.default_rng(1).normal(size=2 * len(body.mesh.skin))
     felt, stiffness = oracle.reduced(force, tangent, len(skin))
@@ -183,14 +183,16 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
 
 def newton_pressure(body, u):
     J = np.linalg.det(oracle.deformation(body, u))
-    return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+    return body.elements.lame[:, None] * np.einsum(
+        "eq,eqm,eq->em", body.elements.weight, body.elements.modes, np.log(J)
+    )
 
 
 def equilibrated(body, u):
     u = u.copy()
     for _ in range(8):
         force, tangent = oracle.forces_and_tangents(body, u, newton_pressure(body, u))
-        u[body.nodes[:, 8]] -= np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])[:, :, 0]
+        u[body.elements.nodes[:, 8]] -= np.linalg.solve(tangent[:, 16:, 16:], force[:, 16:, None])[:, :, 0]
     return u
 
 
@@ -200,7 +202,7 @@ def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
     F = np.array([[1.1, 0.2], [0.05, 0.9]])
     u = body.mesh.nodes @ (F - np.eye(2)).T
     Q = np.sum(F * F) - 2.0 - 2.0 * np.log(np.linalg.det(F))
-    expected = body.shear / 2.0 * Q + body.lame / 2.0 * np.log(np.linalg.det(F)) ** 2
+    expected = body.elements.shear / 2.0 * Q + body.elements.lame / 2.0 * np.log(np.linalg.det(F)) ** 2
     np.testing.assert_allclose(probes.energy(u), expected[probes.element], rtol=1e-9)
 
 

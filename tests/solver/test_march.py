@@ -8,7 +8,8 @@ import pytest
 from solver._kernels.compiling import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.load_stepping import march, press_and_slide, settled
+from solver.equilibrium.load_stepping import march, settled
+from solver.verification.histories import press_and_slide
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
 

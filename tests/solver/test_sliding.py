@@ -50,7 +50,7 @@ def test_the_surface_and_the_bone_push_alike(capped):
     pressure = pressure_of(body, shape.u)
     force, _ = oracle.forces_and_tangents(body, shape.u, pressure)
     whole = np.zeros(body.mesh.nodes.shape)
-    np.add.at(whole, body.nodes, force.reshape(-1, 9, 2))
+    np.add.at(whole, body.elements.nodes, force.reshape(-1, 9, 2))
     bone = whole[body.mesh.held].sum(axis=0)
     np.testing.assert_allclose(shape.force, -bone, atol=1e-10)
     free = np.ones(len(whole), bool)
@@ -128,14 +128,16 @@ def test_turning_the_unloaded_body_by_a_right_angle_stores_nothing():
     body = FiniteBody.of(block(distortion=0.06), [NeoHooke(0.08, 0.48)])
     x, y = body.mesh.nodes.T
     u = np.stack([-y - x, x - y], axis=1)
-    force, _ = oracle.forces_and_tangents(body, u, np.zeros((len(body.nodes), 3)))
+    force, _ = oracle.forces_and_tangents(body, u, np.zeros((len(body.elements.nodes), 3)))
     assert abs(oracle.energy(body, u)) < 1e-15
     np.testing.assert_allclose(force, 0.0, atol=1e-14)
 
 
 def pressure_of(body, u):
     J = np.linalg.det(oracle.deformation(body, u))
-    return body.lame[:, None] * np.einsum("eq,eqm,eq->em", body.weight, body.modes, np.log(J))
+    return body.elements.lame[:, None] * np.einsum(
+        "eq,eqm,eq->em", body.elements.weight, body.elements.modes, np.log(J)
+    )
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])

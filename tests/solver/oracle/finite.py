@@ -21,8 +21,8 @@ def deformation(body: FiniteBody, u: Array) -> Array:
 
 def _gradient(body: FiniteBody, u: Array) -> Array:
     """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
-    local = u[body.nodes]  # (e, 9, 2)
-    return np.stack([body.grad_x @ local, body.grad_y @ local], axis=-1)
+    local = u[body.elements.nodes]  # (e, 9, 2)
+    return np.stack([body.elements.grad_x @ local, body.elements.grad_y @ local], axis=-1)
 
 
 def _turned(H: Array) -> tuple[Array, Array]:
@@ -37,7 +37,7 @@ def _logarithm(body: FiniteBody, H: Array) -> tuple[Array, Array]:
     """Return ln J (e, 9) and its modes (e, 3) for F = 1 + H."""
     grown = H[..., 0, 0] + H[..., 1, 1] + (H[..., 0, 0] * H[..., 1, 1] - H[..., 0, 1] * H[..., 1, 0])
     log = _log1p(grown)
-    return log, np.einsum("eq,eqm,eq->em", body.weight, body.modes, log)
+    return log, np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
 
 
 def _log1p(x: Array) -> Array:
@@ -52,7 +52,7 @@ def _excess(H: Array, log: Array) -> Array:
 
 def pressure(body: FiniteBody, u: Array) -> Array:
     """Return the modes (e, 3) of the pressure lambda ln J at `u`."""
-    return body.lame[:, None] * _logarithm(body, _gradient(body, u))[1]
+    return body.elements.lame[:, None] * _logarithm(body, _gradient(body, u))[1]
 
 
 def energy(body: FiniteBody, u: Array) -> float:
@@ -62,8 +62,11 @@ def energy(body: FiniteBody, u: Array) -> float:
 
 def _stored(body: FiniteBody, H: Array) -> complex:
     log, volume = _logarithm(body, H)
-    grown = shape(body.stiffening[:, None], _excess(H, log))
-    return complex(np.sum(body.weight * body.shear[:, None] / 2.0 * grown) + np.sum(body.lame / 2.0 * (volume**2).T))
+    grown = shape(body.elements.stiffening[:, None], _excess(H, log))
+    return complex(
+        np.sum(body.elements.weight * body.elements.shear[:, None] / 2.0 * grown)
+        + np.sum(body.elements.lame / 2.0 * (volume**2).T)
+    )
 
 
 def forces(body: FiniteBody, u: Array) -> Array:
@@ -71,10 +74,12 @@ def forces(body: FiniteBody, u: Array) -> Array:
     H = _gradient(body, u)
     log, volume = _logarithm(body, H)
     inverse, exceeds = _turned(H)
-    G = body.shear[:, None] * slopes(body.stiffening[:, None], _excess(H, log))[0]
-    pressure = body.lame[:, None] * (body.modes @ volume[:, :, None])[:, :, 0]
-    stress = body.weight[:, :, None, None] * (G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse)
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
+    G = body.elements.shear[:, None] * slopes(body.elements.stiffening[:, None], _excess(H, log))[0]
+    pressure = body.elements.lame[:, None] * (body.elements.modes @ volume[:, :, None])[:, :, 0]
+    stress = body.elements.weight[:, :, None, None] * (
+        G[:, :, None, None] * exceeds + pressure[:, :, None, None] * inverse
+    )
+    gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1).reshape(len(H), 9, 9, 2)
     return (gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1).reshape(len(H), 18)
 
 
@@ -86,18 +91,18 @@ def forces_and_tangents(body: FiniteBody, u: Array, pressure: Array) -> tuple[Ar
     H = _gradient(body, u)
     log, _ = _logarithm(body, H)
     inverse, exceeds = _turned(H)
-    gradient = np.stack([body.grad_x, body.grad_y], axis=-1)
-    w = body.weight
-    grown, growth = slopes(body.stiffening[:, None], _excess(H, log))
-    G = body.shear[:, None] * grown
+    gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
+    w = body.elements.weight
+    grown, growth = slopes(body.elements.stiffening[:, None], _excess(H, log))
+    G = body.elements.shear[:, None] * grown
     spatial = np.einsum("eqaA,eqiA->eqia", inverse, gradient)  # gradients in the deformed body
-    dilate = np.einsum("eq,eqm,eqia->emia", w, body.modes, spatial)
+    dilate = np.einsum("eq,eqm,eqia->emia", w, body.elements.modes, spatial)
     excess = np.einsum("eqaA,eqiA->eqia", exceeds, gradient)
-    geometric = w * (G - np.einsum("eqm,em->eq", body.modes, pressure))
+    geometric = w * (G - np.einsum("eqm,em->eq", body.elements.modes, pressure))
     tangent = np.einsum("eq,eqiA,eqjA,ab->eiajb", w * G, gradient, gradient, np.eye(2))
     tangent += np.einsum("eq,eqja,eqib->eiajb", geometric, spatial, spatial)
-    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * growth * w * body.shear[:, None], excess, excess)
-    tangent += np.einsum("e,emia,emjb->eiajb", body.lame, dilate, dilate)
+    tangent += np.einsum("eq,eqia,eqjb->eiajb", 2.0 * growth * w * body.elements.shear[:, None], excess, excess)
+    tangent += np.einsum("e,emia,emjb->eiajb", body.elements.lame, dilate, dilate)
     return forces(body, u), tangent.reshape(-1, 18, 18)
 
 
@@ -114,7 +119,7 @@ def system(body: FiniteBody, u: Array, pressure: Array) -> tuple[Array, Array]:
     """Return the internal forces (n,) and the tangent (n, n) with the elements' centres eliminated."""
     force, tangent = without_centres(body, u, pressure)
     out, whole = np.zeros(body.size + 1), np.zeros((body.size + 1, body.size + 1))
-    at = body.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
+    at = body.elements.unknown.reshape(-1, 16)  # fixed unknowns, -1, go to the last place and are cut off
     np.add.at(out, at, force)
     np.add.at(whole, (at[:, :, None], at[:, None, :]), tangent)
     return out[:-1], whole[:-1, :-1]

@@ -1,0 +1,59 @@
+# ruff: noqa: N803, N806 - F, J, Q and T are the literature's own
+"""Energies, stresses and tangents of laws in plain NumPy that the program does not need: they judge its elements."""
+
+import numpy as np
+
+from solver.arrays import Array
+from solver.constitutive import PLAIN, shape
+from solver.constitutive.overstress import turned
+from solver.contact import SHEAR_LIMITED, SLIP
+
+
+def hooke_energy(law, gradient):
+    """Return W = G eps:eps + lambda/2 (tr eps)^2 (...) [MPa] for displacement gradients (..., 2, 2), eps_zz = 0."""
+    strain = (gradient + np.swapaxes(gradient, -1, -2)) / 2.0
+    return (
+        law.shear * np.sum(strain * strain, axis=(-2, -1)) + law.lame / 2.0 * np.trace(strain, axis1=-2, axis2=-1) ** 2
+    )
+
+
+def hooke_stress(law, gradient):
+    """Return sigma = 2 G eps + lambda tr(eps) 1 (..., 2, 2) [MPa], tension positive."""
+    strain = (gradient + np.swapaxes(gradient, -1, -2)) / 2.0
+    return 2.0 * law.shear * strain + law.lame * np.trace(strain, axis1=-2, axis2=-1)[..., None, None] * np.eye(2)
+
+
+def energy(law, F):
+    """Return W (...) [MPa] of a law of finite strain at deformation gradients F (..., 2, 2); nan where det F <= 0."""
+    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+    Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
+    grown = Q if law.stiffening == PLAIN else shape(np.array(law.stiffening), Q)
+    return law.shear / 2.0 * grown + law.lame / 2.0 * np.log(J) ** 2
+
+
+def overstress_energy(T: Array, F: Array) -> Array:
+    """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress.stress` is the derivative within a step."""
+    J, _, _, whole = turned(F, T)
+    return 0.5 * J ** (-2.0 / 3.0) * whole
+
+
+def overstress_tangent(T: Array, F: Array) -> Array:
+    """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
+    J, inverse, pulled, whole = turned(F, T)
+    wide = (..., None, None, None, None)
+    plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
+    across = np.einsum("...aA,...bB->...aAbB", pulled, inverse)
+    out = np.einsum("ab,...AB->...aAbB", np.eye(2), plane)
+    out = out - 2.0 / 3.0 * (across + np.einsum("...aA,...bB->...aAbB", inverse, pulled))
+    out += 2.0 / 9.0 * whole[wide] * np.einsum("...aA,...bB->...aAbB", inverse, inverse)
+    out += whole[wide] / 3.0 * np.einsum("...aB,...bA->...aAbB", inverse, inverse)
+    return (J ** (-2.0 / 3.0))[wide] * out
+
+
+def friction_slopes(law, state, sense):
+    """Return how friction forces grow with the normal force (n,) [-] and with the skin's length (n,) [MPa].
+
+    Of points in `state` (n,), with friction forces along `sense` (n,), +1 along +x. Open points bear no force, and that
+    of sticking ones is unknown.
+    """
+    return np.where(state == SLIP, sense * law.mu, 0.0), np.where(state == SHEAR_LIMITED, sense * law.tau_max, 0.0)
