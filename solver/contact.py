@@ -68,11 +68,6 @@ class FrictionLaw:
         """Return the largest tangential force (n,) [N/mm] whatever the pressure, on `length` (n,) [mm] of skin."""
         return np.full(length.shape, np.inf) if self.tau_max == np.inf else self.tau_max * length
 
-    @property
-    def frictionless(self) -> bool:
-        """True where no tangential force is possible."""
-        return self.mu == 0.0 or self.tau_max == 0.0
-
 
 LAWS = (FrictionLaw,)
 

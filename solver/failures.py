@@ -29,15 +29,7 @@ class SolveFailure(Exception):
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints instead of a prediction."""
-        return {
-            "error": {
-                "kind": self.kind,
-                "limit_mu": self.limit_mu,
-                "limit_indentation": self.limit_indentation,
-                "limit_normal_force": self.limit_normal_force,
-                "message": str(self),
-            }
-        }
+        return {"error": {"kind": self.kind, **vars(self), "message": str(self)}}
 
     def in_a_sentence(self) -> "SolveFailure":
         """Return this failure with its message begun and ended as a sentence: parts of the solver tell fragments.
@@ -46,12 +38,7 @@ class SolveFailure(Exception):
         'No equilibrium within 25 iterations.'
         """
         words = str(self)
-        return type(self)(
-            words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."),
-            limit_mu=self.limit_mu,
-            limit_indentation=self.limit_indentation,
-            limit_normal_force=self.limit_normal_force,
-        )
+        return type(self)(words[:1].upper() + words[1:] + ("" if words.endswith(".") else "."), **vars(self))
 
 
 class NoSteadyState(SolveFailure):

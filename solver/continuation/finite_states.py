@@ -83,13 +83,10 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
         return settled(finger, scene, near)
     load = sliding_load(scene)
-    for begin in dict.fromkeys((near, None)):
-        try:
-            return load_stepping.settled(finger.newton, load, begin, FORCE_SEARCH.leading)
-        except NotConverged:
-            if begin is None:
-                raise
-    raise AssertionError  # the last begin is none
+    if near is not None:
+        with suppress(NotConverged):
+            return load_stepping.settled(finger.newton, load, near, FORCE_SEARCH.leading)
+    return load_stepping.settled(finger.newton, load, None, FORCE_SEARCH.leading)
 
 
 def _settled_under(

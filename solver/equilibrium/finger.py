@@ -26,7 +26,7 @@ from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
 from solver.contact import SkinCompression, width
 from solver.equilibrium import EquilibriumState, Newton
 from solver.failures import MIXED, NotConverged
-from solver.mesh import Q2P1, MeshError, distinct, with_middles
+from solver.mesh import Q2P1, MeshError, distinct, line, with_middles
 from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene import Scene
@@ -370,5 +370,4 @@ def _interpolation(nodes: Array, points: Array) -> tuple[Indices, Array]:
     ends = nodes[::2]
     piece = _piece(ends, points)
     local = 2.0 * (points - ends[piece]) / (ends[piece + 1] - ends[piece]) - 1.0
-    parts = [local * (local - 1.0) / 2.0, 1.0 - local * local, local * (local + 1.0) / 2.0]
-    return 2 * piece, np.stack(parts, axis=1)
+    return 2 * piece, line(local)[0]

@@ -124,11 +124,6 @@ class Way:
         """The state reached."""
         return self.instants[-1].state
 
-    @property
-    def states(self) -> list[EquilibriumState]:
-        """The states after rest."""
-        return [instant.state for instant in self.instants[1:]]
-
     def go(self, aim: Aim) -> None:
         """Append the state at `aim`, and those of smaller steps where one of that size fails."""
         begin = self.aim

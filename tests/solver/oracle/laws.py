@@ -57,3 +57,8 @@ def friction_slopes(law, state, sense):
     of sticking ones is unknown.
     """
     return np.where(state == SLIP, sense * law.mu, 0.0), np.where(state == SHEAR_LIMITED, sense * law.tau_max, 0.0)
+
+
+def frictionless(law):
+    """Return whether no tangential force is possible."""
+    return law.mu == 0.0 or law.tau_max == 0.0
