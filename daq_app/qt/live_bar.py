@@ -60,7 +60,7 @@ class LiveBar(QWidget):
             row.setSpacing(GRID)
             self._rows.addLayout(row)
         self._place_numbers(numbers)
-        numbers.addStretch(1)
+        numbers.addStretch(len(READ))
         acts.addStretch(1)
         for widget in (self.finite, self.length, self.hold):
             acts.addWidget(widget)
@@ -151,6 +151,8 @@ class LiveBar(QWidget):
             caption = label(name, "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
+            if self._pairs:
+                row.addStretch(1)  # where there is room, a caption stands nearer to its own number than to another
             row.addWidget(caption)
             row.addWidget(value)
             self.values[channel] = value
