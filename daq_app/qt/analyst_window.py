@@ -2,7 +2,6 @@
 
 from html import escape
 from pathlib import Path
-from typing import Protocol
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QKeySequence, QResizeEvent
@@ -16,7 +15,6 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QSizePolicy,
     QTabWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -27,7 +25,7 @@ from daq_app.analyst.shown import progress_words
 from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Wrapped, bare, button, choice, label, panel
+from daq_app.qt.parts import Wrapped, bare, button, choice, hbox, label, panel, scrolled, vbox
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens
@@ -79,32 +77,16 @@ class LineageLabel(QLabel):
         self.setToolTip(next((link.more for link in self._links if link.place == place), ""))
 
 
-class Work(Protocol):
-    """What is done for the window, as `daq_app.analyst.process.Analyst` does it."""
-
-    def poll(self) -> tuple[m.Said, ...]:
-        """Return what came since the last call."""
-        ...
-
-    def ask(self, request: m.Ask) -> None:
-        """Ask for something; nothing is waited for."""
-        ...
-
-    def close(self) -> None:
-        """End the work."""
-        ...
-
-
 class AnalystWindow(QMainWindow):
     """A session folder, followed from its trials to the model. It knows nothing but the last `AnalystState`."""
 
-    def __init__(self, folder: Path, tokens: Tokens, work: Work | None = None) -> None:
+    def __init__(self, folder: Path, tokens: Tokens, work: Analyst | None = None) -> None:
         """Open `folder`; `work` is done by another process, begun here where none is given."""
         super().__init__()
         self.setWindowTitle(f"{folder.name} – daq-app")
         self.setAccessibleName(tr("analyst's window"))
         self.state = AnalystState(folder)
-        self._work: Work = work or Analyst(folder)
+        self._work = work or Analyst(folder)
         self.keys: KeysPage | None = None  # made when somebody asks for it
         self._head = label("", "simulated")
         self.way = LineageLabel(tokens)
@@ -193,7 +175,7 @@ class AnalystWindow(QMainWindow):
         super().resizeEvent(event)
         self._place_columns()
         if self.keys is not None:
-            self.keys.fit(self.size(), type_scale())
+            self.keys.fit()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
@@ -202,11 +184,8 @@ class AnalystWindow(QMainWindow):
         super().closeEvent(event)
 
     def _show_keys(self) -> None:
-        if self.keys is None:
-            self.keys = KeysPage(self, ANALYST_KEYS)
-        self.keys.fit(self.size(), type_scale())
-        self.keys.setVisible(not self.keys.isVisible())
-        self.keys.raise_()
+        self.keys = self.keys or KeysPage(self, type_scale(), ANALYST_KEYS)
+        self.keys.toggle()
 
     def _go_to(self, column: int) -> None:
         """Go to one of the columns, on its page where they are pages."""
@@ -289,21 +268,16 @@ class AnalystWindow(QMainWindow):
     def _panel(self, name: str, column: QWidget) -> QFrame:
         frame, layout = panel(name.lower())
         layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        scrolled = QScrollArea()  # where a column is too high for the window it is scrolled, never cut
-        scrolled.setWidgetResizable(True)
-        scrolled.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-        column.setObjectName("column")
-        scrolled.setStyleSheet("QScrollArea, QWidget#column { background: transparent; border: none; }")
-        scrolled.setWidget(column)
-        layout.addWidget(scrolled)
-        self._scrolled.append(scrolled)
+        area = scrolled(column)  # where a column is too high for the window it is scrolled, never cut
+        layout.addWidget(area)
+        self._scrolled.append(area)
         return frame
 
     def _place_columns(self) -> None:
         least = [column.minimumSizeHint().width() + 2 * GRID for _, column in self._named()]
         narrow = self.width() < sum(width + 4 * GRID for width in least)
-        for scrolled, width in zip(self._scrolled, least, strict=True):
-            scrolled.setMinimumWidth(0 if narrow else width)
+        for area, width in zip(self._scrolled, least, strict=True):
+            area.setMinimumWidth(0 if narrow else width)
         if narrow == self._narrow:
             return
         self._narrow = narrow
@@ -319,23 +293,18 @@ class AnalystWindow(QMainWindow):
             self._pages.setCurrentIndex(2)
 
     def _placed(self) -> QWidget:
-        foot = QHBoxLayout()
-        foot.addWidget(self._words, 1)
         self.progress.setFixedWidth(round(140 * type_scale()))
         self.format.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.format.setFixedWidth(round(90 * type_scale()))
-        for part in (self.progress, self.stop, self.go_on, self.report, self.format, self.export):
-            foot.addWidget(part)
-        top = QHBoxLayout()
-        top.addWidget(self.way, 1)
-        top.addWidget(self._head)
         window = QWidget()
         window.setObjectName("window")
         window.setMinimumSize(*LEAST)  # the columns find room in less than they would like
-        layout = QVBoxLayout(window)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.addLayout(top)
-        layout.addWidget(self._panes, 1)
-        layout.addWidget(self._pages, 1)
-        layout.addLayout(foot)
+        vbox(
+            hbox((self.way, 1), self._head),
+            (self._panes, 1),
+            (self._pages, 1),
+            hbox((self._words, 1), self.progress, self.stop, self.go_on, self.report, self.format, self.export),
+            on=window,
+            margins=GRID,
+        )
         return window

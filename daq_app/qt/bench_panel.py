@@ -6,15 +6,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
-    QGridLayout,
-    QHBoxLayout,
-    QLabel,
-    QVBoxLayout,
     QWidget,
 )
 
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import EntryLine, button, choice, label, regrade, say, scrolled
+from daq_app.qt.parts import EntryLine, button, choice, hbox, label, named, regrade, say, scrolled, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
@@ -50,6 +46,8 @@ class BenchPanel(QFrame):
         self._life = {name: label("–", wrap=True) for name in NAMES}
         self._name = label("", "title", wrap=True)
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
+        for count in self._counters.values():
+            count.setAlignment(Qt.AlignmentFlag.AlignRight)
         self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
@@ -64,9 +62,7 @@ class BenchPanel(QFrame):
         )
         self._search_words = label("", "quiet", wrap=True)
         self._content = self._built()
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(2, 2, 2, 2)
-        layout.addWidget(self._content)
+        vbox(self._content, on=self, margins=2)
 
     def show_view(self, view: BenchView) -> None:
         """Show the bench."""
@@ -77,14 +73,8 @@ class BenchPanel(QFrame):
         say(self._lamp_words, view.lamp_words)
         regrade(self._lamp_words, view.lamp if view.lamp in ("wrong", "look") else "")
         say(self._name, view.name)
-        for name, text in (
-            ("serial", view.serial),
-            ("calibration", view.calibration),
-            ("rate", view.rate),
-            ("tare", view.tare),
-            ("drift", view.drift),
-        ):
-            say(self._fields[name], text, tr(SPOKEN.get(name, name)))
+        for name, shown in self._fields.items():
+            say(shown, getattr(view, name), tr(SPOKEN.get(name, name)))
         for name, text in view.life:
             say(self._life[name], text, tr(name))
         for name, text in view.counters:
@@ -141,41 +131,28 @@ class BenchPanel(QFrame):
             typed_in.setCursorPosition(0)
 
     def _built(self) -> QWidget:
-        inside = QWidget()
-        layout = QVBoxLayout(inside)
-        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
-        layout.setSpacing(GRID)
-        layout.addWidget(self._name)
-        lamp = QHBoxLayout()
-        lamp.addWidget(self._lamp, 0, Qt.AlignmentFlag.AlignTop)
-        lamp.addWidget(self._lamp_words, 1)
-        layout.addLayout(lamp)
-        layout.addWidget(self._choice)
-        row = QHBoxLayout()
-        row.addWidget(self.connect_button, 1)
-        row.addWidget(self.search, 1)
-        layout.addLayout(row)
-        layout.addWidget(self._search_words)
-        layout.addLayout(_rows([(name, self._fields[name]) for name in ("serial", "calibration", "rate")]))
-        layout.addWidget(
-            label(tr("Load: share of the rated range, most since acknowledged, noise"), "section", wrap=True)
+        inside, fields = QWidget(), self._fields
+        vbox(
+            self._name,
+            hbox(vbox(self._lamp, 1), (self._lamp_words, 1)),
+            self._choice,
+            hbox((self.connect_button, 1), (self.search, 1)),
+            self._search_words,
+            named((tr(name), fields[name]) for name in ("serial", "calibration", "rate")),
+            label(tr("Load: share of the rated range, most since acknowledged, noise"), "section", wrap=True),
+            vbox(*self._bars.values(), spacing=0),
+            hbox((self.tare, 2), (self.acknowledge, 3)),
+            label(tr("Readings since the stream began"), "section", wrap=True),
+            named(((tr(name), value) for name, value in self._counters.items()), 2),
+            label(tr("Zero"), "section"),
+            named(((tr("mean"), fields["tare"]), (tr("drift"), fields["drift"]))),
+            label(tr("This serial number, over its life here"), "section", wrap=True),
+            named((tr(name), value) for name, value in self._life.items()),
+            1,
+            on=inside,
+            margins=(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
+            spacing=GRID,
         )
-        bars = QVBoxLayout()
-        bars.setSpacing(0)
-        for bar in self._bars.values():
-            bars.addWidget(bar)
-        layout.addLayout(bars)
-        acts = QHBoxLayout()
-        acts.addWidget(self.tare, 2)
-        acts.addWidget(self.acknowledge, 3)
-        layout.addLayout(acts)
-        layout.addWidget(label(tr("Readings since the stream began"), "section", wrap=True))
-        layout.addLayout(_counters([(name, self._counters[name]) for name in SHOWN_COUNTERS]))
-        layout.addWidget(label(tr("Zero"), "section"))
-        layout.addLayout(_rows([(tr_noop("mean"), self._fields["tare"]), ("drift", self._fields["drift"])]))
-        layout.addWidget(label(tr("This serial number, over its life here"), "section", wrap=True))
-        layout.addLayout(_rows([(name, self._life[name]) for name in NAMES]))
-        layout.addStretch(1)
         return scrolled(inside)
 
 
@@ -190,17 +167,9 @@ class BenchStrip(QFrame):
         self._lamp = Lamp(tr("transducer"))
         self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
         self.setFixedWidth(round(150 * scale))
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.addWidget(button(tr("Bench  B"), tr("show the bench"), expand))
-        row = QHBoxLayout()
         self._words = label("", "quiet", wrap=True)
-        row.addWidget(self._lamp)
-        row.addWidget(self._words, 1)
-        layout.addLayout(row)
-        for bar in self._bars.values():
-            layout.addWidget(bar)
-        layout.addStretch(1)
+        whole, lamp = button(tr("Bench  B"), tr("show the bench"), expand), hbox(self._lamp, (self._words, 1))
+        vbox(whole, lamp, *self._bars.values(), 1, on=self, margins=GRID)
 
     def show_view(self, view: BenchView) -> None:
         """Show the bench."""
@@ -208,27 +177,3 @@ class BenchStrip(QFrame):
         say(self._words, view.lamp_words)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
-
-
-def _rows(fields: list[tuple[str, QLabel]]) -> QGridLayout:
-    grid = QGridLayout()
-    grid.setHorizontalSpacing(GRID)
-    grid.setVerticalSpacing(2)
-    for row, (name, value) in enumerate(fields):
-        grid.addWidget(label(tr(name), "quiet"), row, 0, Qt.AlignmentFlag.AlignTop)
-        grid.addWidget(value, row, 1)
-    grid.setColumnStretch(1, 1)
-    return grid
-
-
-def _counters(fields: list[tuple[str, QLabel]]) -> QGridLayout:
-    grid = QGridLayout()
-    grid.setHorizontalSpacing(GRID)
-    grid.setVerticalSpacing(2)
-    for at, (name, value) in enumerate(fields):
-        value.setAlignment(Qt.AlignmentFlag.AlignRight)
-        grid.addWidget(label(tr(name), "quiet"), at // 2, 2 * (at % 2))
-        grid.addWidget(value, at // 2, 2 * (at % 2) + 1)
-    for column in (1, 3):
-        grid.setColumnStretch(column, 1)
-    return grid

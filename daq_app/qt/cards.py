@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
 
-from daq_app.qt.parts import bare, button, choice, label, regrade, say
+from daq_app.qt.parts import button, choice, fill, hbox, label, regrade, say, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
@@ -28,18 +28,16 @@ class CardFrame(QFrame):
         self.setProperty("role", "card")
         self._mark = label("○")
         self.words = label("", "quiet", wrap=True)
-        head = QHBoxLayout()
-        head.setSpacing(GRID)
-        head.addWidget(self._mark)
-        head.addWidget(label(tr(name), "name", wrap=True), 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.setSpacing(4)
-        layout.addLayout(head)
-        layout.addWidget(self.words)
         self.body = QVBoxLayout()
         self.body.setSpacing(4)
-        layout.addLayout(self.body)
+        vbox(
+            hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID),
+            self.words,
+            self.body,
+            on=self,
+            margins=GRID,
+            spacing=4,
+        )
 
     def show_card(self, card: Card) -> None:
         """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""
@@ -71,9 +69,7 @@ class CutShort(QFrame):
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
-        layout = QVBoxLayout(self)
-        for widget in (label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on):
-            layout.addWidget(widget)
+        fill(QVBoxLayout(self), label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on)
         self.show_sessions(())
 
     def look_in(self, folder: Path) -> None:
@@ -118,12 +114,7 @@ class TransducerRow(QWidget):
         self.connect_button = button(tr("Connect"), tr("connect the transducer"), lambda: act("connect"))
         self.zero = button(tr("Zero  T"), tr("measure the zero of the transducer"), lambda: act("tare"))
         self.words = label("", "quiet", wrap=True)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.connect_button, 1)
-        buttons.addWidget(self.zero, 1)
-        layout = bare(QVBoxLayout(self), GRID // 2)
-        layout.addLayout(buttons)
-        layout.addWidget(self.words)
+        vbox(hbox((self.connect_button, 1), (self.zero, 1)), self.words, on=self, spacing=GRID // 2)
 
     def show_view(self, view: BenchView) -> None:
         """Show which transducer it is, its zero, noise and life, and what can be done with it."""

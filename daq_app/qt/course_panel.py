@@ -7,16 +7,13 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
-    QHBoxLayout,
     QListWidget,
     QListWidgetItem,
-    QPushButton,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
-from daq_app.qt.parts import EntryLine, bare, button, label, say
+from daq_app.qt.parts import EntryLine, bare, button, hbox, label, say, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.messages import Message
@@ -24,6 +21,7 @@ from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr
 from sessions.run import steps
 
+MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
 ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
@@ -49,8 +47,15 @@ class CoursePanel(QFrame):
         self.no_answer = button(
             tr("No answer 0"), tr("the subject gives no answer"), lambda: self.ask("no answer"), "small"
         )
-        self.end = button(tr("End Ctrl+E"), tr("end the session, with a reason"), self._end, "small")
-        self._all = (self.skip, self.redo, self.pause, self.note, self.no_answer, self.end)
+        self.end = button(tr("End Ctrl+E"), tr("end the session, with a reason"), lambda: self.ask("end"), "small")
+        self._all = {
+            "skip": self.skip,
+            "redo": self.redo,
+            "pause": self.pause,
+            "note": self.note,
+            "no answer": self.no_answer,
+            "end": self.end,
+        }
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
@@ -60,16 +65,15 @@ class CoursePanel(QFrame):
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
-        head = QHBoxLayout()
-        head.addWidget(label(tr("Plan"), "section"), 1)
-        head.addWidget(self._timer)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
-        layout.setSpacing(GRID)
-        layout.addLayout(head)
-        layout.addWidget(self.plan, 1)
-        layout.addWidget(self.mirror)
-        layout.addWidget(self._bottom)
+        vbox(
+            hbox((label(tr("Plan"), "section"), 1), self._timer),
+            (self.plan, 1),
+            self.mirror,
+            self._bottom,
+            on=self,
+            margins=(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
+            spacing=GRID,
+        )
 
     @property
     def asking(self) -> bool:
@@ -82,27 +86,20 @@ class CoursePanel(QFrame):
         say(
             self._timer, tr("waiting {timer}", timer=view.timer) if view.timer else "", tr("Time since this was asked:")
         )
-        if before is not None and before.rows == view.rows and _buttons(before) == _buttons(view):
-            return
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
-        for widget, shown in zip(
-            (self.redo, self.skip, self.pause, self.note, self.no_answer, self.end), _buttons(view), strict=True
-        ):
-            _show_button(widget, shown)
+        for name, widget in self._all.items():
+            shown = _shown(view, name)
+            if before is None or shown != _shown(before, name):
+                widget.setText(f"{shown.label} {tr(shown.key)}".strip())
+                widget.setEnabled(shown.enabled)
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
         view = self._view
         if view is None:
             return
-        shown = {
-            "redo": view.redo,
-            "skip": view.skip,
-            "note": view.note,
-            "no answer": view.no_answer,
-            "end": view.end,
-        }[what]
+        shown = _shown(view, what)
         if not shown.enabled:
             return
         if shown.sends is not None:
@@ -127,40 +124,25 @@ class CoursePanel(QFrame):
         if not text:
             say(self._question, tr("{asked_for} A word is enough; Esc leaves it.", asked_for=self._asked_for))
             return
-        messages: dict[str, Callable[[str], Message]] = {
-            "redo": steps.Redo,
-            "skip": steps.Skip,
-            "note": steps.Note,
-            "end": steps.Abort,
-        }
         self.leave()
-        self._send(messages[self._asking](text))
+        self._send(MESSAGES[self._asking](text))
 
     def _pause(self) -> None:
         if self._view is not None and self._view.pause.enabled and self._view.pause.sends is not None:
             self._send(self._view.pause.sends)
 
-    def _end(self) -> None:
-        self.ask("end")
-
     def _actions(self, columns: int) -> QWidget:
         page = QWidget()
         grid = bare(QGridLayout(page), GRID)
-        for at, widget in enumerate(self._all):
+        for at, widget in enumerate(self._all.values()):
             grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         return page
 
     def _entry_row(self, scale: float) -> QWidget:
-        page = QWidget()
-        layout = bare(QVBoxLayout(page), GRID)
-        layout.addStretch(1)
-        layout.addWidget(self._question)
-        layout.addWidget(self.line)
-        row = QHBoxLayout()
-        row.addWidget(button(tr("Keep  Enter"), tr("keep what was typed"), self._keep))
-        row.addWidget(button(tr("Leave  Esc"), tr("leave it"), self.leave))
-        layout.addLayout(row)
+        page, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)
+        acts = hbox(keep, button(tr("Leave  Esc"), tr("leave it"), self.leave))
+        vbox(1, self._question, self.line, acts, on=page, spacing=GRID)
         page.setMinimumHeight(round(88 * scale))
         return page
 
@@ -188,10 +170,7 @@ class CoursePanel(QFrame):
         self.mirror.open.set_room(self.height() >= self._roomy)
 
 
-def _buttons(view: CourseView) -> tuple[Button, ...]:
-    return (view.redo, view.skip, view.pause, view.note, view.no_answer, view.end)
-
-
-def _show_button(widget: QPushButton, shown: Button) -> None:
-    widget.setText(f"{shown.label} {tr(shown.key)}".strip())
-    widget.setEnabled(shown.enabled)
+def _shown(view: CourseView, name: str) -> Button:
+    """Return what a view says of a button."""
+    button: Button = getattr(view, name.replace(" ", "_"))
+    return button

@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSettings, Signal
 from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.messages import History
-from daq_app.qt.parts import Wrapped, bare, button, label
+from daq_app.qt.parts import Wrapped, button, hbox, label, vbox
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID, TEXT, font
 from daq_app.wording import tr
@@ -73,17 +73,20 @@ class DecisionsBar(QWidget):
         self.redo = button(tr("Redo"), "", self.stack.redo, "small")
         self._show_next()
         self.sentences_label = Wrapped("value", "look")
-        line = QHBoxLayout()
-        line.setSpacing(GRID // 2)
-        line.addWidget(label(tr("by"), "quiet"))
-        line.addWidget(self.by)
-        line.addWidget(label(tr("why"), "quiet"))
-        line.addWidget(self.why, 1)
-        line.addWidget(self.undo)
-        line.addWidget(self.redo)
-        layout = bare(QVBoxLayout(self), GRID // 2)
-        layout.addLayout(line)
-        layout.addWidget(self.sentences_label)
+        vbox(
+            hbox(
+                label(tr("by"), "quiet"),
+                self.by,
+                label(tr("why"), "quiet"),
+                (self.why, 1),
+                self.undo,
+                self.redo,
+                spacing=GRID // 2,
+            ),
+            self.sentences_label,
+            on=self,
+            spacing=GRID // 2,
+        )
 
     def who(self) -> str:
         """Return the code of who decides."""

@@ -7,11 +7,11 @@ import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
 
 from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Finger, Range
 from daq_app.analyst.probe import Line, along_line, along_skin, read_out
-from daq_app.qt.parts import bare, button, choice
+from daq_app.qt.parts import bare, button, choice, fill, hbox, vbox
 from daq_app.qt.tokens import GRID, MODEL, TARGET, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr, tr_noop
@@ -59,13 +59,7 @@ class FieldPlot(QWidget):
         for curve in self._curves:
             self.plot.addItem(curve)
         self.plot.addItem(self._here, ignoreBounds=True)
-        top = QHBoxLayout()
-        top.setSpacing(GRID // 2)
-        top.addWidget(self.source, 1)
-        top.addWidget(self.draw)
-        layout = bare(QVBoxLayout(self), GRID // 2)
-        layout.addLayout(top)
-        layout.addWidget(self.plot, 1)
+        vbox(hbox((self.source, 1), self.draw, spacing=GRID // 2), (self.plot, 1), on=self, spacing=GRID // 2)
         self.source.currentIndexChanged.connect(lambda: self.changed.emit())
 
     def show_field(self, fingers: Sequence[Finger | None], field: FieldChoice, line: Line | None) -> None:
@@ -124,8 +118,7 @@ class FieldBar(QWidget):
         self.ranges.addItems([tr("All trials"), tr("Own scale"), tr("Fixed")])
         self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
         layout = bare(QHBoxLayout(self), GRID // 2)
-        layout.addWidget(self.which, 3)
-        layout.addWidget(self.ranges, 2)
+        fill(layout, (self.which, 3), (self.ranges, 2))
         for number in (self.low, self.high):
             number.setVisible(False)
             number.valueChanged.connect(lambda: self.changed.emit())

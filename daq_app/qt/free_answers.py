@@ -6,7 +6,7 @@ from PySide6.QtCore import QRegularExpression, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QWidget
 
-from daq_app.qt.parts import button
+from daq_app.qt.parts import button, fill
 from daq_app.qt.tokens import GRID
 from daq_app.window.answer import Choice, Which
 from daq_app.window.subject_texts import SubjectText as Text
@@ -55,10 +55,7 @@ class NumberField(_Field):
         self.field.setStyleSheet(f"font-size: {round(LARGE * scale)}px;")
         self.field.setValidator(QRegularExpressionValidator(NUMBER, self.field))
         self.field.textEdited.connect(self._typed)
-        layout = QHBoxLayout(self)
-        layout.addStretch(1)
-        layout.addWidget(self.field)
-        layout.addStretch(1)
+        fill(QHBoxLayout(self), 1, self.field, 1)
         self.setFocusProxy(self.field)
 
     def begin(self) -> None:
@@ -88,10 +85,7 @@ class ChoiceOfTwo(_Field):
         self.second = self._button(Text.SECOND, "second", scale)
         layout = QHBoxLayout(self)
         layout.setSpacing(4 * GRID)
-        layout.addStretch(1)
-        layout.addWidget(self.first)
-        layout.addWidget(self.second)
-        layout.addStretch(1)
+        fill(layout, 1, self.first, self.second, 1)
 
     def begin(self) -> None:
         """Begin another answer."""

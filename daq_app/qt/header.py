@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QApplication, QBoxLayout, QFrame, QHBoxLayout, QSizePolicy, QWidget
+from PySide6.QtWidgets import QApplication, QBoxLayout, QFrame, QSizePolicy, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.languages import name_of
-from daq_app.qt.parts import button, label, regrade, say
+from daq_app.qt.parts import button, hbox, label, regrade, say
 from daq_app.qt.tokens import GRID, SMALL, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
@@ -36,20 +36,10 @@ class Header(QWidget):
         self._words = label(tr("not recording"), "title")
         self._saved = label("", "quiet")
         self._saved.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        subject, lamp = QHBoxLayout(), QHBoxLayout()
-        subject.addWidget(self._heading, 3)
-        subject.addWidget(self._device, 2)
-        subject.addWidget(self._language)
-        lamp.addStretch(1)
-        for part in (self._simulated, self._lamp, self._words, self._saved):
-            lamp.addWidget(part)
+        subject = hbox((self._heading, 3), (self._device, 2), self._language, spacing=GRID)
+        lamp = hbox(1, self._simulated, self._lamp, self._words, self._saved, spacing=GRID)
         self._one_row = round(ONE_ROW * scale)
-        self._rows = QBoxLayout(QBoxLayout.Direction.LeftToRight, self)
-        self._rows.setContentsMargins(GRID, 0, GRID, 0)
-        for row, stretch in ((subject, 1), (lamp, 0)):
-            row.setSpacing(GRID)
-            self._rows.addLayout(row, stretch)
-        self._rows.setSpacing(GRID)
+        self._rows = hbox((subject, 1), lamp, on=self, margins=(GRID, 0, GRID, 0), spacing=GRID)
         self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
 
     def show_view(self, view: View) -> None:
@@ -88,10 +78,7 @@ class Notice(QFrame):
         self._scale = scale
         self._folds = False
         self.show_folding(False)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, 2, GRID, 2)
-        layout.addWidget(self._words, 1)
-        layout.addWidget(self._button)
+        hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str) -> None:
         """Show a banner, or else what was told."""
@@ -148,16 +135,9 @@ class ToDo(QFrame):
         policy.setRetainSizeWhenHidden(True)
         self.primary.setSizePolicy(policy)
         self.primary.setMinimumWidth(220)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, GRID, 2 * GRID, GRID)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self._arrow)
-        layout.addWidget(self.sentence, 1)
-        self._buttons = QBoxLayout(QBoxLayout.Direction.LeftToRight)
-        self._buttons.setSpacing(GRID)
-        self._buttons.addWidget(self.second)
-        self._buttons.addWidget(self.primary)
-        layout.addLayout(self._buttons)
+        self._buttons = hbox(self.second, self.primary, spacing=GRID)
+        room = (2 * GRID, GRID, 2 * GRID, GRID)
+        hbox(self._arrow, (self.sentence, 1), self._buttons, on=self, margins=room, spacing=2 * GRID)
 
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
         """Show a sentence, its button and the stroke's direction."""
@@ -178,7 +158,5 @@ class ToDo(QFrame):
             self._small = small
             ways = QBoxLayout.Direction
             self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
-            self.sentence.setProperty("role", "title" if small else "headline")
-            self.sentence.style().unpolish(self.sentence)
-            self.sentence.style().polish(self.sentence)
+            regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)

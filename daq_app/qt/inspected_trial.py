@@ -5,25 +5,20 @@ from collections.abc import Callable
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QScrollArea, QWidget
 
 from daq_app.qt.live_bar import short_name, spoken
-from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import bare, button, label, regrade, say
-from daq_app.qt.tokens import GRID, MU, SMALL, TARGET, N, T
+from daq_app.qt.live_panel import PLOTS
+from daq_app.qt.live_plot import LivePlot
+from daq_app.qt.parts import button, hbox, label, named, regrade, say, scrolled, vbox
+from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import Columns
-from daq_app.window.plot_scale import PlotScale
 from daq_app.window.stroke_quality import PICTURE
 from daq_app.window.view_trials import MARKS, Inspection, Tile
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import tr
 
 TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}  # of the style sheet
-PLOTS = (
-    (tr_noop("N and T [N]"), (Curve("N", N), Curve("T", T)), PlotScale(0.0, 5.0, 5.0)),
-    ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
-    (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
-)
 
 
 class TrialStrip(QScrollArea):
@@ -33,20 +28,14 @@ class TrialStrip(QScrollArea):
         """Show no trials; `inspect` is called with the number of the trial whose tile is pressed."""
         super().__init__()
         self._inspect = inspect
-        self._scale = scale
         self._shown: tuple[Tile, ...] = ()
         self.horizontalScrollBar().rangeChanged.connect(self._keep_in_sight)  # new tiles have their places then
         self.tiles: list[QPushButton] = []
         inside = QWidget()
-        inside.setObjectName("inside")
-        self._row = bare(QHBoxLayout(inside), GRID // 2)
-        self._row.addStretch(1)
-        self.setWidget(inside)
-        self.setWidgetResizable(True)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._row = hbox(1, on=inside, spacing=GRID // 2)
+        scrolled(inside, self)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName(tr("trials of the session"))
-        self.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
         lines = round((2 * SMALL + 2 * GRID) * scale)
         self.setFixedHeight(max(lines, TARGET) + 12 + GRID // 2)  # with the scroll bar
 
@@ -99,21 +88,16 @@ class InspectedTrial(QWidget):
         self.heading = label("", "name", wrap=True)
         self.verdict = label("", "title", wrap=True)
         self.details = label("", "quiet", wrap=True)
-        self.cells: dict[str, QLabel] = {}
+        self.cells = {name: label("–", "value") for name in PICTURE}
         self._plots = [LivePlot(*plot, scale, PICTURE) for plot in PLOTS]
-        head = QHBoxLayout()
-        head.addWidget(self.heading, 1)
-        head.addWidget(button(tr("Back  I"), tr("back to the signals of this moment"), back))
-        layout = bare(QVBoxLayout(self), GRID // 2)
-        layout.addLayout(head)
-        layout.addWidget(self.verdict)
-        layout.addWidget(self.details)
-        layout.addLayout(self._cells())
-        for at, plot in enumerate(self._plots):
-            plot.show_times(at == len(self._plots) - 1)
+        for plot in self._plots:
+            plot.show_times(plot is self._plots[-1])
             plot.show_end(tr("end"))
-            layout.addWidget(plot, 3 if at == 0 else 2)
-        layout.addStretch(0)
+        head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
+        # Two means in a row find room at every size of type.
+        cells = named(((short_name(name), cell) for name, cell in self.cells.items()), 2)
+        plots = zip(self._plots, (3, 2, 2), strict=True)
+        vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
 
     def show_trial(self, shown: Inspection) -> None:
         """Show a trial."""
@@ -145,16 +129,3 @@ class InspectedTrial(QWidget):
         for plot in self._plots:
             plot.show_seconds(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
             plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
-
-    def _cells(self) -> QGridLayout:
-        """Return the means, each in its place: two rows, so that they find room at every size of type."""
-        grid = QGridLayout()
-        grid.setHorizontalSpacing(GRID)
-        grid.setVerticalSpacing(0)
-        for at, name in enumerate(PICTURE):
-            self.cells[name] = label("–", "value")
-            grid.addWidget(label(short_name(name), "quiet"), at // 2, 2 * (at % 2))
-            grid.addWidget(self.cells[name], at // 2, 2 * (at % 2) + 1)
-        for column in (1, 3):
-            grid.setColumnStretch(column, 1)
-        return grid

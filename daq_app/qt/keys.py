@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QApplication, QGridLayout, QHBoxLayout, QMainWindow, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QGridLayout, QMainWindow, QWidget
 
-from daq_app.qt.parts import bare, button, is_text_field, label, panel, scrolled
+from daq_app.qt.parts import button, hbox, is_text_field, label, panel, scrolled, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.window.answer import owner
@@ -142,15 +142,15 @@ def name_of(event: QKeyEvent) -> str:
 class KeysPage(QWidget):
     """Every key, over the window."""
 
-    def __init__(self, parent: QWidget, keys: tuple[Key, ...] = KEYS) -> None:
+    def __init__(self, parent: QWidget, scale: float, keys: tuple[Key, ...] = KEYS) -> None:
         """Build the page of these keys, hidden."""
         super().__init__(parent)
+        self._scale, self._over = scale, parent
         self.setAccessibleName(tr("keys"))
         frame, inside = panel(tr("keys of this window"))
-        head = QHBoxLayout()
-        head.addWidget(label(tr("Keys"), "title"), 1)
-        head.addWidget(button(tr("Close  F1"), tr("close the keys"), self.hide))
-        inside.addLayout(head)
+        inside.addLayout(
+            hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
+        )
         rows = QWidget()
         grid = QGridLayout(rows)
         grid.setContentsMargins(0, 0, GRID, 0)
@@ -163,13 +163,20 @@ class KeysPage(QWidget):
         area = scrolled(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         inside.addWidget(area, 1)
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(frame)
+        vbox(frame, on=self)
         self.hide()
 
-    def fit(self, window: QSize, scale: float) -> None:
-        """Take the middle of a window, as much as there is need for."""
-        size = QSize(round(WIDTH * scale), round(HEIGHT * scale)).boundedTo(window - QSize(4 * GRID, 4 * GRID))
+    def toggle(self) -> None:
+        """Show the page over everything else, or hide it."""
+        self.fit()
+        self.setVisible(not self.isVisible())
+        self.raise_()
+
+    def fit(self) -> None:
+        """Take the middle of the window, as much as there is need for."""
+        window = self._over.size()
+        wanted = QSize(round(WIDTH * self._scale), round(HEIGHT * self._scale))
+        size = wanted.boundedTo(window - QSize(4 * GRID, 4 * GRID))
         self.resize(size)
         self.move((window.width() - size.width()) // 2, (window.height() - size.height()) // 2)
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
-from daq_app.qt.parts import bare, button, choice, label, say
+from daq_app.qt.parts import button, choice, hbox, label, regrade, say
 from daq_app.qt.tokens import GRID, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.live_trace import CHANNELS
 from daq_app.wording import tr, tr_noop
@@ -34,7 +34,6 @@ class LiveBar(QWidget):
     ) -> None:
         """Show no numbers; `length` takes what is chosen [s], `hold` is told of a press, `finite` takes a choice."""
         super().__init__()
-        self._show_length = length
         self._forces_shown = True
         self._on_hold = False
         self._short = False  # the buttons show their keys alone
@@ -52,20 +51,12 @@ class LiveBar(QWidget):
         self.length = choice(tr("stretch of time that is shown"))
         for seconds in LENGTHS:
             self.length.addItem(f"{seconds} s", seconds)
-        self.length.activated.connect(self._chosen)
+        self.length.activated.connect(lambda: length(LENGTHS[self.length.currentIndex()]))
         self.length.setFixedWidth(round(84 * scale))
-        self._rows = bare(QBoxLayout(QBoxLayout.Direction.LeftToRight, self), GRID // 2)
-        numbers, acts = QHBoxLayout(), QHBoxLayout()
-        for row in (numbers, acts):
-            row.setSpacing(GRID)
-            self._rows.addLayout(row)
-        self._place_numbers(numbers)
-        numbers.addStretch(len(READ))
-        acts.addStretch(1)
-        for widget in (self.finite, self.length, self.hold):
-            acts.addWidget(widget)
-        for widget in (self.hold, self.finite):
-            widget.setCheckable(True)
+        acts = hbox(1, self.finite, self.length, self.hold, spacing=GRID)
+        self._rows = hbox(self._numbers(), acts, on=self, spacing=GRID // 2)
+        self.hold.setCheckable(True)
+        self.finite.setCheckable(True)
         for widget in (self.hold, self.finite, self.length):
             widget.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.
@@ -103,9 +94,6 @@ class LiveBar(QWidget):
         super().resizeEvent(event)
         self._fit()
 
-    def _chosen(self, at: int) -> None:
-        self._show_length(LENGTHS[at])
-
     def _fit(self) -> None:
         """Put the acts below the numbers where both find no room in a row, and the numbers in smaller type then."""
         if not self._short:
@@ -119,10 +107,7 @@ class LiveBar(QWidget):
         room = self.width()
         for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
             value.setFixedWidth(self._widest(channel, size))
-            if value.property("role") != role:
-                value.setProperty("role", role)
-                value.style().unpolish(value)
-                value.style().polish(value)
+            regrade(value, role, "role")
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
             for widget in (caption, value):
                 widget.setVisible(self._forces_shown and room >= 0)
@@ -141,22 +126,20 @@ class LiveBar(QWidget):
         metrics = QFontMetrics(font(size, self._scale, bold=size == TITLE))
         return metrics.horizontalAdvance(WIDEST[channel]) + 4
 
-    def _place_numbers(self, row: QHBoxLayout) -> None:
+    def _numbers(self) -> QHBoxLayout:
         for channel, _, _, colour in READ:
-            name = short_name(channel)
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setAccessibleName(spoken(channel, "–"))
-            caption = label(name, "quiet")
+            caption = label(short_name(channel), "quiet")
             if colour:
                 caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
-            if self._pairs:
-                row.addStretch(1)  # where there is room, a caption stands nearer to its own number than to another
-            row.addWidget(caption)
-            row.addWidget(value)
             self.values[channel] = value
             self._pairs.append((caption, value))
+        # Where there is room, a caption stands nearer to its own number than to another.
+        spread = [part for pair in self._pairs for part in (1, *pair)]
+        return hbox(*spread[1:], len(READ), spacing=GRID)
 
 
 def spoken(channel: str, text: str) -> str:

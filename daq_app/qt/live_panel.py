@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.drawer import Drawer
 from daq_app.qt.finger_view import FingerView
 from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import bare, button
+from daq_app.qt.parts import button, fill, hbox, vbox
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T
 from daq_app.window.course_state import Mark, picture_end
@@ -73,20 +73,13 @@ class LivePanel(QFrame):
         self.finger = FingerView(scale)
         self.map = ContactMap(scale)
         self.bar = LiveBar(scale, self.show_seconds, self._hold, self._finite)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.setSpacing(4)
-        layout.addWidget(self.bar)
         self.drawer = Drawer(*self._placed())
         self.tab = button("", tr("drawer"), self.toggle_drawer, "handle")
         self.tab.setFixedWidth(round(TAB * scale))
         self.tab.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         self._pictures = QWidget()
-        pictures = bare(QHBoxLayout(self._pictures), 2)
-        pictures.addWidget(self.drawer, 1)
-        pictures.addWidget(self.tab)
-        layout.addWidget(self._pictures, 1)
-        layout.addStretch(0)
+        hbox((self.drawer, 1), self.tab, on=self._pictures, spacing=2)
+        vbox(self.bar, (self._pictures, 1), 0, on=self, margins=GRID, spacing=4)
         self._show_tab()
         self.show_seconds(self._seconds)
         self.show_finite(settings().value(FINITE) == "yes")
@@ -244,8 +237,7 @@ class LivePanel(QFrame):
         for row, (plot, stretch) in enumerate(zip((*self.plots[:3], self._model_plot), (3, 2, 2, 2), strict=True)):
             grid.addWidget(plot, row, 0)
             grid.setRowStretch(row, stretch)
-        side.addWidget(self.finger, 7)
-        side.addWidget(self.map, 3)
+        fill(side, (self.finger, 7), (self.map, 3))
         for plot in self.plots[3:]:
             side.addWidget(plot, 2)
         self.plots[3].show_times(False)

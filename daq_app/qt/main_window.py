@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QMainWindow,
     QStackedWidget,
-    QVBoxLayout,
     QWidget,
 )
 
@@ -25,7 +24,7 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.menus import Menus, Rail, Room
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import bare, scrolled
+from daq_app.qt.parts import bare, fill, scrolled, vbox
 from daq_app.qt.remembered import restore_place, save_place
 from daq_app.qt.rooms import Rooms
 from daq_app.qt.screens import millimetres
@@ -309,11 +308,8 @@ class MainWindow(QMainWindow):
             self.bridge.drawing_failed(error)
 
     def _show_keys(self) -> None:
-        if self.keys is None:
-            self.keys = KeysPage(self)
-        self.keys.setVisible(not self.keys.isVisible())
-        self.keys.fit(self.size(), self._scale)
-        self.keys.raise_()
+        self.keys = self.keys or KeysPage(self, self._scale)
+        self.keys.toggle()
 
     def _fold_bench(self) -> None:
         self._bench_shown = not self.bench.isVisible()
@@ -335,25 +331,21 @@ class MainWindow(QMainWindow):
         self.to_do.show_small(height < TALL or width < ROOMY)
         self.notice.show_folding(height < LOW)
         if self.keys is not None:
-            self.keys.fit(self.size(), self._scale)
+            self.keys.fit()
 
     def _placed(self) -> QWidget:
         window = QWidget()
         window.setObjectName("window")
         panels = QWidget()
         body = bare(_Panels(panels), GRID)
-        body.addWidget(self._left, 4)
-        body.addWidget(self.middle, 3)
+        fill(body, (self._left, 4), (self.middle, 3))
         for part in (self.bench, self.strip):
             part.hide()  # until it is known how much room there is
             body.addWidget(part)
         here = QWidget()
-        layout = bare(QVBoxLayout(here), GRID)
-        layout.addWidget(self.notice)
-        layout.addWidget(self.to_do)
         below = scrolled(panels)
         below.setMinimumHeight(1)  # what to do now is whole, however low the window is
-        layout.addWidget(below, 1)
+        vbox(self.notice, self.to_do, (below, 1), on=here, spacing=GRID)
         self.rooms.addWidget(here)
         frame = QGridLayout(window)
         frame.setContentsMargins(GRID, GRID // 2, GRID, GRID)

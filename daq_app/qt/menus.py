@@ -8,12 +8,12 @@ from typing import Literal
 
 from PySide6.QtCore import Qt, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
-from PySide6.QtWidgets import QFrame, QMainWindow, QMenu, QMessageBox, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QMainWindow, QMenu, QMessageBox, QToolButton, QWidget
 
 from daq_app.qt import remembered
 from daq_app.qt.keys import KEYS
 from daq_app.qt.languages import name_of
-from daq_app.qt.parts import button
+from daq_app.qt.parts import button, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
@@ -54,8 +54,6 @@ class Rail(QFrame):
         super().__init__()
         self.setAccessibleName(tr("rooms"))
         self.setProperty("role", "strip")
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(GRID // 2, GRID, GRID // 2, GRID)
         self.buttons = {
             room: button(
                 f"{tr(ROOM_NAMES[room])}\n{KEY[room]}", tr(ROOM_NAMES[room]), lambda room=room: go(room), "rail"
@@ -64,8 +62,7 @@ class Rail(QFrame):
         }
         for widget in self.buttons.values():
             widget.setCheckable(True)
-            layout.addWidget(widget)
-        layout.addStretch(1)
+        vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
 
     def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:

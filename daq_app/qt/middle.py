@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import Wrapped, bare, button, panel, regrade, scrolled
+from daq_app.qt.parts import Wrapped, button, hbox, panel, regrade, scrolled, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
@@ -38,14 +38,7 @@ class Middle(QWidget):
         inside.addWidget(scrolled(self.trial))
         for page in (self.live, frame):
             self._pages.addWidget(page)
-        row = QHBoxLayout()
-        row.addWidget(self.stroke, 1)
-        row.addWidget(self.undo)
-        row.addWidget(self.redo)
-        layout = bare(QVBoxLayout(self), GRID)
-        layout.addWidget(self.strip)
-        layout.addWidget(self._pages, 1)
-        layout.addLayout(row)
+        vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)
 
     @property
     def inspected(self) -> int | None:

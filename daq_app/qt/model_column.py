@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
@@ -24,7 +24,7 @@ from daq_app.qt.field_plot import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
 from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
-from daq_app.qt.parts import Wrapped, bare, button, choice
+from daq_app.qt.parts import Wrapped, button, choice, fill, hbox, vbox
 from daq_app.qt.picture_view import PICTURE, ComparedView, PictureView, SaveButtons
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import Tokens
@@ -95,15 +95,11 @@ class ModelColumn(QWidget):
         ):
             self.tabs.addTab(page, name)
         self.tabs.currentChanged.connect(lambda: self._show_session())
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(self.tabs)
+        vbox(self.tabs, on=self)
 
     def _session_page(self) -> QWidget:
         page = QWidget()
-        layout = bare(QVBoxLayout(page))
-        layout.addWidget(self.which)
-        layout.addWidget(self.session_errors)
-        layout.addWidget(self.picture, 1)
+        vbox(self.which, self.session_errors, (self.picture, 1), on=page)
         return page
 
     def show_state(self, state: AnalystState) -> None:
@@ -297,23 +293,17 @@ class ModelColumn(QWidget):
 
     def _finger_page(self) -> QWidget:
         page = QWidget()
-        bar = QHBoxLayout()
-        for part in (self.near, self.mesh, self.together, self.history):
-            bar.addWidget(part)
-        bar.addWidget(self.save, 1)
-        course = QHBoxLayout()
-        course.addWidget(self.player, 1)
-        course.addWidget(self.film)
-        layout = bare(QVBoxLayout(page))
-        layout.addWidget(self.fields)
         fingers = QHBoxLayout()
-        fingers.addWidget(self.finger, 1)
-        fingers.addWidget(self.other, 1)
-        layout.addLayout(fingers, 3)
-        layout.addWidget(self.probe)
-        layout.addWidget(self.plot, 1)
-        layout.addWidget(self.errors)
-        layout.addWidget(self.why)
-        layout.addLayout(course)
-        layout.addLayout(bar)
+        fill(fingers, (self.finger, 1), (self.other, 1))
+        vbox(
+            self.fields,
+            (fingers, 3),
+            self.probe,
+            (self.plot, 1),
+            self.errors,
+            self.why,
+            hbox((self.player, 1), self.film),
+            hbox(self.near, self.mesh, self.together, self.history, (self.save, 1)),
+            on=page,
+        )
         return page

@@ -12,14 +12,13 @@ from PySide6.QtWidgets import (
     QCompleter,
     QFileDialog,
     QFrame,
-    QHBoxLayout,
     QRadioButton,
     QVBoxLayout,
     QWidget,
 )
 
 from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
-from daq_app.qt.parts import bare, button, choice, entry, field, label, say, scrolled, tick
+from daq_app.qt.parts import bare, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
@@ -286,11 +285,6 @@ class NewSessionPage(QFrame):
 
     def _build(self, scale: float) -> None:
         inside = QWidget()
-        layout = QVBoxLayout(inside)
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        layout.setSpacing(GRID)
-        layout.addWidget(label(tr("New session"), "title"))
-        layout.addWidget(self.cut_short)
         self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
         left, right = QVBoxLayout(), QVBoxLayout()
         for column in (left, right):
@@ -307,11 +301,8 @@ class NewSessionPage(QFrame):
             build(self.frames[name].body)
         for column in (left, right):
             column.addStretch(1)
-        layout.addLayout(self._columns)
-        layout.addStretch(1)
-        outer = QVBoxLayout(self)
-        outer.setContentsMargins(2, 2, 2, 2)
-        outer.addWidget(scrolled(inside))
+        vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
+        vbox(scrolled(inside), on=self, margins=2)
         self._two = round(TWO * scale)
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
 
@@ -331,18 +322,16 @@ class NewSessionPage(QFrame):
         """Lay out in which study and by which protocol, and whether it is rehearsed."""
         field(layout, tr("Study, may be empty"), self.studies)
         field(layout, tr("Protocol"), self.protocol)
-        layout.addWidget(self.pre_evaluation)
-        layout.addWidget(self.practice)
+        fill(layout, self.pre_evaluation, self.practice)
         field(layout, tr("Seed of the order"), self.seed)
-        layout.addWidget(label(tr("Who strokes and scores"), "quiet", wrap=True))
-        row = QHBoxLayout()
-        row.addWidget(self.people_score)
-        row.addWidget(self.simulated)
-        row.addStretch(1)
-        layout.addLayout(row)
-        layout.addWidget(self._people_words)
-        layout.addWidget(self._preview)
-        layout.addWidget(self._pilot)
+        fill(
+            layout,
+            label(tr("Who strokes and scores"), "quiet", wrap=True),
+            hbox(self.people_score, self.simulated, 1),
+            self._people_words,
+            self._preview,
+            self._pilot,
+        )
 
     def _build_subject(self, layout: QVBoxLayout) -> None:
         """Lay out who takes part."""
@@ -353,9 +342,7 @@ class NewSessionPage(QFrame):
 
     def _build_recorded(self, layout: QVBoxLayout) -> None:
         """Lay out the transducer, what is recorded, and what the analysis must know of the face."""
-        layout.addWidget(self.transducer)
-        layout.addWidget(self.with_forces)
-        layout.addWidget(self.scores_only)
+        fill(layout, self.transducer, self.with_forces, self.scores_only)
         of_height = bare(QVBoxLayout(self._height))
         field(of_height, tr("Height of the face above the transducer's origin [mm]"), self.height_above)
         field(of_height, tr("Axis along which pressing is positive"), self.normal)

@@ -1,15 +1,17 @@
 """How labels, buttons and panels of the window are made, so that all of them look and are named alike."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QKeyEvent, QResizeEvent, QWheelEvent
 from PySide6.QtWidgets import (
     QAbstractSpinBox,
+    QBoxLayout,
     QCheckBox,
     QComboBox,
     QFrame,
+    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLayout,
@@ -27,6 +29,9 @@ from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
 L = TypeVar("L", bound=QLayout)
+Margins = int | tuple[int, int, int, int]  # around a layout: left, top, right, bottom [px]
+B = TypeVar("B", bound=QBoxLayout)
+Part = QWidget | QLayout | int | tuple[QWidget | QLayout, int]  # with its stretch; a number alone is empty room
 
 
 def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
@@ -167,9 +172,54 @@ def bare(layout: L, spacing: int | None = None) -> L:
     return layout
 
 
-def scrolled(inside: QWidget) -> QScrollArea:
-    """Return a frameless area in which `inside` moves where it is greater than its room."""
-    area = QScrollArea()
+def fill(layout: B, *parts: Part) -> B:
+    """Return a layout with further parts at its end."""
+    for part in parts:
+        one, stretch = part if isinstance(part, tuple) else (part, 0)
+        if isinstance(one, QWidget):
+            layout.addWidget(one, stretch)
+        elif isinstance(one, QLayout):
+            layout.addLayout(one, stretch)
+        else:
+            layout.addStretch(one)
+    return layout
+
+
+def hbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QHBoxLayout:
+    """Return parts beside each other, as the layout of a widget or within another layout."""
+    return _set_out(QHBoxLayout(), parts, on, margins, spacing)
+
+
+def vbox(*parts: Part, on: QWidget | None = None, margins: Margins = 0, spacing: int | None = None) -> QVBoxLayout:
+    """Return parts below each other, likewise."""
+    return _set_out(QVBoxLayout(), parts, on, margins, spacing)
+
+
+def _set_out(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Margins, spacing: int | None) -> B:
+    layout.setContentsMargins(*(margins if isinstance(margins, tuple) else (margins,) * 4))
+    if spacing is not None:
+        layout.setSpacing(spacing)
+    if on is not None:
+        on.setLayout(layout)
+    return fill(layout, *parts)
+
+
+def named(values: Iterable[tuple[str, QWidget]], across: int = 1) -> QGridLayout:
+    """Return widgets behind their names, so many pairs in a row."""
+    grid = QGridLayout()
+    grid.setHorizontalSpacing(GRID)
+    grid.setVerticalSpacing(2)
+    for at, (name, widget) in enumerate(values):
+        row, column = at // across, 2 * (at % across)
+        grid.addWidget(label(name, "quiet"), row, column, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(widget, row, column + 1)
+        grid.setColumnStretch(column + 1, 1)
+    return grid
+
+
+def scrolled(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
+    """Return a frameless area, a new one unless given, in which `inside` moves where it is greater than its room."""
+    area = area or QScrollArea()
     area.setWidget(inside)
     area.setWidgetResizable(True)
     area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -189,15 +239,13 @@ def panel(name: str) -> tuple[QFrame, QVBoxLayout]:
     return frame, layout
 
 
-def regrade(widget: QWidget, grade: str) -> None:
-    """Give a widget another grade of the style sheet."""
-    if widget.property("grade") != grade:
-        widget.setProperty("grade", grade)
-        widget.style().unpolish(widget)
-        widget.style().polish(widget)
-        for child in widget.findChildren(QWidget):
-            child.style().unpolish(child)
-            child.style().polish(child)
+def regrade(widget: QWidget, value: str, of: str = "grade") -> None:
+    """Give a widget another grade, or role, of the style sheet."""
+    if widget.property(of) != value:
+        widget.setProperty(of, value)
+        for one in (widget, *widget.findChildren(QWidget)):
+            one.style().unpolish(one)
+            one.style().polish(one)
 
 
 def say(widget: QLabel, text: str, name: str = "") -> None:
@@ -216,12 +264,7 @@ def field(layout: QVBoxLayout, words: str, widget: QWidget, *more: QWidget) -> N
     caption = label(words, "quiet", wrap=True)
     if not isinstance(widget, _Choice):  # it has a label of its own
         caption.setBuddy(widget)
-    layout.addWidget(caption)
-    row = QHBoxLayout()
-    row.addWidget(widget, 1)
-    for other in more:
-        row.addWidget(other)
-    layout.addLayout(row)
+    fill(layout, caption, hbox((widget, 1), *more))
 
 
 def tick(words: str, name: str) -> QCheckBox:

@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QImage, QPainter, QPaintEvent
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFileDialog, QSizePolicy, QWidget
 
 from daq_app.analyst.seen import NAMES, ComparedRow
-from daq_app.qt.parts import bare, button, label, say
+from daq_app.qt.parts import button, hbox, label, say, vbox
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr
@@ -24,14 +24,11 @@ class SaveButtons(QWidget):
         """Offer to save `what`; nothing is shown yet."""
         super().__init__()
         self._name, self._save = "", save
-        layout = bare(QHBoxLayout(self), GRID // 2)
-        layout.addStretch(1)
         self.buttons = [
             button(kind, tr("save {what} as {kind}", what=what, kind=kind), lambda kind=kind: self._ask(kind), "small")
             for kind in KINDS
         ]
-        for widget in self.buttons:
-            layout.addWidget(widget)
+        hbox(1, *self.buttons, on=self, spacing=GRID // 2)
         self.set_name("")
 
     def set_name(self, name: str) -> None:
@@ -56,9 +53,7 @@ class PictureView(QWidget):
         super().__init__()
         self._canvas = _Canvas()
         self.save = SaveButtons(what, save)
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(self._canvas, 1)
-        layout.addWidget(self.save)
+        vbox((self._canvas, 1), self.save, on=self)
 
     def show_picture(self, name: str, title: str, png: bytes) -> None:
         """Show a picture by its PNG; where that is empty, `title` says why."""
@@ -109,13 +104,7 @@ class ComparedView(QWidget):
         self.table = TextTable(tr("two sessions compared"), head)
         self.table.setMinimumHeight(130)
         self.picture = PictureView(tr("the picture of both sessions"), save)
-        top = QHBoxLayout()
-        top.addWidget(self.words, 1)
-        top.addWidget(self.choose)
-        layout = bare(QVBoxLayout(self))
-        layout.addLayout(top)
-        layout.addWidget(self.table, 1)
-        layout.addWidget(self.picture, 2)
+        vbox(hbox((self.words, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
         self.show_rows((), ("", ""))
 
     def show_rows(self, rows: Sequence[ComparedRow], sessions: tuple[str, str]) -> None:

@@ -3,16 +3,93 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QStackedWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
 
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.menus import Menus, Rail, Room
-from daq_app.qt.remembered import remember_session
+from daq_app.qt.parts import button, hbox, label, vbox
+from daq_app.qt.remembered import recent_sessions, remember_session
+from daq_app.qt.tokens import GRID, theme_of
 from daq_app.window.messages import NewSession
+from daq_app.wording import tr
 
-if TYPE_CHECKING:  # loaded when somebody looks at a session
+if TYPE_CHECKING:
     from daq_app.qt.analyst_window import AnalystWindow
-    from daq_app.qt.review_room import ReviewRoom
+
+LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
+
+
+class ReviewRoom(QWidget):
+    """One session at a time; another takes its place."""
+
+    def __init__(self, scale: float) -> None:
+        """Show no session."""
+        super().__init__()
+        self.analyst: AnalystWindow | None = None
+        self.recent = QListWidget()
+        self.recent.setAccessibleName(tr("recent sessions"))
+        self.recent.itemActivated.connect(self._go)
+        self.recent.itemClicked.connect(self._go)
+        self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
+        side = QWidget()
+        side.setFixedWidth(round(LIST_WIDTH * scale))
+        vbox(
+            label(tr("Recent sessions"), "section"),
+            (self.recent, 1),
+            button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose),
+            on=side,
+            margins=(0, GRID, 0, GRID),
+        )
+        self._row = hbox(side, (self._none, 1), on=self, spacing=GRID)
+
+    def enter(self) -> None:
+        """Open the newest session where none is open."""
+        self._list()
+        if self.analyst is None and (listed := recent_sessions()):
+            self.open(listed[0])
+
+    def choose(self) -> None:
+        """Ask for the folder of a session, and open it."""
+        listed = recent_sessions()
+        name = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(listed[0].parent) if listed else ".")
+        if name:
+            self.open(Path(name))
+
+    def open(self, folder: Path) -> None:
+        """Open a session in place of the one that is open."""
+        if self.analyst is not None and self.analyst.state.folder == folder:
+            return
+        self.leave()
+        remember_session(folder)
+        self._list()
+        from daq_app.qt.analyst_window import AnalystWindow  # loaded when somebody looks at a session
+
+        self.analyst = AnalystWindow(folder, theme_of(self))
+        self.analyst.setWindowFlags(Qt.WindowType.Widget)
+        self._none.hide()
+        self._row.addWidget(self.analyst, 1)
+        self.analyst.show()
+
+    def leave(self) -> None:
+        """End the work on the session that is open."""
+        if self.analyst is not None:
+            self.analyst.close()
+            self._row.removeWidget(self.analyst)
+            self.analyst.deleteLater()
+            self.analyst = None
+            self._none.show()
+
+    def _list(self) -> None:
+        self.recent.clear()
+        for place in recent_sessions():
+            item = QListWidgetItem(place.name)
+            item.setToolTip(str(place))
+            item.setData(Qt.ItemDataRole.UserRole, str(place))
+            self.recent.addItem(item)
+
+    def _go(self, item: QListWidgetItem) -> None:
+        self.open(Path(item.data(Qt.ItemDataRole.UserRole)))
 
 
 class Rooms(QStackedWidget):
@@ -22,11 +99,10 @@ class Rooms(QStackedWidget):
         """Show nothing yet: the room of the session in hand is the first widget that is added."""
         super().__init__()
         self._bridge = bridge
-        self._scale = scale
         self._rail = rail
         self._menus = menus
         self._kept: str | None = None  # folder of the session that was put among the recent ones
-        self.review: ReviewRoom | None = None
+        self.review = ReviewRoom(scale)  # added when it is first entered
 
     @property
     def room(self) -> Room:
@@ -44,7 +120,7 @@ class Rooms(QStackedWidget):
     @property
     def analyst(self) -> "AnalystWindow | None":
         """Return the session that is looked at; None in the other rooms."""
-        return None if self.review is None or self.room != "review" else self.review.analyst
+        return self.review.analyst if self.room == "review" else None
 
     def go_to(self, room: Room) -> None:
         """Show a room, where it can be: Review on the session that has just ended, or else on the newest."""
@@ -81,15 +157,10 @@ class Rooms(QStackedWidget):
 
     def leave(self) -> None:
         """End the work on the session that is looked at."""
-        if self.review is not None:
-            self.review.leave()
+        self.review.leave()
 
-    def _entered(self) -> "ReviewRoom":
-        """Show the room of recorded sessions, which is made when it is first entered."""
-        if self.review is None:
-            from daq_app.qt.review_room import ReviewRoom
-
-            self.review = ReviewRoom(self._scale)
+    def _entered(self) -> ReviewRoom:
+        if self.count() == 1:
             self.addWidget(self.review)
         self.setCurrentIndex(1)
         return self.review

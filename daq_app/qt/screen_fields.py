@@ -7,7 +7,7 @@ from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.languages import missing_glyphs, name_of, translator
-from daq_app.qt.parts import bare, button, choice, field
+from daq_app.qt.parts import bare, button, choice, field, fill
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.subject_picture import Thumbnail
@@ -39,8 +39,7 @@ class ScreenFields(QWidget):
         self._new_code.hide()
         layout = bare(QVBoxLayout(self), 4)
         field(layout, tr("Language that the subject reads"), self.language)
-        for part in (self.thumbnail, self._ruler, self.camera, self._new_code):
-            layout.addWidget(part)
+        fill(layout, self.thumbnail, self._ruler, self.camera, self._new_code)
 
     def show_line(self, known: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QPointF, QRectF, QSettings, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QScreen
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLineEdit, QWidget
 
-from daq_app.qt.parts import button, label, say
+from daq_app.qt.parts import button, hbox, label, say, vbox
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.wording import tr
@@ -98,20 +98,22 @@ class RulerCheck(QWidget):
         self._measured.setFixedWidth(round(100 * scale))
         self._measured.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)
-        row = QHBoxLayout()
-        row.addWidget(self._measured)
-        row.addWidget(label("mm"))
-        row.addWidget(button(tr("Keep"), tr("keep the measured length"), self._keep))
-        row.addWidget(button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit))
-        row.addStretch(1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(4 * GRID, 4 * GRID, 4 * GRID, 4 * GRID)
-        layout.addWidget(self._sentence)
-        layout.addStretch(1)
-        layout.addWidget(self._line)
-        layout.addStretch(1)
-        layout.addLayout(row)
-        layout.addWidget(self._wrong)
+        vbox(
+            self._sentence,
+            1,
+            self._line,
+            1,
+            hbox(
+                self._measured,
+                label("mm"),
+                button(tr("Keep"), tr("keep the measured length"), self._keep),
+                button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit),
+                1,
+            ),
+            self._wrong,
+            on=self,
+            margins=4 * GRID,
+        )
 
     def begin(self, screen: QScreen) -> None:
         """Check this screen."""

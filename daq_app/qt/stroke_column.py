@@ -1,14 +1,14 @@
 """The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QScrollArea, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QFormLayout, QTabWidget, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.messages import Edge
 from daq_app.analyst.shown import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.qt.decisions_bar import DecisionsBar
-from daq_app.qt.parts import bare, label
+from daq_app.qt.parts import hbox, label, scrolled, vbox
 from daq_app.qt.picture_view import SaveButtons
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import ReadingsTable, TextTable
@@ -41,26 +41,31 @@ class StrokeColumn(QWidget):
         self.decisions = DecisionsBar()
         self.decisions.requested.connect(self.requested.emit)
         self.save = SaveButtons(tr("the stroke"), self._save)
-        self._numbers = QGridLayout()
         self._lines: tuple[tuple[str, str], ...] = ()
         self.readings = ReadingsTable()
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("numbers and readings"))
-        self._scroll = self._scrolled()
+        inside = QWidget()
+        self._numbers = QFormLayout(inside)
+        self._numbers.setContentsMargins(0, 0, 0, 0)
+        self._numbers.setLabelAlignment(Qt.AlignmentFlag.AlignLeft)
+        self._scroll = scrolled(inside)  # where there is little room the numbers are scrolled, never cut
+        self._scroll.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._scroll.setAccessibleName(tr("numbers of the stroke and its prediction"))
         self.tabs.addTab(self._scroll, tr("Numbers"))
         self.tabs.addTab(self.readings, tr("Readings"))
         self.friction = TextTable(tr("friction of every stroke"), [tr(words) for words in FRICTION_HEAD])
         self.friction.chosen.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
-        layout = bare(QVBoxLayout(self), GRID // 2)
-        layout.addWidget(self.stroke, 4)
-        bar = QHBoxLayout()
-        bar.addWidget(self.player, 1)
-        bar.addWidget(self.save)
-        layout.addLayout(bar)
-        layout.addWidget(self.decisions)
-        layout.addWidget(self.tabs, 3)
+        vbox(
+            (self.stroke, 4),
+            hbox((self.player, 1), self.save),
+            self.decisions,
+            (self.tabs, 3),
+            on=self,
+            spacing=GRID // 2,
+        )
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""
@@ -132,15 +137,10 @@ class StrokeColumn(QWidget):
             self.player.toggle()
 
     def _show_numbers(self) -> None:
-        while (item := self._numbers.takeAt(0)) is not None:
-            if (old := item.widget()) is not None:
-                old.hide()
-                old.deleteLater()
-        for at, (name, value) in enumerate(self._lines):
-            self._numbers.addWidget(label(name, "quiet"), at, 0)
-            self._numbers.addWidget(label(value, wrap=True), at, 1)
-        for at in range(self._numbers.rowCount() + 1):
-            self._numbers.setRowStretch(at, int(at >= len(self._lines)))
+        while self._numbers.rowCount():
+            self._numbers.removeRow(0)
+        for name, value in self._lines:
+            self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
 
     def _dragged(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
@@ -155,16 +155,3 @@ class StrokeColumn(QWidget):
 
     def _save(self, name: str, path: str) -> None:
         self.requested.emit(m.Write(f"picture {name}", path))
-
-    def _scrolled(self) -> QScrollArea:
-        box = QWidget()
-        box.setLayout(self._numbers)
-        self._numbers.setColumnStretch(1, 1)
-        self._numbers.setContentsMargins(0, 0, 0, 0)
-        scrolled = QScrollArea()  # where there is little room the numbers are scrolled, never cut
-        scrolled.setWidget(box)
-        scrolled.setWidgetResizable(True)
-        box.setObjectName("inside")
-        scrolled.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
-        scrolled.setAccessibleName(tr("numbers of the stroke and its prediction"))
-        return scrolled

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
 from daq_app.qt.drawer import Openness
 from daq_app.qt.languages import missing_glyphs, translator
-from daq_app.qt.parts import Wrapped, bare, button, label
+from daq_app.qt.parts import Wrapped, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.window.new_session import Refused, SessionForm
@@ -131,8 +131,7 @@ class Mirror(QWidget):
         self.picture: SubjectPicture | None = None  # made when it is first seen
         self.tab = button("", tr("the subject's page"), self.open.toggle, "handle")
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Maximum)
-        layout = bare(QVBoxLayout(self), 4)
-        layout.addWidget(self.tab)
+        vbox(self.tab, on=self, spacing=4)
         self._place()
 
     def show_view(self, view: SubjectView | None, size: QSize) -> None:
@@ -190,21 +189,27 @@ class SubjectPreview(QDialog):
         self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
         self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")
-        row = QHBoxLayout()
-        for widget in (self.back, self.on, self._count):
-            row.addWidget(widget)
-        row.addStretch(1)
-        row.addWidget(button(tr("Close  Esc"), tr("close the preview"), self.close))
-        right = QVBoxLayout()
-        right.setSpacing(GRID)
-        right.addWidget(self.picture, 1)
-        right.addWidget(self.lost)
-        right.addLayout(row)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(2 * GRID, 2 * GRID, 2 * GRID, 2 * GRID)
-        layout.setSpacing(2 * GRID)
-        layout.addWidget(self.list)
-        layout.addLayout(right, 1)
+        hbox(
+            self.list,
+            (
+                vbox(
+                    (self.picture, 1),
+                    self.lost,
+                    hbox(
+                        self.back,
+                        self.on,
+                        self._count,
+                        1,
+                        button(tr("Close  Esc"), tr("close the preview"), self.close),
+                    ),
+                    spacing=GRID,
+                ),
+                1,
+            ),
+            on=self,
+            margins=2 * GRID,
+            spacing=2 * GRID,
+        )
         self.resize(round(1000 * min(scale, 1.25)), round(560 * min(scale, 1.25)))
         self.list.currentRowChanged.connect(self._show)
         self.list.setCurrentRow(0)

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget,
 from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
 from daq_app.qt.indicators import PressBar
 from daq_app.qt.languages import direction, translator
-from daq_app.qt.parts import bare, button, label, say
+from daq_app.qt.parts import button, fill, hbox, label, say, vbox
 from daq_app.qt.score_line import ScoreLine
 from daq_app.qt.screens import Millimetres, RulerCheck, millimetres
 from daq_app.qt.tokens import GRID, font
@@ -64,8 +64,7 @@ class SubjectWindow(QWidget):
         self._pages.addWidget(self._message_page())
         self._pages.addWidget(self._scale_page())
         self._pages.addWidget(self.ruler)
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(self._pages)
+        vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
             way.changed.connect(self._answer_changed)
         self.setMinimumSize(round(560 * min(scale, 1.25)), 340)
@@ -232,12 +231,9 @@ class SubjectWindow(QWidget):
         self._answer_layout = layout = QVBoxLayout(page)
         layout.setContentsMargins(2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
         self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        layout.addWidget(self._question)
-        layout.addStretch(2)
+        fill(layout, self._question, 2)
         self._hint.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        layout.addWidget(self._hint)
-        layout.addWidget(self._ways)
-        layout.addStretch(2)
+        fill(layout, self._hint, self._ways, 2)
         self._next_row = QHBoxLayout()
         self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
         place = QWidget()  # keeps the button's place while there is none
@@ -254,11 +250,9 @@ class SubjectWindow(QWidget):
         while self._next_row.count():
             self._next_row.takeAt(0)
         if hand == "right":
-            self._next_row.addStretch(1)
-            self._next_row.addWidget(self.next)
+            fill(self._next_row, 1, self.next)
         else:
-            self._next_row.addWidget(self.next)
-            self._next_row.addStretch(1)
+            fill(self._next_row, self.next, 1)
 
     def _turn(self) -> None:
         self._pages.setCurrentIndex(1 if self.scoring else 0)
@@ -339,8 +333,4 @@ def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) 
 
 def _centred(widget: QWidget, weight: int) -> QHBoxLayout:
     """Return a row with a widget in its middle, that takes `weight` times the space of either side."""
-    row = QHBoxLayout()
-    row.addStretch(1)
-    row.addWidget(widget, weight)
-    row.addStretch(1)
-    return row
+    return hbox(1, (widget, weight), 1)

@@ -6,10 +6,10 @@ from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt, Signal
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent, QStandardItem, QStandardItemModel
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
 from daq_app.analyst.raw import RawReadings
-from daq_app.qt.parts import Wrapped, bare
+from daq_app.qt.parts import Wrapped, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop
 
@@ -134,9 +134,7 @@ class ReadingsTable(QWidget):
         self.table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Interactive)
         self._model = _Model()
         self.table.setModel(self._model)
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(self.place)
-        layout.addWidget(self.table, 1)
+        vbox(self.place, (self.table, 1), on=self)
 
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
         """Show readings, those of the steady window marked by a word and by bold type."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QSizePolicy, QSlider, QWidget
+from PySide6.QtWidgets import QSizePolicy, QSlider, QWidget
 
 from daq_app.analyst.transport import SPEEDS, Transport
-from daq_app.qt.parts import bare, button, choice, label, say
+from daq_app.qt.parts import button, choice, hbox, label, say
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
@@ -46,12 +46,7 @@ class TransportBar(QWidget):
         self.speed.activated.connect(self._at_speed)
         self.place = label("", "quiet")
         self.place.setVisible(tells_time)
-        layout = bare(QHBoxLayout(self), GRID)
-        for part in (self.play, self.back, self.forward):
-            layout.addWidget(part)
-        layout.addWidget(self.slider, 1)
-        layout.addWidget(self.place)
-        layout.addWidget(self.speed)
+        hbox(self.play, self.back, self.forward, (self.slider, 1), self.place, self.speed, on=self, spacing=GRID)
         self._timer = QTimer(self)
         self._timer.setInterval(TICK)
         self._timer.timeout.connect(self._tick)

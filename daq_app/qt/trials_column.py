@@ -5,12 +5,12 @@ from typing import Any
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QListWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QListWidget, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.shown import greatest_errors, marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
-from daq_app.qt.parts import Wrapped, bare, choice, label
+from daq_app.qt.parts import Wrapped, choice, label, vbox
 from daq_app.qt.tokens import MODEL, Tokens
 from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.wording import tr
@@ -40,13 +40,15 @@ class TrialsColumn(QWidget):
         self.responses.activated.connect(self._respond)
         self.errors = Wrapped("quiet")
         self.relation, self.points = self._relation()
-        layout = bare(QVBoxLayout(self))
-        layout.addWidget(label(tr("Trials"), "section"))
-        layout.addWidget(self.list, 3)
-        layout.addWidget(label(tr("At the plan's depth, against the score"), "section"))
-        layout.addWidget(self.responses)
-        layout.addWidget(self.errors)
-        layout.addWidget(self.relation, 2)
+        vbox(
+            label(tr("Trials"), "section"),
+            (self.list, 3),
+            label(tr("At the plan's depth, against the score"), "section"),
+            self.responses,
+            self.errors,
+            (self.relation, 2),
+            on=self,
+        )
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""

@@ -14,7 +14,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QFileDialog, QLineEdit, QMessageBox
 
-from daq_app.qt.review_room import ReviewRoom
+from daq_app.qt.rooms import ReviewRoom
 from daq_app.recorder.messages import Connect, Disconnect
 from daq_app.window.messages import NewSession
 
