@@ -2,7 +2,7 @@
 
 import argparse
 
-from daq_app.cli.options import within
+from daq_app.cli.options import add_number
 from daq_app.console import WrongValue
 from sessions.strokes.friction import FIXED, HERTZ, PLANNED_AT, AreaLaw
 
@@ -17,23 +17,15 @@ def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) ->
         help="contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
         f"N; where none is given {otherwise}",
     )
-    parser.add_argument(
-        "--area-force",
-        type=within("--area-force", float, 0.01, 100.0, "0.01 to 100 (N)"),
-        metavar="NEWTON",
-        help=f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)",
-    )
+    meaning = f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)"
+    add_number(parser, "--area-force", float, (0.01, 100.0), meaning, None, "NEWTON", "0.01 to 100 (N)")
     add_calibration(parser)
 
 
 def add_calibration(parser: argparse.ArgumentParser) -> None:
     """Declare --calibration-error."""
-    parser.add_argument(
-        "--calibration-error",
-        type=within("--calibration-error", float, 0.0, 20.0, "0 to 20 (per cent)"),
-        metavar="PERCENT",
-        help="standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)",
-    )
+    meaning = "standard uncertainty of each axis of the transducer (else as set before for the session, or 1, assumed)"
+    add_number(parser, "--calibration-error", float, (0.0, 20.0), meaning, None, "PERCENT", "0 to 20 (per cent)")
 
 
 def area_law(options: argparse.Namespace) -> AreaLaw | None:

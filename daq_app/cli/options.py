@@ -33,6 +33,25 @@ def within(
     return read
 
 
+def add_number(
+    parser: argparse.ArgumentParser,
+    name: str,
+    kind: type[int] | type[float],
+    span: tuple[float, float],
+    meaning: str,
+    default: float | None = None,
+    metavar: str | None = None,
+    words: str = "",
+) -> None:
+    """Declare an option that takes a number in a span; `words` say which where the ends do not."""
+    parser.add_argument(name, type=within(name, kind, *span, words), default=default, metavar=metavar, help=meaning)
+
+
+def add_seed(parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_SEED) -> None:
+    """Declare --seed, of something that is drawn at random."""
+    add_number(parser, "--seed", int, (0, largest), use, default)
+
+
 def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str, float]:
     """Return the numbers of an option given as NAME=VALUE, by name. Raises WrongValue with the example."""
     numbers: dict[str, float] = {}
@@ -90,14 +109,15 @@ def add_paths(parser: argparse.ArgumentParser, meaning: str, default: str | None
     )
 
 
+def add_variants(parser: argparse.ArgumentParser, meaning: str, default: str | None = None) -> None:
+    """Declare --variants, which was called --beside before."""
+    choices = ["none", "small", "both"]
+    parser.add_argument("--variants", "--beside", dest="variants", choices=choices, default=default, help=meaning)
+
+
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Declare where many solves run: processes of this computer or a Dask cluster."""
-    parser.add_argument(
-        "--workers",
-        type=within("--workers", int, 1, 1024),
-        metavar="N",
-        help="processes on this computer (as many as cores)",
-    )
+    add_number(parser, "--workers", int, (1, 1024), "processes on this computer (as many as cores)", metavar="N")
     parser.add_argument(
         "--scheduler",
         type=_address,

@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from daq_app.cli.options import LARGEST_SEED, numbers_by_key, within
+from daq_app.cli.options import add_number, add_seed, numbers_by_key, within
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.prediction import BY_NAME
 from sessions.prediction.planted_strokes import StudyDesign, planted_strokes
@@ -35,19 +35,8 @@ def add_power(parser: argparse.ArgumentParser) -> None:
         help="with --power: how often a study whose subjects press each surface to these depths tells --quantity from "
         "its rivals; some minutes",
     )
-    parser.add_argument(
-        "--studies",
-        type=within("--studies", int, 20, 100_000),
-        default=400,
-        metavar="N",
-        help="with --power: simulated per design (400)",
-    )
-    parser.add_argument(
-        "--seed",
-        type=within("--seed", int, 0, LARGEST_SEED),
-        default=0,
-        help="with --power: of the simulated studies (0)",
-    )
+    add_number(parser, "--studies", int, (20, 100_000), "with --power: simulated per design (400)", 400, "N")
+    add_seed(parser, "with --power: of the simulated studies (0)")
 
 
 def print_power(options: argparse.Namespace, console: Console) -> int:

@@ -9,7 +9,7 @@ import math
 
 from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
 from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
-from daq_app.cli.options import add_session, within
+from daq_app.cli.options import add_number, add_session
 from daq_app.console import DONE, FLAWED, Console, number, span, table
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals
@@ -25,12 +25,7 @@ WAYS = {1: "p → d", -1: "d → p", None: "–"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the session, and what the analysis may be told."""
     add_session(parser)
-    parser.add_argument(
-        "--bootstrap-seed",
-        type=within("--bootstrap-seed", int, 0, math.inf),
-        metavar="SEED",
-        help="of the intervals (as before, or 0)",
-    )
+    add_number(parser, "--bootstrap-seed", int, (0, math.inf), "of the intervals (as before, or 0)", metavar="SEED")
     add_analysis(parser)
 
 

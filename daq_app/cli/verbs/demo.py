@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import analyse_session, predict_session
-from daq_app.cli.options import LARGEST_SEED, within
+from daq_app.cli.options import add_seed
 from daq_app.console import DONE, FLAWED, Console, number, table
 from daq_app.simulation.demo_study import Study, StudyCutShort, simulated_study
 from drivers.clock import LONGEST_STEP, clock_at
@@ -28,12 +28,7 @@ PACE = 20.0  # simulated seconds a real second
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare seed, pace and folder."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
-    parser.add_argument(
-        "--seed",
-        type=within("--seed", int, 0, LARGEST_SEED),
-        default=1,
-        help="of surfaces' noise, subjects and orders (1)",
-    )
+    add_seed(parser, "of surfaces' noise, subjects and orders (1)", 1)
     parser.add_argument(
         "--real-time", action="store_true", help=f"keep the clock; otherwise time runs {PACE:g} times faster"
     )

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.cli.body_options import add_body_arguments, body_of
-from daq_app.cli.options import within
+from daq_app.cli.options import add_seed
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.atomic_file import write_whole
 from sessions.plan.protocols import protocol_file
@@ -26,11 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the study, the subject, and what is done."""
     parser.add_argument("study", type=Path, metavar="STUDY", help="the study's folder")
     parser.add_argument("--protocol", metavar="PROTOCOL", help="make the study: a built-in protocol, or a TOML file")
-    parser.add_argument(
-        "--seed",
-        type=within("--seed", int, 0, 2**31 - 1),
-        help="of a new study's orders (one by chance, recorded, unless given)",
-    )
+    add_seed(parser, "of a new study's orders (one by chance, recorded, unless given)", None, 2**31 - 1)
     parser.add_argument("--blind", action="store_true", help="of a new study: codes alone until it is unblinded")
     parser.add_argument("--subject", metavar="CODE", help="a code, never a name")
     add_body_arguments(parser)

@@ -15,7 +15,7 @@ import numpy as np
 
 from daq_app.batch.derived import open_visit, stored_settings
 from daq_app.cli.analysis_options import add_calibration, calibration_error
-from daq_app.cli.options import add_visit, within
+from daq_app.cli.options import add_number, add_seed, add_visit
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.atomic_file import write_whole
 from sessions.exchange.displacement_log import displacement_log
@@ -52,12 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         ("--prior", 1.1, 4.0, FACTOR, "FACTOR", f"one standard deviation of each stiffness about the published one, as "
          f"a factor ({FACTOR:g}, assumed)"),
     ):  # fmt: skip
-        kind = within(name, float, least, greatest)
-        parser.add_argument(name, type=kind, default=usual, metavar=metavar, help=words)
+        add_number(parser, name, float, (least, greatest), words, usual, metavar)
     parser.add_argument(
         "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
     )
-    parser.add_argument("--seed", type=within("--seed", int, 0, 2**32), default=0, help="of the posterior's draws (0)")
+    add_seed(parser, "of the posterior's draws (0)", largest=2**32)
     parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
     add_calibration(parser)
 

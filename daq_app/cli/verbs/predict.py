@@ -13,7 +13,15 @@ from typing import Any
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
-from daq_app.cli.options import add_kinematics, add_quantity, add_tau, add_visit, numbers_by_key, within
+from daq_app.cli.options import (
+    add_kinematics,
+    add_number,
+    add_quantity,
+    add_tau,
+    add_variants,
+    add_visit,
+    numbers_by_key,
+)
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.prediction import (
     BY_NAME,
@@ -52,14 +60,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     add_quantity(parser, "to print (--json has all)")
-    parser.add_argument(
-        "--variants",
-        "--beside",  # as it was called before
-        dest="variants",
-        choices=["none", "small", "both"],
-        default="small",
-        help="also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "
+    add_variants(
+        parser,
+        "also with tau_max as printed, at the measured force, and slid the other way: at small strain (about a "
         "second), or at finite strain too (about a minute: limits are looked for where a surface has no settled slide)",
+        "small",
     )
     parser.add_argument(
         "--intervals", action="store_true", help="also what the uncertainty of friction makes of each SED (more solves)"
@@ -76,13 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="a parameter of the afferent, such as static_gain=30; --afferent prints all of them",
     )
-    parser.add_argument(
-        "--afferent-seed",
-        type=within("--afferent-seed", int, 0, math.inf),
-        default=0,
-        metavar="SEED",
-        help="of the spike times (0)",
-    )
+    add_number(parser, "--afferent-seed", int, (0, math.inf), "of the spike times (0)", 0, "SEED")
     parser.add_argument(
         "--seal",
         action="store_true",

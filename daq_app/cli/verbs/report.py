@@ -9,7 +9,7 @@ from pathlib import Path
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
 from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
-from daq_app.cli.options import add_paths, add_quantity, add_visit
+from daq_app.cli.options import add_paths, add_quantity, add_variants, add_visit
 from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study_file import is_study
@@ -36,12 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "also along every other reasonable choice of the analysis; with 'finite' at finite strain too (a minute)",
         None,
     )
-    parser.add_argument(
-        "--variants",
-        "--beside",  # as it was called before
-        dest="variants",
-        choices=["none", "small", "both"],
-        help="also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
+    add_variants(
+        parser,
+        "also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
         "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
     )
     parser.add_argument(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from daq_app.batch import sign_map
 from daq_app.batch.sensitivity import Index, checked, doubts, left_as_it_is, saltelli_points, sensitivity, usual_design
 from daq_app.batch.sign_map import Answer
-from daq_app.cli.options import add_kinematics, add_quantity, add_workers, within
+from daq_app.cli.options import add_kinematics, add_quantity, add_seed, add_workers
 from daq_app.console import DONE, Console, WrongValue, number, table
 from sessions.prediction import QUANTITIES, Quantity
 from sessions.prediction.series_slopes import SERIES
@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"a power of two; N (numbers + 2) solves ({SAMPLES}), or {len(sign_map.DESIGN) + 2} N fingers "
         f"({OF_FINGERS})",
     )
-    parser.add_argument("--seed", type=within("--seed", int, 0, math.inf), default=0, help="of the samples (0)")
+    add_seed(parser, "of the samples (0)", largest=math.inf)
     add_quantity(parser, "whose signs are shown")
     add_kinematics(parser, "strain of every finger but the one change that takes the other")
     parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, written as they come: another run goes on")

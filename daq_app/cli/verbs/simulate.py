@@ -10,7 +10,7 @@ import argparse
 import time
 from pathlib import Path
 
-from daq_app.cli.options import within
+from daq_app.cli.options import add_number
 from daq_app.console import Console, WrongValue
 from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
 
@@ -26,19 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--port", "--rdt-port", type=_port, dest="rdt_port", help="UDP port (49152)")
     parser.add_argument("--tcp-port", type=_port, help="TCP command port (49151)")
     parser.add_argument("--http-port", type=_port, help="HTTP port (80, or a free one)")
-    parser.add_argument(
-        "--rate",
-        type=within("--rate", int, 1, 7000, "the box gives 1 to 7000 readings a second"),
-        help="readings a second of net-ft, 1 to 7000 (200)",
-    )
+    allowed = "the box gives 1 to 7000 readings a second"
+    add_number(parser, "--rate", int, (1, 7000), "readings a second of net-ft, 1 to 7000 (200)", words=allowed)
     parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits a second (38400)")
     parser.add_argument("--seed", type=int, default=0, help="of noise, drift and strokes (0)")
-    parser.add_argument(
-        "--factor",
-        type=within("--factor", float, 0.01, 1000.0),
-        default=1.0,
-        help="how much faster than real time runs (1)",
-    )
+    add_number(parser, "--factor", float, (0.01, 1000.0), "how much faster than real time runs (1)", 1.0)
     parser.add_argument("--script", type=Path, help="TOML timetable of strokes and faults")
 
 

@@ -18,11 +18,11 @@ from daq_app.cli.analysis_options import add_analysis, area_law, calibration_err
 from daq_app.cli.options import (
     LARGEST_SEED,
     add_kinematics,
+    add_number,
     add_paths,
     add_quantity,
     add_tau,
     add_workers,
-    within,
 )
 from daq_app.cli.study_power import add_power, print_power
 from daq_app.console import DONE, FLAWED, Console, WrongValue
@@ -44,12 +44,8 @@ PLANTED = "planted.json"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the folder of sessions, or the seed of a synthetic study."""
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
-    parser.add_argument(
-        "--synthetic",
-        type=within("--synthetic", int, 0, LARGEST_SEED),
-        metavar="SEED",
-        help="make a study of ten simulated subjects instead",
-    )
+    meaning = "make a study of ten simulated subjects instead"
+    add_number(parser, "--synthetic", int, (0, LARGEST_SEED), meaning, metavar="SEED")
     parser.add_argument(
         "--out",
         type=Path,
