@@ -8,11 +8,13 @@ import os
 import signal
 import sys
 import threading
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # multiprocessing takes a while to import, and most verbs start no process
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.context import SpawnContext
+    from multiprocessing.process import BaseProcess
 
 BELOW = 5  # on POSIX, nice's steps towards the end of the queue
 BELOW_NORMAL = 0x4000  # on Windows, its name for the same
@@ -49,6 +51,16 @@ def fresh_processes() -> "SpawnContext":
     os.environ[SAFE_PATH] = "1"  # multiprocessing takes no option for the Python that it starts
     use_one_thread()
     return get_context("spawn")
+
+
+def begin(target: Callable[..., None], *more: object, name: str) -> tuple["BaseProcess", Any]:
+    """Start a process that ends with this one; return it, and our end of the pipe of which `target` gets the other."""
+    context = fresh_processes()
+    ours, theirs = context.Pipe()
+    process = context.Process(target=target, args=(theirs, *more), daemon=True, name=name)
+    process.start()
+    theirs.close()
+    return process, ours
 
 
 def process_pool(workers: int) -> "ProcessPoolExecutor":

@@ -89,9 +89,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     if not table:
         return None
     _logarithmic(axes)
-    axes.set_xlabel("true error of the SED [%]")
-    axes.set_ylabel("time [ms]")
-    axes.set_title(title)
+    axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
     name = f"speed-{time.removesuffix('_s')}"
     header = ("way", "element", "order", "linear solver", "unknowns", "largest true error [-]", "median time [s]")
     return Panel(
@@ -119,8 +117,7 @@ def _guaranteed_panel(rows: Sequence[Guaranteed]) -> Panel | None:
         axes.plot([], [], mark, color=colour, markersize=4, label=f"{kinematics} strain")
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper right")
-    axes.set_xlabel("guaranteed, and true, error of the SED [%]")
-    axes.set_ylabel("time for a surface [ms]")
+    axes.set(xlabel="guaranteed, and true, error of the SED [%]", ylabel="time for a surface [ms]")
     title = "surfaces solved to a tolerance"
     axes.set_title(title)
     header = (
@@ -187,8 +184,7 @@ def _order_panel(
         axes.plot([], [], "--", color=GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
-    axes.set_xlabel("error [–]" if time is not None else "element size, by the unit of each problem [–]")
-    axes.set_ylabel(label)
+    axes.set(xlabel="error [–]" if time is not None else "element size, by the unit of each problem [–]", ylabel=label)
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     title = "Time against true error on published problems" if time is not None else "Error against element size"
     return Panel(name, title, svg(drawn, name, title, simulated=False), header, tuple(table))
@@ -233,9 +229,7 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
         axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
     axes.legend(frameon=False, loc="lower right")
-    axes.set_xlabel("true error [%]")
-    axes.set_ylabel("estimated error [%]")
-    axes.set_title(number)
+    axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
     name = "estimate-" + number.split()[0].lower()
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
     table = tuple((r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows)
@@ -302,8 +296,7 @@ def growth_plate(measured: Measured) -> Plate:
     _power_line(axes, rows)
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper left")
-    axes.set_xlabel("unknowns")
-    axes.set_ylabel("time [ms]")
+    axes.set(xlabel="unknowns", ylabel="time [ms]")
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
     table = tuple((r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows)
     title = "Growth of the time with the unknowns"
@@ -313,10 +306,8 @@ def growth_plate(measured: Measured) -> Plate:
 
 def _logarithmic(axes: Axes) -> None:
     """Make both axes logarithmic, from a power of ten to another, so that their labels are few and short."""
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(_decades(axes.get_xlim()))
-    axes.set_ylim(_decades(axes.get_ylim()))
+    axes.set(xscale="log", yscale="log")
+    axes.set(xlim=_decades(axes.get_xlim()), ylim=_decades(axes.get_ylim()))
     for axis in (axes.xaxis, axes.yaxis):  # powers of ten as plain numbers: read at a glance, and drawn twice as fast
         axis.set_major_formatter(FuncFormatter(_plain))
         axis.set_minor_formatter(NullFormatter())

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.analyst import messages as m
-from daq_app.child_process import fresh_processes
+from daq_app.child_process import begin
 from daq_app.wording import tr
 
 Connection = Any  # one end of a pipe; its type is another one on each system
@@ -97,7 +97,6 @@ class Analyst:
     """The work as the window sees it: nothing here waits."""
 
     def __init__(self, folder: Path) -> None:
-        """Begin with a session."""
         self._folder = folder
         self._process: BaseProcess | None = None
         self._connection: Connection | None = None
@@ -144,12 +143,7 @@ class Analyst:
         self._gone()
 
     def _start(self) -> None:
-        context = fresh_processes()
-        ours, theirs = context.Pipe()
-        self._process = context.Process(target=run, args=(theirs, str(self._folder)), daemon=True, name="analyst")
-        self._process.start()
-        theirs.close()
-        self._connection = ours
+        self._process, self._connection = begin(run, str(self._folder), name="analyst")
 
     def _gone(self) -> None:
         if self._connection is not None:

@@ -54,7 +54,6 @@ class RawFile:
     """The readings of a recording, with the rows they have in its file; what is needed again is kept."""
 
     def __init__(self, recording: Recording) -> None:
-        """Read nothing yet."""
         self._recording = recording
         self._whole: ReadingBlock | None = None  # of a recording without trials
         self._before: dict[tuple[int, int], int] | None = None  # rows before the block that begins so

@@ -25,7 +25,7 @@ from daq_app.analyst.shown import progress_words
 from daq_app.analyst.state import AnalystState, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Wrapped, bare, button, choice, hbox, label, panel, scrolled, vbox
+from daq_app.qt.parts import Panel, Wrapped, bare, button, choice, hbox, label, scrolled, vbox
 from daq_app.qt.remembered import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
 from daq_app.qt.tokens import GRID, Tokens
@@ -43,7 +43,6 @@ class LineageLabel(QLabel):
     followed = Signal(str)  # the place that a link leads to
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show no way yet."""
         super().__init__()
         self._tokens = tokens
         self._links: tuple[Link, ...] = ()
@@ -109,10 +108,9 @@ class AnalystWindow(QMainWindow):
         )
         self.report = button(tr("Report…"), tr("write the report"), self.write_report)
         self.format, self.export = (
-            choice(tr("format of the export")),
+            choice(tr("format of the export"), sorted(FORMATS)),
             button(tr("Export…"), tr("write an export"), self.write_export),
         )
-        self.format.addItems(sorted(FORMATS))
         self._scrolled: list[QScrollArea] = []
         self._parts = [self._panel(name, column) for name, column in self._named()]
         self._pages = QTabWidget()
@@ -266,10 +264,8 @@ class AnalystWindow(QMainWindow):
         return (tr("Trials"), self.trials), (tr("Stroke"), self.stroke), (tr("Model"), self.model)
 
     def _panel(self, name: str, column: QWidget) -> QFrame:
-        frame, layout = panel(name.lower())
-        layout.setContentsMargins(GRID, GRID, GRID, GRID)
-        area = scrolled(column)  # where a column is too high for the window it is scrolled, never cut
-        layout.addWidget(area)
+        frame, area = Panel(name.lower()), scrolled(column)  # a column that is too high is scrolled, never cut
+        vbox(area, on=frame, margins=GRID)
         self._scrolled.append(area)
         return frame
 

@@ -5,12 +5,11 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QComboBox,
-    QFrame,
     QWidget,
 )
 
 from daq_app.qt.indicators import Lamp, LoadBar
-from daq_app.qt.parts import EntryLine, button, choice, hbox, label, named, regrade, say, scrolled, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, named, regrade, say, scrolled, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
 from daq_app.window.bench_load import AXES
@@ -29,14 +28,12 @@ SPOKEN = {
 }  # where a caption alone does not say of what
 
 
-class BenchPanel(QFrame):
+class BenchPanel(Panel):
     """The right of the experimenter's window."""
 
     def __init__(self, scale: float, send: Callable[[Message], None], search: Callable[[], None]) -> None:
         """Show no transducer; `send` takes what is asked for, `search` looks for devices."""
-        super().__init__()
-        self.setProperty("role", "panel")
-        self.setAccessibleName(tr("bench"))
+        super().__init__(tr("bench"))
         self._send = send
         self._view: BenchView | None = None
         self._lamp = Lamp(tr("transducer"))
@@ -156,14 +153,12 @@ class BenchPanel(QFrame):
         return scrolled(inside)
 
 
-class BenchStrip(QFrame):
+class BenchStrip(Panel):
     """The bench folded: a lamp, and a short bar for each axis."""
 
     def __init__(self, scale: float, expand: Callable[[], None]) -> None:
         """Show no transducer; `expand` shows the bench whole."""
-        super().__init__()
-        self.setProperty("role", "strip")
-        self.setAccessibleName(tr("bench, folded"))
+        super().__init__(tr("bench, folded"), "strip")
         self._lamp = Lamp(tr("transducer"))
         self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
         self.setFixedWidth(round(150 * scale))

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QFrame, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from daq_app.qt.parts import button, choice, fill, hbox, label, regrade, say, vbox
+from daq_app.qt.parts import Panel, button, choice, fill, hbox, label, regrade, say, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
@@ -17,15 +17,13 @@ from daq_app.window.view_bench import BenchView, bench_summary
 from daq_app.wording import tr
 
 
-class CardFrame(QFrame):
+class CardFrame(Panel):
     """Holds the fields of a card in `body`."""
 
     def __init__(self, name: str) -> None:
-        """Show a card that is not ready."""
-        super().__init__()
+        super().__init__("", "card")
         self._name = name
         self._card: Card | None = None
-        self.setProperty("role", "card")
         self._mark = label("○")
         self.words = label("", "quiet", wrap=True)
         self.body = QVBoxLayout()
@@ -57,15 +55,14 @@ class CardFrame(QFrame):
         regrade(self.words, "wrong")
 
 
-class CutShort(QFrame):
+class CutShort(Panel):
     """Lists the sessions that can go on; without one it is not seen."""
 
     def __init__(self, send: Callable[[Message], None]) -> None:
         """Offer nothing; `send` takes what is asked for."""
-        super().__init__()
+        super().__init__("", "banner")
         self._send = send
         self._shown: tuple[Unfinished, ...] = ()
-        self.setProperty("role", "banner")
         self.setProperty("grade", "look")
         self._sessions = choice(tr("sessions that were cut short"))
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
@@ -109,7 +106,6 @@ class TransducerRow(QWidget):
     """Two buttons and a few lines of words; `act` does what a button stands for."""
 
     def __init__(self, act: Callable[[str], None]) -> None:
-        """Show no transducer."""
         super().__init__()
         self.connect_button = button(tr("Connect"), tr("connect the transducer"), lambda: act("connect"))
         self.zero = button(tr("Zero  T"), tr("measure the zero of the transducer"), lambda: act("tare"))

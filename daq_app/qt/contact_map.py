@@ -21,7 +21,6 @@ class ContactMap(PaintedWidget):
     """Where the finger presses now, and where it came from. The drawing is of the face's middle, not to its edges."""
 
     def __init__(self, scale: float) -> None:
-        """Show an untouched sample."""
         super().__init__()
         self._scale = scale
         self._trail: Array = np.empty((0, 2))

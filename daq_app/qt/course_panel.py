@@ -5,7 +5,6 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
-    QFrame,
     QGridLayout,
     QListWidget,
     QListWidgetItem,
@@ -13,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt.parts import EntryLine, bare, button, hbox, label, say, vbox
+from daq_app.qt.parts import EntryLine, Panel, bare, button, hbox, label, say, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.messages import Message
@@ -25,14 +24,12 @@ MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": s
 ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
-class CoursePanel(QFrame):
+class CoursePanel(Panel):
     """The left of the experimenter's window while a session is in hand."""
 
     def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
         """Show no plan; `send` takes what is done."""
-        super().__init__()
-        self.setProperty("role", "panel")
-        self.setAccessibleName(tr("course of the session"))
+        super().__init__(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
         self._asking = ""

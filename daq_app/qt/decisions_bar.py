@@ -55,7 +55,6 @@ class DecisionsBar(QWidget):
     requested = Signal(object)
 
     def __init__(self) -> None:
-        """Remember who decided last."""
         super().__init__()
         self.by = QLineEdit(str(QSettings().value(BY, "")))
         self.by.setPlaceholderText(NOBODY)

@@ -53,7 +53,6 @@ class Drawer(QSplitter):
     """
 
     def __init__(self, main: QWidget, drawer: QWidget) -> None:
-        """Place both as they were left."""
         super().__init__(Qt.Orientation.Horizontal)
         self._main, self._drawer = main, drawer
         self.addWidget(main)

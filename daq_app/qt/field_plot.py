@@ -38,12 +38,11 @@ class FieldPlot(QWidget):
     changed = Signal()
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show nothing yet."""
         super().__init__()
-        self.source = choice(tr("what is plotted under the finger"))
-        self.source.addItems([tr(words) for words in SOURCES])
-        self.draw = button(tr("Line"), tr("draw a line over the finger with the mouse"), lambda: None, "small")
-        self.draw.setCheckable(True)
+        self.source = choice(tr("what is plotted under the finger"), map(tr, SOURCES))
+        self.draw = button(
+            tr("Line"), tr("draw a line over the finger with the mouse"), lambda: None, "small", checkable=True
+        )
         self.plot = ZoomedPlot(tokens)
         self.plot.read = self._read
         self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
@@ -109,13 +108,10 @@ class FieldBar(QWidget):
     changed = Signal()
 
     def __init__(self) -> None:
-        """Offer the SED, with one range for all trials."""
         super().__init__()
         self._automatic: Range = (0.0, 1.0)
-        self.which = choice(tr("field that is drawn"))
-        self.which.addItems([tr(field.label) for field in FIELD_CHOICES])
-        self.ranges = choice(tr("range of the colours"))
-        self.ranges.addItems([tr("All trials"), tr("Own scale"), tr("Fixed")])
+        self.which = choice(tr("field that is drawn"), (tr(field.label) for field in FIELD_CHOICES))
+        self.ranges = choice(tr("range of the colours"), (tr("All trials"), tr("Own scale"), tr("Fixed")))
         self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
         layout = bare(QHBoxLayout(self), GRID // 2)
         fill(layout, (self.which, 3), (self.ranges, 2))

@@ -46,7 +46,6 @@ class Sight(QObject):
     pointed = Signal(object)  # place under the pointer (x, y) [mm]; None where it left
 
     def __init__(self) -> None:
-        """Look at all of it."""
         super().__init__()
         self.part: QRectF | None = None  # [mm]; None: all of it
         self.line: Line | None = None

@@ -31,7 +31,6 @@ class FingerView(QWidget):
     """A picture of the last state of a model."""
 
     def __init__(self, scale: float) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._scale = scale
         self._picture: Picture | None = None

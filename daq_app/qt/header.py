@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QApplication, QBoxLayout, QFrame, QSizePolicy, QWidget
+from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
 from daq_app.qt.indicators import Arrow, Lamp
 from daq_app.qt.languages import name_of
-from daq_app.qt.parts import button, hbox, label, regrade, say
+from daq_app.qt.parts import Panel, button, hbox, label, regrade, say
 from daq_app.qt.tokens import GRID, SMALL, font
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
@@ -22,7 +22,6 @@ class Header(QWidget):
     """Whose session it is, by which device and in which language, and whether it is simulated and being recorded."""
 
     def __init__(self, scale: float) -> None:
-        """Show no session."""
         super().__init__()
         self._heading, self._device = label("", "title", wrap=True), label("", "quiet", wrap=True)
         self._language = label("", "quiet")
@@ -62,16 +61,15 @@ class Header(QWidget):
         self._rows.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
 
 
-class Notice(QFrame):
+class Notice(Panel):
     """One line that is always there: empty, a sentence, or a banner that stays until its cause is gone."""
 
     def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
         """Show nothing; `send` takes what the banner's button asks for."""
-        super().__init__()
+        super().__init__("", "banner")
         self._send = send
         self._banner: Banner | None = None
         self._warning: str | None = None
-        self.setProperty("role", "banner")
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
@@ -116,14 +114,12 @@ class Notice(QFrame):
             self._send(self._banner.sends)
 
 
-class ToDo(QFrame):
+class ToDo(Panel):
     """What to do now, and the one button that does it."""
 
     def __init__(self, primary: Callable[[], None], review: Callable[[], None]) -> None:
         """Show nothing to do; `review` opens the session that has ended."""
-        super().__init__()
-        self.setProperty("role", "panel")
-        self.setAccessibleName(tr("what to do now"))
+        super().__init__(tr("what to do now"))
         self._small = False
         self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)

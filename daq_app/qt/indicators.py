@@ -65,7 +65,6 @@ class LoadBar(QWidget):
     NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
 
     def __init__(self, name: str, scale: float) -> None:
-        """Start empty."""
         super().__init__()
         self._scale = scale
         self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
@@ -134,7 +133,6 @@ class Arrow(QWidget):
     """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
 
     def __init__(self) -> None:
-        """Start with no arrow."""
         super().__init__()
         self._direction = 0
         self.setFixedSize(5 * GRID, 7 * GRID)
@@ -193,7 +191,6 @@ class PressBar(QWidget):
     """A bar from no force, where reading begins, to `FULL`; no number, so that nobody aims at one."""
 
     def __init__(self, scale: float) -> None:
-        """Start empty."""
         super().__init__()
         self._force = 0.0
         self.setAccessibleName(Text.PRESSING)

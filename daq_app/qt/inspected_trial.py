@@ -71,8 +71,7 @@ class TrialStrip(QScrollArea):
 
     def _add(self) -> None:
         at = len(self.tiles)
-        tile_button = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile")
-        tile_button.setCheckable(True)
+        tile_button = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile", checkable=True)
         tile_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
         self.tiles.append(tile_button)
         self._row.insertWidget(at, tile_button)

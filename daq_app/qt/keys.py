@@ -7,7 +7,7 @@ from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QGridLayout, QMainWindow, QWidget
 
-from daq_app.qt.parts import button, hbox, is_text_field, label, panel, scrolled, vbox
+from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, scrolled, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.window.answer import owner
@@ -139,18 +139,14 @@ def name_of(event: QKeyEvent) -> str:
     return "Enter" if event.key() == Qt.Key.Key_Return else QKeySequence(event.key()).toString()
 
 
-class KeysPage(QWidget):
+class KeysPage(Panel):
     """Every key, over the window."""
 
     def __init__(self, parent: QWidget, scale: float, keys: tuple[Key, ...] = KEYS) -> None:
-        """Build the page of these keys, hidden."""
-        super().__init__(parent)
+        super().__init__(tr("keys of this window"))
         self._scale, self._over = scale, parent
-        self.setAccessibleName(tr("keys"))
-        frame, inside = panel(tr("keys of this window"))
-        inside.addLayout(
-            hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
-        )
+        self.setParent(parent)
+        head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
         rows = QWidget()
         grid = QGridLayout(rows)
         grid.setContentsMargins(0, 0, GRID, 0)
@@ -162,8 +158,7 @@ class KeysPage(QWidget):
         grid.setColumnStretch(1, 1)
         area = scrolled(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
-        inside.addWidget(area, 1)
-        vbox(frame, on=self)
+        vbox(head, (area, 1), on=self, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)), spacing=GRID)
         self.hide()
 
     def toggle(self) -> None:

@@ -41,9 +41,9 @@ class LiveBar(QWidget):
         self._scale = scale
         self.values: dict[str, QLabel] = {}
         self._pairs: list[tuple[QLabel, QLabel]] = []
-        self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold)
+        self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
         self.finite = button(
-            tr("Finite  M"), tr("live model at finite strain"), lambda: finite(self.finite.isChecked())
+            tr("Finite  M"), tr("live model at finite strain"), lambda: finite(self.finite.isChecked()), checkable=True
         )
         self.finite.setToolTip(
             tr("Live model at small strain, or at finite strain where the forces are within its reach")
@@ -55,8 +55,6 @@ class LiveBar(QWidget):
         self.length.setFixedWidth(round(84 * scale))
         acts = hbox(1, self.finite, self.length, self.hold, spacing=GRID)
         self._rows = hbox(self._numbers(), acts, on=self, spacing=GRID // 2)
-        self.hold.setCheckable(True)
-        self.finite.setCheckable(True)
         for widget in (self.hold, self.finite, self.length):
             widget.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         # Numbers give way where there is no room for all of them, and buttons where there is none for a second row.

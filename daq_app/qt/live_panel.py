@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QSizePolicy, QVBoxLayout, QWidget
 
 from daq_app.qt.contact_map import ContactMap
 from daq_app.qt.drawer import Drawer
 from daq_app.qt.finger_view import FingerView
 from daq_app.qt.live_bar import LENGTHS, LiveBar
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import button, fill, hbox, vbox
+from daq_app.qt.parts import Panel, button, fill, hbox, vbox
 from daq_app.qt.screens import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, N, T
 from daq_app.window.course_state import Mark, picture_end
@@ -51,14 +51,12 @@ SED = (
 FINITE = "live model/finite strain"  # under which the choice is remembered
 
 
-class LivePanel(QFrame):
+class LivePanel(Panel):
     """The middle of the experimenter's window."""
 
     def __init__(self, feed: LiveFeed, model: LiveModel, scale: float) -> None:
         """Show what `feed` holds and what `model` says; nothing yet."""
-        super().__init__()
-        self.setProperty("role", "panel")
-        self.setAccessibleName(tr("live readings"))
+        super().__init__(tr("live readings"))
         self._feed = feed
         self._model = model
         self._model_trace = ModelTrace()

@@ -8,12 +8,12 @@ from typing import Literal
 
 from PySide6.QtCore import Qt, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
-from PySide6.QtWidgets import QFrame, QMainWindow, QMenu, QMessageBox, QToolButton, QWidget
+from PySide6.QtWidgets import QMainWindow, QMenu, QMessageBox, QToolButton, QWidget
 
 from daq_app.qt import remembered
 from daq_app.qt.keys import KEYS
 from daq_app.qt.languages import name_of
-from daq_app.qt.parts import button, vbox
+from daq_app.qt.parts import Panel, button, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
@@ -46,22 +46,22 @@ PANELS = (
 LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 
 
-class Rail(QFrame):
+class Rail(Panel):
     """Three buttons, one for each room; that of the room that is shown stays pressed."""
 
     def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
         """Show that nothing is open; `go` is called with the room that is wanted."""
-        super().__init__()
-        self.setAccessibleName(tr("rooms"))
-        self.setProperty("role", "strip")
+        super().__init__(tr("rooms"), "strip")
         self.buttons = {
             room: button(
-                f"{tr(ROOM_NAMES[room])}\n{KEY[room]}", tr(ROOM_NAMES[room]), lambda room=room: go(room), "rail"
+                f"{tr(ROOM_NAMES[room])}\n{KEY[room]}",
+                tr(ROOM_NAMES[room]),
+                lambda room=room: go(room),
+                "rail",
+                checkable=True,
             )
             for room in ROOMS
         }
-        for widget in self.buttons.values():
-            widget.setCheckable(True)
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
 

@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QStackedWidget, QWidget
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import Wrapped, button, hbox, panel, regrade, scrolled, vbox
+from daq_app.qt.parts import Panel, Wrapped, button, hbox, regrade, scrolled, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.window.view_course import CourseView
 from daq_app.window.view_trials import inspection
@@ -34,8 +34,8 @@ class Middle(QWidget):
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
         self.undo.hide()
         self._pages = QStackedWidget()
-        frame, inside = panel(tr("inspected trial"))
-        inside.addWidget(scrolled(self.trial))
+        frame = Panel(tr("inspected trial"))
+        vbox(scrolled(self.trial), on=frame, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)))
         for page in (self.live, frame):
             self._pages.addWidget(page)
         vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)

@@ -44,7 +44,6 @@ class ModelColumn(QWidget):
     said = Signal(str)  # what came of a picture or film that was written
 
     def __init__(self, tokens: Tokens, scale: float) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._state: AnalystState | None = None
         self._film: m.Filmed | None = None
@@ -64,14 +63,15 @@ class ModelColumn(QWidget):
         self.finger.sight.cut.connect(self._cut)
         for canvas in (self.finger, self.other):
             canvas.range_chosen.connect(self.fields.fix)
-        self.near = button(tr("Contact"), tr("show the contact alone, with its tractions"), self._paint, "small")
-        self.mesh = button(tr("Mesh"), tr("show the mesh"), self._paint, "small")
-        self.together = button(
-            tr("Both"), tr("show the finger of the compared session beside this one"), self._paint, "small"
+        self.near, self.mesh, self.together = (
+            button(text, name, self._paint, "small", checkable=True)
+            for text, name in (
+                (tr("Contact"), tr("show the contact alone, with its tractions")),
+                (tr("Mesh"), tr("show the mesh")),
+                (tr("Both"), tr("show the finger of the compared session beside this one")),
+            )
         )
         self.together.hide()
-        for widget in (self.near, self.mesh, self.together):
-            widget.setCheckable(True)
         self.history = button(tr("History"), tr("show the finger from first touch on"), self._ask_history, "small")
         self.film = button(tr("Film"), tr("save the history as a film, GIF or MP4"), self._ask_film, "small")
         self._filming = False

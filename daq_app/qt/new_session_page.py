@@ -11,14 +11,13 @@ from PySide6.QtWidgets import (
     QComboBox,
     QCompleter,
     QFileDialog,
-    QFrame,
     QRadioButton,
     QVBoxLayout,
     QWidget,
 )
 
 from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
-from daq_app.qt.parts import bare, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
+from daq_app.qt.parts import Panel, bare, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
@@ -46,7 +45,7 @@ HANDS: tuple[tuple[str, Hand | None], ...] = (
 )
 
 
-class NewSessionPage(QFrame):
+class NewSessionPage(Panel):
     """The left of the experimenter's window while no session is in hand."""
 
     changed = Signal()
@@ -56,9 +55,7 @@ class NewSessionPage(QFrame):
 
         Enter goes to the window, whose primary button begins.
         """
-        super().__init__()
-        self.setProperty("role", "panel")
-        self.setAccessibleName(tr("new session"))
+        super().__init__(tr("new session"))
         self._send = send
         self._act = act
         self._cards: tuple[Card, ...] = ()
@@ -66,8 +63,7 @@ class NewSessionPage(QFrame):
         self.frames = {name: CardFrame(name) for name in FIELDS}
         self.subject = entry(tr("subject code, never a name"))
         self._proposal = button("", tr("take the proposed code"), self._take_proposal, "small")
-        self.protocol = choice(tr("protocol"))
-        self.protocol.addItems([*protocol_names(), tr("choose a file …")])
+        self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = entry(tr("study, a folder of its own; may be empty"))
@@ -80,8 +76,7 @@ class NewSessionPage(QFrame):
         self.seed.setPlaceholderText(tr("a new one"))
         self.height_above = entry(tr("height of the face above the transducer's origin in millimetres; may be empty"))
         self.height_above.setPlaceholderText(tr("as stated"))
-        self.normal = choice(tr("axis of the transducer along which pressing is positive"))
-        self.normal.addItems([tr("as stated"), *AXES])
+        self.normal = choice(tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *AXES))
         self.area = entry(tr("contact area of finger and surface in square millimetres; may be empty"))
         self.area.setPlaceholderText(tr("as stated"))
         self.stroking, self.answering = _hands(tr("stroking hand")), _hands(tr("answering hand"))
@@ -360,6 +355,4 @@ class NewSessionPage(QFrame):
 
 
 def _hands(name: str) -> QComboBox:
-    box = choice(name)
-    box.addItems([tr(words) for words, _ in HANDS])
-    return box
+    return choice(name, (tr(words) for words, _ in HANDS))

@@ -11,7 +11,6 @@ class PaintedWidget(QWidget):
     """Takes all the room there is; a subclass paints the ground, and in its `paintEvent` upon it."""
 
     def __init__(self) -> None:
-        """Begin without a ground."""
         super().__init__()
         self._ground: QPixmap | None = None  # what stands still ...
         self.theme = LIGHT  # ... and the theme in which it was painted

@@ -43,6 +43,15 @@ def label(text: str = "", role: str = "value", *, wrap: bool = False) -> QLabel:
     return text_label
 
 
+class Panel(QFrame):
+    """A frame with a role of the style sheet and a name for screen readers."""
+
+    def __init__(self, name: str = "", role: str = "panel") -> None:
+        super().__init__()
+        self.setProperty("role", role)
+        self.setAccessibleName(name)
+
+
 class Wrapped(QLabel):
     """A label of as many lines as its text needs at the width it has, a long path too.
 
@@ -90,13 +99,14 @@ class Wrapped(QLabel):
         self.setFixedHeight(needed)
 
 
-def button(text: str, name: str, does: Callable[[], object], role: str = "") -> QPushButton:
-    """Return a button that says `name` to screen readers."""
+def button(text: str, name: str, does: Callable[[], object], role: str = "", *, checkable: bool = False) -> QPushButton:
+    """Return a button that says `name` to screen readers, and with `checkable` stays pressed until the next press."""
     push = QPushButton(text)
     push.setAccessibleName(name)
     if role:
         push.setProperty("role", role)
     push.setAutoDefault(False)
+    push.setCheckable(checkable)
     push.clicked.connect(lambda: does())
     return push
 
@@ -131,9 +141,10 @@ class _Choice(QComboBox):
         event.ignore()
 
 
-def choice(name: str) -> QComboBox:
+def choice(name: str, entries: Iterable[str] = ()) -> QComboBox:
     """Return a list to choose from that says `name` to screen readers, and takes the room it is given."""
     box = _Choice(name)
+    box.addItems(list(entries))
     box.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
     return box
 
@@ -209,9 +220,10 @@ def named(values: Iterable[tuple[str, QWidget]], across: int = 1) -> QGridLayout
     grid = QGridLayout()
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
+    place = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # beside what may wrap
     for at, (name, widget) in enumerate(values):
         row, column = at // across, 2 * (at % across)
-        grid.addWidget(label(name, "quiet"), row, column, Qt.AlignmentFlag.AlignTop)
+        grid.addWidget(label(name, "quiet"), row, column, place)
         grid.addWidget(widget, row, column + 1)
         grid.setColumnStretch(column + 1, 1)
     return grid
@@ -226,17 +238,6 @@ def scrolled(inside: QWidget, area: QScrollArea | None = None) -> QScrollArea:
     inside.setObjectName("inside")
     area.setStyleSheet("QScrollArea, QWidget#inside { background: transparent; border: none; }")
     return area
-
-
-def panel(name: str) -> tuple[QFrame, QVBoxLayout]:
-    """Return a framed panel with a name for screen readers, and its layout."""
-    frame = QFrame()
-    frame.setProperty("role", "panel")
-    frame.setAccessibleName(name)
-    layout = QVBoxLayout(frame)
-    layout.setContentsMargins(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID))
-    layout.setSpacing(GRID)
-    return frame, layout
 
 
 def regrade(widget: QWidget, value: str, of: str = "grade") -> None:

@@ -49,7 +49,6 @@ class PictureView(QWidget):
     """A picture made for paper."""
 
     def __init__(self, what: str, save: Save) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._canvas = _Canvas()
         self.save = SaveButtons(what, save)
@@ -96,7 +95,6 @@ class ComparedView(QWidget):
     """Offers to open a second session, and shows what came of it."""
 
     def __init__(self, choose: Callable[[], object], save: Save) -> None:
-        """Show nothing yet."""
         super().__init__()
         self.words = label("", "quiet", wrap=True)
         self.choose = button(tr("Compare with…"), tr("compare with another session"), choose)

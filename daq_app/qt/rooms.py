@@ -24,7 +24,6 @@ class ReviewRoom(QWidget):
     """One session at a time; another takes its place."""
 
     def __init__(self, scale: float) -> None:
-        """Show no session."""
         super().__init__()
         self.analyst: AnalystWindow | None = None
         self.recent = QListWidget()

@@ -88,7 +88,6 @@ class RulerCheck(QWidget):
     done = Signal()
 
     def __init__(self, scale: float) -> None:
-        """Build the page."""
         super().__init__()
         self._screen: QScreen | None = None
         self._line = _Line()

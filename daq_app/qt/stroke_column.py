@@ -27,7 +27,6 @@ class StrokeColumn(QWidget):
     replayed = Signal()  # to the end of the trial
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._stroke: StrokeFinding | None = None
         self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet

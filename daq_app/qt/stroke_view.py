@@ -29,7 +29,6 @@ class EdgeHandle(QPushButton):
     recorded = Signal(str, float)  # likewise
 
     def __init__(self, edge: Edge) -> None:
-        """Stand for no stroke yet."""
         super().__init__()
         self.edge: Edge = edge
         self._placed: Placed | None = None
@@ -106,7 +105,6 @@ class StrokeView(QWidget):
     moved = Signal(str, float)  # an edge, and the instant it was moved to [s, device time]
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._tokens = tokens
         self._stroke: StrokeFinding | None = None

@@ -97,7 +97,6 @@ class Thumbnail(SubjectPicture):
     """Shows the first page with a question; nothing while the form's protocol or study is refused."""
 
     def __init__(self, scale: float) -> None:
-        """Show nothing yet."""
         super().__init__(scale, QSize(1000, 640))
         self._drawn: object = None  # what the picture was drawn from
         self.setFixedHeight(round(THUMBNAIL_HEIGHT * min(scale, 1.4)))
@@ -122,7 +121,6 @@ class Mirror(QWidget):
     """
 
     def __init__(self, scale: float) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._scale = scale
         self._view: SubjectView | None = None

@@ -126,7 +126,6 @@ class ReadingsTable(QWidget):
     """A table with the place of its numbers above it."""
 
     def __init__(self) -> None:
-        """Show nothing yet."""
         super().__init__()
         self.place = Wrapped("quiet")
         self.table = CopiedTable(tr("raw readings"))  # in the order in which they came

@@ -38,34 +38,20 @@ class Tokens:
         return self.text
 
 
-LIGHT = Tokens(
-    dark=False,
-    ground="#eceeef",
-    surface="#f8f9f9",
-    raised="#ffffff",
-    line="#c3c8cb",
-    text="#14181a",
-    quiet="#535c61",
-    act="#0b5a8a",
-    on_act="#ffffff",
-    wrong="#b3261e",
-    look="#8a5a00",
-    record="#c5221f",
-)
-DARK = Tokens(
-    dark=True,
-    ground="#16191b",
-    surface="#1e2224",
-    raised="#2a2f32",
-    line="#454c50",
-    text="#eef1f2",
-    quiet="#a4adb2",
-    act="#7cc4f0",
-    on_act="#0b1a24",
-    wrong="#ff8a80",
-    look="#f3c15c",
-    record="#ff5a52",
-)
+_COLOURS = {  # of the light and of the dark theme
+    "ground": ("#eceeef", "#16191b"),
+    "surface": ("#f8f9f9", "#1e2224"),
+    "raised": ("#ffffff", "#2a2f32"),
+    "line": ("#c3c8cb", "#454c50"),
+    "text": ("#14181a", "#eef1f2"),
+    "quiet": ("#535c61", "#a4adb2"),
+    "act": ("#0b5a8a", "#7cc4f0"),
+    "on_act": ("#ffffff", "#0b1a24"),
+    "wrong": ("#b3261e", "#ff8a80"),
+    "look": ("#8a5a00", "#f3c15c"),
+    "record": ("#c5221f", "#ff5a52"),
+}
+LIGHT, DARK = (Tokens(dark=bool(at), **{name: pair[at] for name, pair in _COLOURS.items()}) for at in (0, 1))
 
 
 def current_tokens() -> Tokens:

@@ -27,7 +27,6 @@ class TrialsColumn(QWidget):
     responded = Signal(object)
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show nothing yet."""
         super().__init__()
         self._tokens = tokens
         self._listed: tuple[str, ...] = ()

@@ -38,7 +38,6 @@ class ZoomedPlot(pg.PlotWidget):
     read: Callable[[float], str] | None = None
 
     def __init__(self, tokens: Tokens) -> None:
-        """Show nothing yet."""
         base: Any = super()
         base.__init__(background=tokens.surface)
         scale = type_scale()

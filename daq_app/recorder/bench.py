@@ -79,7 +79,6 @@ class Bench:
     """At most one transducer. Its readings are shown while no session runs; a session takes it by `lent`."""
 
     def __init__(self, clock: Clock, display: Display, send: Callable[[Report], None]) -> None:
-        """Hold none yet."""
         self._clock = clock
         self._display = display
         self._send = send

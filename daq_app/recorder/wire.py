@@ -42,7 +42,6 @@ class Splitter:
     """Cuts a stream of bytes into the bodies of messages, however it was cut before."""
 
     def __init__(self) -> None:
-        """Start with nothing received."""
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:

@@ -156,7 +156,6 @@ class SyntheticPeople(DueEvents):
         planned: SessionPlan,
         spoilt: Spoilt,
     ) -> None:
-        """Let the subject stroke and judge as planned, but for what is to be spoilt."""
         super().__init__(clock)
         self._subject, self._bench, self._transducer = subject, bench, transducer
         self._plan, self._spoilt = planned, spoilt

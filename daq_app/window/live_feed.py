@@ -5,11 +5,12 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live, Report, Six
 from daq_app.window.bench_load import Load, load_of
-from daq_app.window.live_trace import CHANNELS, LiveTrace
+from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
+ARRAYS = ("sequence", "time", "received_ns", "wrench", "status")  # of live readings
 KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
 
 
@@ -40,23 +42,14 @@ def _run(report: Report) -> tuple[int, Six] | None:
 
 
 def _joined(lives: list[Live]) -> Live:
-    return Live(
-        lives[0].stream,
-        np.concatenate([live.sequence for live in lives]),
-        np.concatenate([live.time for live in lives]),
-        np.concatenate([live.received_ns for live in lives]),
-        np.concatenate([live.wrench for live in lives]),
-        np.concatenate([live.status for live in lives]),
-        lives[0].zero,
-        sum(live.left_out for live in lives),
-    )
+    arrays = {name: np.concatenate([getattr(live, name) for live in lives]) for name in ARRAYS}
+    return structs.replace(lives[0], **arrays, left_out=sum(live.left_out for live in lives))
 
 
 class LiveFeed:
     """Everything of the stream that is shown now. One per window."""
 
     def __init__(self) -> None:
-        """Start with no transducer."""
         self.trace = LiveTrace(1000.0)
         self._info: TransducerInfo | None = None
         self._stream: int | None = None
@@ -86,7 +79,7 @@ class LiveFeed:
             self._tail = _Tail.empty()
             self._sequence = None
             self.trace.clear()
-        time, drawn = _with_gaps(live.time, self._channels(live, frame), live.sequence, self._sequence)
+        time, drawn = broken(live.time, self._channels(live, frame), _missing(live.sequence, self._sequence))
         self._sequence = int(live.sequence[-1])
         self._keep(live)
         self.trace.add(time, drawn)
@@ -95,17 +88,11 @@ class LiveFeed:
 
     def take(self) -> ReadingBlock:
         """Return the readings of the take in hand, as a wrench: N, N mm."""
-        lives = list(self._take)
-        if not lives:
+        if not self._take:
             return ReadingBlock.empty()
-        sequence = np.concatenate([live.sequence for live in lives])
+        whole = _joined(list(self._take))
         return ReadingBlock(
-            sequence,
-            sequence,
-            np.concatenate([live.status for live in lives]),
-            np.concatenate([live.time for live in lives]),
-            np.concatenate([live.received_ns for live in lives]),
-            np.concatenate([live.wrench for live in lives]),
+            whole.sequence, whole.sequence, whole.status, whole.time, whole.received_ns, raw=whole.wrench
         )
 
     def _keep(self, live: Live) -> None:
@@ -130,14 +117,9 @@ class LiveFeed:
         return np.where(live.status == 0, drawn, np.nan)
 
 
-def _with_gaps(time: Array, drawn: Array, sequence: NDArray[np.int64], before: int | None) -> tuple[Array, Array]:
-    """Return times (n,) and what is drawn (channels, n), with nan where readings are missing: a line is no reading."""
-    first = sequence[0] - 1 if before is None else before
-    gaps = np.flatnonzero(np.diff(sequence, prepend=first) > 1)
-    if not len(gaps):
-        return time, drawn
-    times: Array = np.insert(time, gaps, time[gaps])
-    return times, np.insert(drawn, gaps, np.nan, axis=1)
+def _missing(sequence: NDArray[np.int64], before: int | None) -> NDArray[np.int64]:
+    """Return the places of readings before which others are missing."""
+    return np.flatnonzero(np.diff(sequence, prepend=sequence[0] - 1 if before is None else before) > 1)
 
 
 class _Tail:

@@ -10,7 +10,7 @@ from contextlib import suppress
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from daq_app.child_process import fresh_processes, give_way
+from daq_app.child_process import begin, give_way
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
 from daq_app.wording import tr
@@ -63,7 +63,6 @@ class LiveModel:
     """The live model as the window sees it. `add` and `poll` never wait for it."""
 
     def __init__(self) -> None:
-        """Start nothing yet."""
         self.said: Provisional | None = None  # the newest
         self.settled: Settled | None = None  # of the last stroke; None again once another begins
         self.problem = ""  # why nothing is said; empty where all is well
@@ -81,12 +80,8 @@ class LiveModel:
         """Start the process; it follows the published finger until a plan tells of another."""
         if self._process is not None:
             return
-        context = fresh_processes()
-        ours, theirs = context.Pipe()
-        self._process = context.Process(target=run, args=(theirs,), daemon=True, name="live model")
-        self._process.start()
-        theirs.close()
-        self._connection, self._under_way, self.problem = ours, 0, ""
+        self._process, self._connection = begin(run, name="live model")
+        self._under_way, self.problem = 0, ""
         self._use()
 
     def close(self) -> None:

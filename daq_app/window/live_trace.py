@@ -158,6 +158,10 @@ def _with_gaps(time: Array, values: Array, gaps: NDArray[np.int64], each: int) -
     """Return the columns with a nan behind those named in `gaps`; each column is `each` points."""
     if not len(gaps):
         return Columns(time, values)
-    behind = (gaps + 1) * each
-    times: Array = np.insert(time, behind, time[behind])
-    return Columns(times, np.insert(values, behind, np.nan, axis=1))
+    return Columns(*broken(time, values, (gaps + 1) * each))
+
+
+def broken(time: Array, values: Array, at: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return times (n,) and values (channels, n) with a nan before the places `at`: a line there is no reading."""
+    times: Array = np.insert(time, at, time[at])
+    return times, np.insert(values, at, np.nan, axis=1)

@@ -85,7 +85,6 @@ class ModelTrace:
     """The SED at the receptor over the last minute, for a plot."""
 
     def __init__(self) -> None:
-        """Start with nothing."""
         self._trace = LiveTrace(1.0 / STEP, channels=len(CHANNELS), gap=GAP)
         self._stream: int | None = None
 

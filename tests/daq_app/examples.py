@@ -14,27 +14,20 @@ speed = 39.0
 
 def short_protocol(name, title, sticky, slippery):
     """Return a protocol of a few of the surfaces of sensotact-friction, by their indices, as a file holds it."""
+    head = f'name = "{name}"\ntitle = "{title}"\nlabel_seed = 1\ncontact_angle = 45.0\n'
+    away = _block("stickiness", "proximal to distal", 2.0, sticky, "Push your finger once away from you.", "sticky")
+    back = _block("slipperiness", "distal to proximal", 1.5, slippery, "Pull your finger once towards you.", "slippery")
+    return head + away + back
+
+
+def _block(name, direction, depth, indices, instruction, most):
     return f"""
+[[blocks]]
 name = "{name}"
-title = "{title}"
-label_seed = 1
-contact_angle = 45.0
-
-[[blocks]]
-name = "stickiness"
-descriptor = "stickiness"
-direction = "proximal to distal"
-indentation = 2.0
-indices = {sticky}
-instruction = "Push your finger once away from you."
-scale_ends = ["not sticky at all", "as sticky as can be"]
-
-[[blocks]]
-name = "slipperiness"
-descriptor = "slipperiness"
-direction = "distal to proximal"
-indentation = 1.5
-indices = {slippery}
-instruction = "Pull your finger once towards you."
-scale_ends = ["not slippery at all", "as slippery as can be"]
+descriptor = "{name}"
+direction = "{direction}"
+indentation = {depth}
+indices = {indices}
+instruction = "{instruction}"
+scale_ends = ["not {most} at all", "as {most} as can be"]
 """

@@ -95,15 +95,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     afferent = _afferent(options)
     scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
     console.note(ignored or None)
-    choices = PredictionOptions(
-        tau_reading=options.tau,
-        scene=scene,
-        indentation=options.indentation,
-        kinematics=options.kinematics,
-        variants=options.variants,
-        intervals=options.intervals,
-        variant_intervals=options.intervals,
-    )
+    stated = {name: getattr(options, name) for name in ("indentation", "kinematics", "variants", "intervals")}
+    choices = PredictionOptions(options.tau, scene=scene, variant_intervals=options.intervals, **stated)
     recording = open_visit(options.session, options.subject)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
     prediction = predict_session(recording, analysis, console, choices, afferent if options.afferent else None)

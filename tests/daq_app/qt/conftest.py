@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication
 
 from daq_app.qt.screens import settings
 from daq_app.qt.start import opened
+from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
@@ -61,6 +62,30 @@ def application(tmp_path_factory):
     QSettings.setDefaultFormat(QSettings.Format.IniFormat)
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(tmp_path_factory.mktemp("settings")))
     return QApplication.instance() or QApplication([])
+
+
+@pytest.fixture
+def subject_page(application):
+    """Return a function that shows a view in a window for the subject, at a scale of the fonts."""
+    windows = []
+
+    def shown(view, scale, size, direction=None, style="", hand=None):
+        window = SubjectWindow(scale, lambda: 0.0)
+        windows.append(window)
+        window.setStyleSheet(style)
+        if direction is not None:
+            window.setLayoutDirection(direction)
+        window.resize(*size)
+        window.show()
+        window.show_view(view, hand)
+        for _ in range(3):
+            application.processEvents()
+        return window
+
+    yield shown
+    for window in windows:
+        window.hide()
+        window.deleteLater()
 
 
 @pytest.fixture(scope="module")

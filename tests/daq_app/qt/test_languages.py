@@ -7,7 +7,6 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
 from daq_app.qt import languages
-from daq_app.qt.subject_window import SubjectWindow
 from daq_app.window.subject_texts import SubjectText
 from daq_app.window.view_subject import SubjectView
 from daq_app.wording import SUBJECT, translations
@@ -19,23 +18,9 @@ NAMES = ("{number}", "{count}", "{code}", "{low}", "{high}", "{score}")
 
 
 @pytest.fixture
-def shown(application):
+def shown(subject_page):
     """Return a function that shows the subject's page at a size of type."""
-    made = []
-
-    def window(view, scale=1.0, size=(900, 560)):
-        page = SubjectWindow(scale, lambda: 0.0)
-        made.append(page)
-        page.resize(*size)
-        page.show()
-        page.show_view(view, None)
-        application.processEvents()
-        return page
-
-    yield window
-    for page in made:
-        page.hide()
-        page.deleteLater()
+    return lambda view, scale=1.0, size=(900, 560): subject_page(view, scale, size)
 
 
 @pytest.mark.parametrize("language", OTHERS)

@@ -64,11 +64,16 @@ def test_a_tile_shows_the_stroke_of_its_trial_until_the_next_onset(driver):
     assert middle.trial.isVisible()  # a session that is over can be looked through
 
 
-def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(driver):
-    window, live = driver.window, driver.window.live
-    window.resize(1920, 1000)
+def at_size(driver, *size):
+    """Return the window and its signals, the window being of a size and having the keyboard."""
+    driver.window.resize(*size)
     driver.application.processEvents()
-    window.setFocus()
+    driver.window.setFocus()
+    return driver.window, driver.window.live
+
+
+def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(driver):
+    window, live = at_size(driver, 1920, 1000)
     try:
         assert live.map.isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
@@ -99,10 +104,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
 
 
 def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_stroke(driver):
-    window, live = driver.window, driver.window.live
-    window.resize(1000, 700)
-    driver.application.processEvents()
-    window.setFocus()
+    window, live = at_size(driver, 1000, 700)
     try:
         assert live.plots[0].isVisible()
         assert not live.plots[3].isVisible()

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel
 
 from daq_app.qt import tokens
 from daq_app.qt.indicators import FULL, PressBar
-from daq_app.qt.subject_window import LARGER, SubjectWindow
+from daq_app.qt.subject_window import LARGER
 from daq_app.window.view_subject import SubjectView
 from tests.daq_app.qt.written_text import cut_off
 
@@ -24,26 +24,13 @@ READING = [(GERMAN, LEFT_TO_RIGHT), (JAPANESE, LEFT_TO_RIGHT), (ARABIC, RIGHT_TO
 
 
 @pytest.fixture
-def page(application):
-    """Return a function that shows a view in a window for the subject, at a scale of the fonts."""
-    made = []
+def page(subject_page):
+    """Return a function that shows a view in a window for the subject, in the program's own style."""
 
     def shown(view, scale, direction=LEFT_TO_RIGHT, size=(1366, 768)):
-        window = SubjectWindow(scale, lambda: 0.0)
-        made.append(window)
-        window.setStyleSheet(tokens.style_sheet(tokens.LIGHT, scale))
-        window.setLayoutDirection(direction)
-        window.resize(*size)
-        window.show()
-        window.show_view(view, "right")
-        for _ in range(3):
-            application.processEvents()
-        return window
+        return subject_page(view, scale, size, direction, tokens.style_sheet(tokens.LIGHT, scale), "right")
 
-    yield shown
-    for window in made:
-        window.hide()
-        window.deleteLater()
+    return shown
 
 
 def box(widget):

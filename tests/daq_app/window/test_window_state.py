@@ -37,6 +37,9 @@ from drivers.transducer import Health
 from sessions.plan.plan import Frame, Shown
 from sessions.run import steps
 
+CUT_SHORT = (*MOUNT, m.SessionEnded("recordings/P07", LOST, True))
+RESUME = m.ResumeSession("recordings/P07")
+
 
 @pytest.mark.parametrize(
     ("messages", "words", "label", "sends"),
@@ -50,12 +53,7 @@ from sessions.run import steps
         (PAUSED, "Paused", "Resume", steps.Resume()),
         (CLOSING, "Every trial is done", "End session", steps.Finish()),
         ((*CLOSING, m.SessionEnded("recordings/P07", END, False)), "Session ended", "New session", NewSession()),
-        (
-            (*MOUNT, m.SessionEnded("recordings/P07", LOST, True)),
-            "cut short",
-            "Resume session",
-            m.ResumeSession("recordings/P07"),
-        ),
+        (CUT_SHORT, "cut short", "Resume session", RESUME),
     ],
 )
 def test_one_sentence_says_what_to_do_now_and_one_button_does_it(messages, words, label, sends):
@@ -190,19 +188,9 @@ def test_a_session_that_has_ended_shows_no_recording():
             m.AcknowledgeOverloads(),
         ),
         ((*MOUNT, DrawingFailed("ValueError: x")), "look", "the recording goes on", Dismissed()),
-        (
-            (*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")),
-            "wrong",
-            "signal 9",
-            m.ResumeSession("recordings/P07"),
-        ),
+        ((*MOUNT, m.Gone(False, "the recorder has ended unexpectedly (signal 9)")), "wrong", "signal 9", RESUME),
         ((*MOUNT, m.Failed("StartSession", "the disk is full", "RecordingError")), "wrong", "the disk is full", None),
-        (
-            (*MOUNT, m.SessionEnded("recordings/P07", LOST, True)),
-            "wrong",
-            "the cable was pulled",
-            m.ResumeSession("recordings/P07"),
-        ),
+        (CUT_SHORT, "wrong", "the cable was pulled", RESUME),
     ],
 )
 def test_what_is_wrong_is_one_banner_with_what_can_be_done(messages, grade, words, sends):
