@@ -91,7 +91,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     _logarithmic(axes)
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
     name = f"speed-{time.removesuffix('_s')}"
-    header = ("way", "element", "order", "linear solver", "unknowns", "largest true error [-]", "median time [s]")
+    header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
     return Panel(
         name, f"Time against true error, {title}", svg(drawn, name, title, simulated=False), header, tuple(table)
     )

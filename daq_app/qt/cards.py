@@ -2,9 +2,10 @@
 
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from daq_app.qt.parts import Panel, button, choice, fill, hbox, label, regrade, say, vbox
@@ -58,6 +59,8 @@ class CardFrame(Panel):
 class CutShort(Panel):
     """Lists the sessions that can go on; without one it is not seen."""
 
+    _listed = Signal(object)  # from a thread
+
     def __init__(self, send: Callable[[Message], None]) -> None:
         """Offer nothing; `send` takes what is asked for."""
         super().__init__("", "banner")
@@ -67,23 +70,18 @@ class CutShort(Panel):
         self._sessions = choice(tr("sessions that were cut short"))
         self.go_on = button(tr("Go on with it"), tr("go on with the session that was cut short"), self._resumed)
         fill(QVBoxLayout(self), label(tr("▲ Sessions that were cut short"), wrap=True), self._sessions, self.go_on)
+        self._listed.connect(self.show_sessions, Qt.ConnectionType.QueuedConnection)
         self.show_sessions(())
 
     def look_in(self, folder: Path) -> None:
         """Look for such sessions in a folder, without holding up the window."""
-        results: list[tuple[Unfinished, ...]] = []
-        worker = threading.Thread(target=lambda: results.append(unfinished(folder)), daemon=True)
-        worker.start()
-        self._looking = timer = QTimer(self)
-        timer.setInterval(100)
 
         def look() -> None:
-            if not worker.is_alive():
-                timer.stop()
-                self.show_sessions(results[0] if results else ())
+            sessions = unfinished(folder)
+            with suppress(RuntimeError):  # the page is gone by now
+                self._listed.emit(sessions)
 
-        timer.timeout.connect(look)
-        timer.start()
+        threading.Thread(target=look, daemon=True).start()
 
     def show_sessions(self, sessions: tuple[Unfinished, ...]) -> None:
         """Offer these sessions."""

@@ -12,12 +12,11 @@ from PySide6.QtWidgets import (
     QCompleter,
     QFileDialog,
     QRadioButton,
-    QVBoxLayout,
     QWidget,
 )
 
 from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
-from daq_app.qt.parts import Panel, bare, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
+from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
 from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
@@ -62,7 +61,9 @@ class NewSessionPage(Panel):
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
         self.subject = entry(tr("subject code, never a name"))
-        self._proposal = button("", tr("take the proposed code"), self._take_proposal, "small")
+        self._proposal = button(
+            "", tr("take the proposed code"), lambda: self.subject.setText(self._proposal.text()), "small"
+        )
         self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
@@ -72,13 +73,13 @@ class NewSessionPage(Panel):
         self.studies.setLineEdit(self.study)
         self.folder = entry(tr("folder in which sessions are kept"))
         self.folder.setText("recordings")
-        self.seed = entry(tr("seed of the stimulus order; empty for a new one"))
-        self.seed.setPlaceholderText(tr("a new one"))
-        self.height_above = entry(tr("height of the face above the transducer's origin in millimetres; may be empty"))
-        self.height_above.setPlaceholderText(tr("as stated"))
+        self.seed = entry(tr("seed of the stimulus order; empty for a new one"), tr("a new one"))
+        self.height_above = entry(
+            tr("height of the face above the transducer's origin in millimetres; may be empty"), tr("as stated")
+        )
         self.normal = choice(tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *AXES))
-        self.area = entry(tr("contact area of finger and surface in square millimetres; may be empty"))
-        self.area.setPlaceholderText(tr("as stated"))
+        words = tr("contact area of finger and surface in square millimetres; may be empty")
+        self.area = entry(words, tr("as stated"))
         self.stroking, self.answering = _hands(tr("stroking hand")), _hands(tr("answering hand"))
         self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
         self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
@@ -275,27 +276,43 @@ class NewSessionPage(Panel):
         self.subject.setPlaceholderText(tr("e.g. {code}", code=code))
         self._proposal.setText(code)
 
-    def _take_proposal(self) -> None:
-        self.subject.setText(self._proposal.text())
-
     def _build(self, scale: float) -> None:
+        height = field(tr("Height of the face above the transducer's origin [mm]"), self.height_above)
+        vbox(height, field(tr("Axis along which pressing is positive"), self.normal), on=self._height)
+        vbox(field(tr("Contact area, for tau_max [mm²]"), self.area), on=self._area)
+        other = button("…", tr("choose the folder of sessions"), self._choose_folder)
+        columns = (
+            {
+                "Subject": (
+                    field(tr("Subject code"), self.subject, self._proposal),
+                    self._enrol,
+                    field(tr("Stroking hand"), self.stroking),
+                    field(tr("Answering hand"), self.answering),
+                ),
+                "Transducer": (self.transducer, self.with_forces, self.scores_only, self._height, self._area),
+                "Subject's screen": (self.screen_fields,),
+            },
+            {
+                "Study and protocol": (
+                    field(tr("Study, may be empty"), self.studies),
+                    field(tr("Protocol"), self.protocol),
+                    self.pre_evaluation,
+                    self.practice,
+                    field(tr("Seed of the order"), self.seed),
+                    label(tr("Who strokes and scores"), "quiet", wrap=True),
+                    hbox(self.people_score, self.simulated, 1),
+                    self._people_words,
+                    self._preview,
+                    self._pilot,
+                ),
+                "Disk": (field(tr("Folder"), self.folder, other),),
+            },
+        )
+        for name, parts in (columns[0] | columns[1]).items():
+            fill(self.frames[name].body, *parts)
+        left, right = (vbox(*(self.frames[name] for name in names), 1, spacing=GRID) for names in columns)
+        self._columns = vbox((left, 1), (right, 1))
         inside = QWidget()
-        self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom)
-        left, right = QVBoxLayout(), QVBoxLayout()
-        for column in (left, right):
-            column.setSpacing(GRID)
-            self._columns.addLayout(column, 1)
-        for column, name, build in (
-            (left, "Subject", self._build_subject),
-            (left, "Transducer", self._build_recorded),
-            (left, "Subject's screen", self._build_screen),
-            (right, "Study and protocol", self._build_study),
-            (right, "Disk", self._build_disk),
-        ):
-            column.addWidget(self.frames[name])
-            build(self.frames[name].body)
-        for column in (left, right):
-            column.addStretch(1)
         vbox(label(tr("New session"), "title"), self.cut_short, self._columns, 1, on=inside, margins=GRID, spacing=GRID)
         vbox(scrolled(inside), on=self, margins=2)
         self._two = round(TWO * scale)
@@ -312,46 +329,6 @@ class NewSessionPage(Panel):
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange:
             self._place_changed()
-
-    def _build_study(self, layout: QVBoxLayout) -> None:
-        """Lay out in which study and by which protocol, and whether it is rehearsed."""
-        field(layout, tr("Study, may be empty"), self.studies)
-        field(layout, tr("Protocol"), self.protocol)
-        fill(layout, self.pre_evaluation, self.practice)
-        field(layout, tr("Seed of the order"), self.seed)
-        fill(
-            layout,
-            label(tr("Who strokes and scores"), "quiet", wrap=True),
-            hbox(self.people_score, self.simulated, 1),
-            self._people_words,
-            self._preview,
-            self._pilot,
-        )
-
-    def _build_subject(self, layout: QVBoxLayout) -> None:
-        """Lay out who takes part."""
-        field(layout, tr("Subject code"), self.subject, self._proposal)
-        layout.addWidget(self._enrol)
-        field(layout, tr("Stroking hand"), self.stroking)
-        field(layout, tr("Answering hand"), self.answering)
-
-    def _build_recorded(self, layout: QVBoxLayout) -> None:
-        """Lay out the transducer, what is recorded, and what the analysis must know of the face."""
-        fill(layout, self.transducer, self.with_forces, self.scores_only)
-        of_height = bare(QVBoxLayout(self._height))
-        field(of_height, tr("Height of the face above the transducer's origin [mm]"), self.height_above)
-        field(of_height, tr("Axis along which pressing is positive"), self.normal)
-        layout.addWidget(self._height)
-        of_area = bare(QVBoxLayout(self._area))
-        field(of_area, tr("Contact area, for tau_max [mm²]"), self.area)
-        layout.addWidget(self._area)
-
-    def _build_screen(self, layout: QVBoxLayout) -> None:
-        layout.addWidget(self.screen_fields)
-
-    def _build_disk(self, layout: QVBoxLayout) -> None:
-        other = button("…", tr("choose the folder of sessions"), self._choose_folder)
-        field(layout, tr("Folder"), self.folder, other)
 
 
 def _hands(name: str) -> QComboBox:

@@ -260,12 +260,12 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
         widget.setAccessibleName(f"{name} {text or tr('nothing')}")
 
 
-def field(layout: QVBoxLayout, words: str, widget: QWidget, *more: QWidget) -> None:
-    """Put words over the field that they ask for, and what stands beside it."""
+def field(words: str, widget: QWidget, *more: QWidget) -> QVBoxLayout:
+    """Return words over the field that they ask for, and what stands beside it."""
     caption = label(words, "quiet", wrap=True)
     if not isinstance(widget, _Choice):  # it has a label of its own
         caption.setBuddy(widget)
-    fill(layout, caption, hbox((widget, 1), *more))
+    return vbox(caption, hbox((widget, 1), *more), spacing=4)
 
 
 def tick(words: str, name: str) -> QCheckBox:
@@ -276,8 +276,9 @@ def tick(words: str, name: str) -> QCheckBox:
     return box
 
 
-def entry(name: str) -> QLineEdit:
-    """Return a line to type in that says `name` to screen readers."""
+def entry(name: str, empty: str = "") -> QLineEdit:
+    """Return a line to type in that says `name` to screen readers, and shows `empty` while it is."""
     line = QLineEdit()
+    line.setPlaceholderText(empty)
     line.setAccessibleName(name)
     return line

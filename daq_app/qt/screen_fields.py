@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSize
 from PySide6.QtGui import QPixmap
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from daq_app.qt.languages import missing_glyphs, name_of, translator
-from daq_app.qt.parts import bare, button, choice, field, fill
+from daq_app.qt.parts import button, choice, field, vbox
 from daq_app.qt.score_line import LENGTH
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.subject_picture import Thumbnail
@@ -37,9 +37,8 @@ class ScreenFields(QWidget):
         self.camera.hide()
         self._new_code = button(tr("New code"), tr("let another tablet in, by a new code"), lambda: act("tablet"))
         self._new_code.hide()
-        layout = bare(QVBoxLayout(self), 4)
-        field(layout, tr("Language that the subject reads"), self.language)
-        fill(layout, self.thumbnail, self._ruler, self.camera, self._new_code)
+        language = field(tr("Language that the subject reads"), self.language)
+        vbox(language, self.thumbnail, self._ruler, self.camera, self._new_code, on=self, spacing=4)
 
     def show_line(self, known: Millimetres, size: QSize) -> None:
         """Say how far the length of the subject's line can be trusted, in a window of a `size`."""
