@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, 
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Frame, Parts, View
+from daq_app.analyst.frame import FIELD_CHOICES, Frame, Parts, View
 from daq_app.analyst.probe import Line, probe_words
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
@@ -75,9 +75,9 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         base.__init__()
         self.sight = sight or Sight()
         self._tokens, self._font = tokens, font(SMALL, scale)
-        self._frame: Frame | None = None
+        self.frame: Frame | None = None
         self._parts = NO_PARTS
-        self._look = Look(FIELD_CHOICES[0], (0.0, 1.0))
+        self.look = Look(FIELD_CHOICES[0], (0.0, 1.0))
         self._words = ""
         self._fits: tuple[Frame, ...] = ()  # all of them are seen before anybody moves or zooms
         self._pointer: QPointF | None = None
@@ -109,11 +109,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     ) -> None:
         """Show a state, and how; what was moved or zoomed stays so. Frames that are `linked` with it fit in too."""
         fits = linked or (() if frame is None else (frame,))
-        if frame is self._frame and fits == self._fits and (words, look) == (self._words, self._look):
+        if frame is self.frame and fits == self._fits and (words, look) == (self._words, self.look):
             return
-        if look.near != self._look.near:
+        if look.near != self.look.near:
             self.sight.part = None
-        self._frame, self._parts, self._words, self._look, self._fits = frame, parts, words, look, fits
+        self.frame, self._parts, self._words, self.look, self._fits = frame, parts, words, look, fits
         self.setAccessibleName(words or tr("finger of the model: none"))
         low, high = look.range
         self._bar.rounding = (high - low) / 100.0
@@ -131,17 +131,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def words_at(self, place: tuple[float, float]) -> str:
         """Return what is at a place [mm]; "" without a finger."""
-        return "" if self._frame is None else probe_words(self._frame, self._parts, self._look.field, *place)
-
-    @property
-    def frame(self) -> Frame | None:
-        """The state that is shown."""
-        return self._frame
-
-    @property
-    def field(self) -> FieldChoice:
-        """The field that is shown in colour."""
-        return self._look.field
+        return "" if self.frame is None else probe_words(self.frame, self._parts, self.look.field, *place)
 
     def draw(self, painter: QPainter, head: str) -> None:
         """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it."""
@@ -158,11 +148,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def paint_finger(self, painter: QPainter) -> None:
         """Paint the finger where the view box has it."""
-        if self._frame is not None:
+        if self.frame is not None:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setFont(self._font)
-            picture = FingerPainter(painter, self._tokens, self.view(), self._here(), self._frame, self._parts)
-            picture.paint(self._look, self._shades[self._look.field.signed], self.sight.line)
+            picture = FingerPainter(painter, self._tokens, self.view(), self._here(), self.frame, self._parts)
+            picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
 
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:  # noqa: ARG002, N802  Qt's name
         """Write what is said of the finger over it."""
@@ -236,21 +226,21 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def _probe(self) -> None:
         """Say which place is under the pointer."""
         at = self._pointer
-        inside = at is not None and self._frame is not None and self._here().contains(at)
+        inside = at is not None and self.frame is not None and self._here().contains(at)
         self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
 
     def _place(self) -> None:
         """Show the part that is looked at, or all of it at the foot of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
-        least = self._least * (1 if self._look.lost is None else 2)  # a place that is marked can be told from others
+        least = self._least * (1 if self.look.lost is None else 2)  # a place that is marked can be told from others
         self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other
         self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
         axis: Any = self._bar.getAxis("bottom")
-        words = QFontMetricsF(self._font).horizontalAdvance(self._look.field.axis)
-        name_axis(axis, self._look.field.axis if words < self.width() else f"[{self._look.field.unit}]")
+        words = QFontMetricsF(self._font).horizontalAdvance(self.look.field.axis)
+        name_axis(axis, self.look.field.axis if words < self.width() else f"[{self.look.field.unit}]")
         part, here = self.sight.part, self._box.rect()
         if part is None and self._fits and here.height() > 1.0:
-            boxes = np.array([whole_box(frame, self._look) for frame in self._fits])
+            boxes = np.array([whole_box(frame, self.look) for frame in self._fits])
             left, below = boxes.min(axis=0)[[0, 2]].tolist()
             right, high = boxes.max(axis=0)[[1, 3]].tolist()
             room = max(here.height() - line - 2.0, 1.0)  # over a line of words under the tractions

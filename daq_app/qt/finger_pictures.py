@@ -29,7 +29,7 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
     """Write what `canvas` shows as the suffix says: `.svg`, `.csv` or PNG. `head` stands over it. Raises OSError."""
     match path.suffix.lower():
         case ".csv":
-            frame, field = canvas.frame, canvas.field
+            frame, field = canvas.frame, canvas.look.field
             rows = io.StringIO()
             if frame is not None:
                 table = np.column_stack([frame.nodes, field.of(frame)])

@@ -15,7 +15,7 @@ from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import Columns
 from daq_app.window.stroke_quality import PICTURE
-from daq_app.window.view_trials import MARKS, Inspection, Tile
+from daq_app.window.view_trials import KINDS, Inspection, Tile
 from daq_app.wording import tr
 
 TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}  # of the style sheet
@@ -50,7 +50,7 @@ class TrialStrip(QScrollArea):
         while len(self.tiles) < len(tiles):
             self._add()
         for tile_button, tile in zip(self.tiles, tiles, strict=True):
-            text = f"{MARKS[tile.kind]} {tile.number}\n{tile.code}"
+            text = f"{KINDS[tile.kind][0]} {tile.number}\n{tile.code}"
             if tile_button.text() != text:
                 tile_button.setText(text)
             tile_button.setAccessibleName(tile.words)

@@ -82,16 +82,6 @@ class LivePanel(Panel):
         self.show_seconds(self._seconds)
         self.show_finite(settings().value(FINITE) == "yes")
 
-    @property
-    def holding(self) -> bool:
-        """Say whether the picture is held."""
-        return self._hold_time is not None
-
-    @property
-    def seconds(self) -> int:
-        """Return how many seconds are shown."""
-        return self._seconds
-
     def set_room(self, room: bool) -> None:
         """Say whether there is room for the stroke and an open drawer beside each other."""
         self.drawer.open.set_room(room)
@@ -199,7 +189,7 @@ class LivePanel(Panel):
             last = np.nextafter(now, np.inf)
             columns = self._model_trace.columns(now - self._seconds, last, self._columns())
             self._model_plot.show_columns(columns, now, (), clock)
-        if not self.finger.isVisible() or self.holding:
+        if not self.finger.isVisible() or self._hold_time is not None:
             return
         model = self._model
         words = model_words(model.said, model.settled, model.problem)

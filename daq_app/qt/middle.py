@@ -24,7 +24,7 @@ class Middle(QWidget):
         """Show no session; `act` does what a button stands for."""
         super().__init__()
         self._bridge = bridge
-        self._inspected: int | None = None  # number of the trial
+        self.inspected: int | None = None  # number of the trial that is; None where none is
         self._phase = ""  # of the session that was shown last
         self.strip = TrialStrip(scale, self.inspect)
         self.live = LivePanel(bridge.feed, bridge.model, scale)
@@ -39,11 +39,6 @@ class Middle(QWidget):
         for page in (self.live, frame):
             self._pages.addWidget(page)
         vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)
-
-    @property
-    def inspected(self) -> int | None:
-        """Return the number of the trial that is inspected; None where none is."""
-        return self._inspected
 
     def show_view(self, course: CourseView | None) -> None:
         """Show the session in hand, or that there is none."""
@@ -74,13 +69,13 @@ class Middle(QWidget):
 
     def inspect(self, number: int) -> None:
         """Show a trial; the one that is shown already gives way to the signals."""
-        self._inspected = None if number == self._inspected else number
+        self.inspected = None if number == self.inspected else number
         self._show_inspected()
 
     def toggle_inspection(self) -> None:
         """Inspect the trial whose stroke was looked at last, or else the one in hand; or go back."""
         session = self._bridge.state.session
-        number = self._inspected
+        number = self.inspected
         if number is None and session is not None:
             number = session.judged if session.judged is not None else session.trial
         if number is not None:
@@ -88,18 +83,18 @@ class Middle(QWidget):
 
     def leave(self) -> None:
         """Go back to the signals."""
-        if self._inspected is not None:
-            self.inspect(self._inspected)
+        if self.inspected is not None:
+            self.inspect(self.inspected)
 
     def toggle_drawer(self) -> None:
         """Open or close the drawer of the signals, which come back where a trial is inspected."""
-        if self._inspected is not None:
+        if self.inspected is not None:
             self.leave()
         else:
             self.live.toggle_drawer()
 
     def _show_inspected(self) -> None:
-        session, number = self._bridge.state.session, self._inspected
+        session, number = self._bridge.state.session, self.inspected
         shown = None if session is None or number is None else inspection(session, number)
         if shown is not None:
             self.trial.show_trial(shown)

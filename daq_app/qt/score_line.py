@@ -53,7 +53,7 @@ class ScoreLine(QAbstractSlider):
         super().__init__()
         self._now = now
         self._pixels_per_mm = 96 / 25.4
-        self._answer = Answer()
+        self.answer = Answer()
         self._ends = ("", "")
         self._ticks = 0
         self.setRange(0, 100)
@@ -65,11 +65,6 @@ class ScoreLine(QAbstractSlider):
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self._resize()
-
-    @property
-    def answer(self) -> Answer:
-        """Return the answer so far."""
-        return self._answer
 
     def speak(self, words: Translate) -> None:
         """Be named in another language to screen readers."""
@@ -85,7 +80,7 @@ class ScoreLine(QAbstractSlider):
     @property
     def answered(self) -> bool:
         """Say whether there is an answer."""
-        return self._answer.score is not None
+        return self.answer.score is not None
 
     def begin(self, ends: tuple[str, str], ticks: int = 0) -> None:
         """Begin another answer, with an empty line between these ends, and ticks where a protocol asks for them."""
@@ -94,7 +89,7 @@ class ScoreLine(QAbstractSlider):
 
     def answer_event(self, hand: Hand | None) -> Scored:
         """Return the answer."""
-        return self._answer.released().scored(hand)
+        return self.answer.released().scored(hand)
 
     def place_of(self, position: float) -> QPointF:
         """Return where a position from 0 to 100 lies in the widget."""
@@ -117,15 +112,15 @@ class ScoreLine(QAbstractSlider):
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Place the mark."""
         if event.button() == Qt.MouseButton.LeftButton:
-            self._take(self._answer.pressed(self._now(), self._position(event.position()), _device(event)))
+            self._take(self.answer.pressed(self._now(), self._position(event.position()), _device(event)))
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Move the mark along."""
-        self._take(self._answer.dragged(self._now(), self._position(event.position()), _device(event)))
+        self._take(self.answer.dragged(self._now(), self._position(event.position()), _device(event)))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Leave the mark where it is."""
-        self._take(self._answer.released())
+        self._take(self.answer.released())
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Place and move the mark with the keyboard."""
@@ -135,7 +130,7 @@ class ScoreLine(QAbstractSlider):
             return
         if self._mirrored and event.key() in (Qt.Key.Key_Left, Qt.Key.Key_Right):
             step = -step
-        self._take(self._answer.stepped(self._now(), step))
+        self._take(self.answer.stepped(self._now(), step))
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
         """Move nothing: a wheel is turned by mistake."""
@@ -157,7 +152,7 @@ class ScoreLine(QAbstractSlider):
         for number in range(1, self._ticks + 1):
             at = self.place_of(100.0 * number / (self._ticks + 1))
             painter.drawLine(at - QPointF(0, mm), at + QPointF(0, mm))
-        score = self._answer.positions[-1][1] if self._answer.positions else None
+        score = self.answer.positions[-1][1] if self.answer.positions else None
         if score is not None:
             at = self.place_of(score)
             painter.setPen(QPen(QColor(t.act), max(1.0 * mm, 3.0), Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
@@ -167,21 +162,21 @@ class ScoreLine(QAbstractSlider):
         now, place = self._now(), self._position(at)
         match event.type():
             case QEvent.Type.TouchBegin:
-                self._take(self._answer.pressed(now, place, "touch"))
+                self._take(self.answer.pressed(now, place, "touch"))
             case QEvent.Type.TouchUpdate:
-                self._take(self._answer.dragged(now, place, "touch"))
+                self._take(self.answer.dragged(now, place, "touch"))
             case _:
-                self._take(self._answer.released())
+                self._take(self.answer.released())
 
     def _moved(self, value: int) -> None:
         """Take a value that assistive technology sets."""
-        if value != round(self._answer.score or 0.0):
-            self._take(self._answer.pressed(self._now(), float(value), "keyboard").released())
+        if value != round(self.answer.score or 0.0):
+            self._take(self.answer.pressed(self._now(), float(value), "keyboard").released())
 
     def _take(self, answer: Answer) -> None:
-        if answer is self._answer:
+        if answer is self.answer:
             return
-        self._answer = answer
+        self.answer = answer
         self.setValue(round(answer.score or 0.0))
         self._name()
         self.update()
@@ -189,7 +184,7 @@ class ScoreLine(QAbstractSlider):
 
     def _name(self) -> None:
         """Say to screen readers what the line is, and where the answer lies."""
-        (low, high), score = self._ends, self._answer.score
+        (low, high), score = self._ends, self.answer.score
         self.setAccessibleName(self._words(Text.LINE).format(low=low, high=high))
         where = self._words(Text.UNANSWERED if score is None else Text.ANSWERED)
         self.setAccessibleDescription(where if score is None else where.format(score=f"{score:.0f}"))

@@ -34,34 +34,29 @@ class SubjectPicture(QWidget):
     def __init__(self, scale: float, size: QSize) -> None:
         """Show nothing yet; `size` is that of the subject's window."""
         super().__init__()
-        self._page = SubjectWindow(scale, lambda: 0.0)
-        self._page.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
-        self._page.resize(size)
+        self.page = SubjectWindow(scale, lambda: 0.0)  # draws the picture
+        self.page.setAttribute(Qt.WidgetAttribute.WA_DontShowOnScreen)
+        self.page.resize(size)
         self._view: SubjectView | None = None
         self._picture = QPixmap()
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setMinimumSize(160, 100)
 
-    @property
-    def page(self) -> SubjectWindow:
-        """Return the window that draws the picture."""
-        return self._page
-
     def show_page(self, view: SubjectView, size: QSize) -> None:
         """Show a page as it looks in a window of a size; where it asks, with the button that ends the answer."""
-        if (view, size) == (self._view, self._page.size()):
+        if (view, size) == (self._view, self.page.size()):
             return
-        self._page.resize(size)
+        self.page.resize(size)
         self._draw(view)
         self.setAccessibleName(tr("the subject's page: {title} {it}", title=view.title, it=view.text).strip())
 
     def _draw(self, view: SubjectView) -> None:
         self._view = view
-        self._page.show()  # nowhere: it only makes Qt lay it out
-        self._page.show_view(view, None)
-        self._page.next.setVisible(view.asks)
-        self._picture = self._page.grab()
-        self._page.hide()
+        self.page.show()  # nowhere: it only makes Qt lay it out
+        self.page.show_view(view, None)
+        self.page.next.setVisible(view.asks)
+        self._picture = self.page.grab()
+        self.page.hide()
         self.update()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name

@@ -83,27 +83,17 @@ class Bench:
         self._display = display
         self._send = send
         self._stack = ExitStack()
-        self._connected: Connected | None = None
-        self._uri: str | None = None  # as asked for
+        self.connected: Connected | None = None  # what is open
+        self.uri: str | None = None  # of the transducer, as asked for
         self._before: TransducerInfo | None = None  # who it was when it was lost
         self._again = 0.0  # when to try once more [real s]
         self._tare: _Tare | None = None
         self._streaming = False  # for nobody but the display
 
     @property
-    def uri(self) -> str | None:
-        """Return the address the transducer was asked for at."""
-        return self._uri
-
-    @property
-    def connected(self) -> Connected | None:
-        """Return what is open."""
-        return self._connected
-
-    @property
     def health(self) -> Health:
         """Return the transducer's totals; none where there is none."""
-        return Health() if self._connected is None else self._connected.transducer.health
+        return Health() if self.connected is None else self.connected.transducer.health
 
     def connect(self, uri: str, clock: Clock | None = None, *, streaming: bool = True) -> None:
         """Open the transducer at `uri` in place of any other, and begin to show what it measures where `streaming`.
@@ -118,22 +108,22 @@ class Bench:
                     self._start()
         except BaseException:
             self._close()
-            self._uri = None
+            self.uri = None
             raise
-        assert self._connected is not None
-        self._send(Device(self._connected.transducer.info, self._connected.frame))
+        assert self.connected is not None
+        self._send(Device(self.connected.transducer.info, self.connected.frame))
 
     def disconnect(self) -> None:
         """Close the transducer."""
-        was = self._uri
+        was = self.uri
         self._close()
-        self._uri = self._before = None
+        self.uri = self._before = None
         if was is not None:
             self._send(NoDevice())
 
     def begin_tare(self, duration: float) -> None:
         """Measure the zero from now on. Raises NotNow where nothing streams."""
-        if self._connected is None:
+        if self.connected is None:
             raise NotNow("no transducer is connected whose zero could be measured; connect one")
         if not 0.1 <= duration <= 60.0:
             raise NotNow(f"a zero is measured over 0.1 to 60 s, not {duration:g} s")
@@ -147,9 +137,9 @@ class Bench:
 
     def stream(self) -> None:
         """Begin to show what is measured, unless it is shown already. Raises NotNow when a stop broke it off."""
-        if self._connected is not None and not self._streaming:
+        if self.connected is not None and not self._streaming:
             try:
-                with _breakable(self._connected.transducer.info.uri):
+                with _breakable(self.connected.transducer.info.uri):
                     self._start()
             except (LinkLost, DeviceFault) as error:
                 self._lost(str(error))
@@ -160,20 +150,20 @@ class Bench:
     def lent(self) -> Tap | None:
         """Return the transducer for a session, not streaming; None where there is none."""
         self._tare = None
-        if self._connected is None:
+        if self.connected is None:
             return None
-        self._connected.transducer.stop()
+        self.connected.transducer.stop()
         self._streaming = False
-        return Tap(self._connected.transducer, self._display)
+        return Tap(self.connected.transducer, self._display)
 
     def look(self) -> None:
         """Take what was measured, or try to find a lost transducer again. Raises NotNow when a tare is refused."""
         time.sleep(GLANCE)
-        if self._connected is None:
+        if self.connected is None:
             self._look_for_it()
             return
         try:
-            block = self._connected.transducer.read(0.0)
+            block = self.connected.transducer.read(0.0)
         except (LinkLost, DeviceFault) as error:
             self._lost(str(error))
             return
@@ -182,55 +172,55 @@ class Bench:
         self._display.take(block)
         if self._tare is not None and self._tare.feed(block):
             tare, self._tare = self._tare, None
-            tared = tare.result(self._connected.transducer.info)
+            tared = tare.result(self.connected.transducer.info)
             self._display.zeroed(tared.mean)
-            remember_zero(self._connected.transducer.info, tared.mean, tared.spread)
+            remember_zero(self.connected.transducer.info, tared.mean, tared.spread)
             self._send(tared)
 
     def _start(self) -> None:
         """Let the open transducer stream for the display."""
-        assert self._connected is not None
+        assert self.connected is not None
         self._display.stream_began()
         self._streaming = True
-        self._connected.transducer.start()
+        self.connected.transducer.start()
 
     def _open(self, uri: str, clock: Clock) -> None:
         with ExitStack() as stack:
             opened = stack.enter_context(connected(uri, clock))
             self._stack = stack.pop_all()
-        self._connected, self._uri = opened, uri
+        self.connected, self.uri = opened, uri
         self._display.device(opened.transducer.info)
 
     def _close(self) -> None:
         self._tare = None
-        self._connected = None
+        self.connected = None
         self._streaming = False
         self._display.device(None)
         self._stack.close()
 
     def _lost(self, sentence: str) -> None:
         """Let go of a transducer that fell silent, and look for it again later."""
-        self._before = None if self._connected is None else self._connected.transducer.info
+        self._before = None if self.connected is None else self.connected.transducer.info
         self._close()
         self._again = time.monotonic() + TRY_AGAIN
         self._send(LinkDown(sentence))
 
     def lost(self, sentence: str) -> None:
         """Take the transducer for lost, as a session found it."""
-        if self._connected is not None:
+        if self.connected is not None:
             self._lost(sentence)
 
     def _look_for_it(self) -> None:
-        if self._uri is None or time.monotonic() < self._again:
+        if self.uri is None or time.monotonic() < self._again:
             return
         self._again = time.monotonic() + TRY_AGAIN
         try:
-            with _breakable(self._uri):
-                self._open(self._uri, self._clock)
+            with _breakable(self.uri):
+                self._open(self.uri, self._clock)
         except (LinkLost, DeviceFault, SetupError, NotNow):
             return
-        assert self._connected is not None
-        info = self._connected.transducer.info
+        assert self.connected is not None
+        info = self.connected.transducer.info
         try:
             check_same_transducer(self._before, info)
             same = True

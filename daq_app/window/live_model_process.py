@@ -74,7 +74,7 @@ class LiveModel:
         self._waiting: list[Forces] = []
         self._requests: list[Use | Settle] = []
         self._plan: SessionPlan | None = None
-        self._kinematics: Kinematics = "small"
+        self.kinematics: Kinematics = "small"  # that is asked for
 
     def prepare(self) -> None:
         """Start the process; it follows the published finger until a plan tells of another."""
@@ -103,15 +103,10 @@ class LiveModel:
 
     def follow_at(self, kinematics: Kinematics) -> None:
         """Follow the same finger in this kinematics."""
-        if kinematics != self._kinematics:
-            self._kinematics = kinematics
+        if kinematics != self.kinematics:
+            self.kinematics = kinematics
             if self._process is not None:
                 self._use()
-
-    @property
-    def kinematics(self) -> Kinematics:
-        """Return the kinematics that is asked for."""
-        return self._kinematics
 
     def add(self, live: Live, frame: Frame) -> None:
         """Take readings."""
@@ -176,4 +171,4 @@ class LiveModel:
 
     def _use(self) -> None:
         self.said = None  # of another finger
-        self._requests = [Use(self._plan, self._kinematics)]
+        self._requests = [Use(self._plan, self.kinematics)]

@@ -19,45 +19,30 @@ from sessions.strokes.stroke import Stroke
 
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 
-# Few words for what an experimenter can do something about; the others are told by their own sentence.
-WORDS = {
-    FlawName.NO_STROKE: tr_noop("no stroke was found"),
-    FlawName.NO_STEADY_SLIDING: tr_noop("no steady window"),
-    FlawName.ROLLED: tr_noop("too short a way: the finger may only roll"),
-    FlawName.SECOND_STROKE: tr_noop("second stroke"),
-    FlawName.WRONG_DIRECTION: tr_noop("wrong direction"),
-    FlawName.TOO_LITTLE_FORCE: tr_noop("pressed too lightly"),
-    FlawName.NO_UNLOADED_STRETCH: tr_noop("no unloaded stretch before the stroke"),
-    FlawName.BEGINS_IN_CONTACT: tr_noop("the finger touched before the stroke"),
-    FlawName.ENDS_IN_CONTACT: tr_noop("the finger had not left"),
-    FlawName.NOT_LIFTED: tr_noop("the finger was not lifted between strokes"),
-    FlawName.DIRECTION_TURNS: tr_noop("the direction turned"),
-    FlawName.SATURATED: tr_noop("the transducer was overloaded"),
-    FlawName.DEVICE_FAULT: tr_noop("the transducer reported a fault"),
-    FlawName.LOST_READINGS: tr_noop("readings were lost"),
-    FlawName.DRIFT: tr_noop("the zero drifted"),
-    FlawName.FROZEN: tr_noop("the transducer stood still"),
-    FlawName.DEAD: tr_noop("the transducer is dead"),
-}
-
-# What to do about the worst of them, as a command to whoever runs the session; about the rest, another stroke helps.
-ADVICE: Mapping[FlawName, str] = {
-    FlawName.NO_STROKE: tr_noop("Stroke once, firmly, and lift."),
-    FlawName.NO_STEADY_SLIDING: tr_noop("Slide further, at one speed."),
-    FlawName.ROLLED: tr_noop("Slide further, not roll."),
-    FlawName.SECOND_STROKE: tr_noop("Stroke once, then lift."),
-    FlawName.WRONG_DIRECTION: tr_noop("Stroke the way the arrow points."),
-    FlawName.TOO_LITTLE_FORCE: tr_noop("Press harder."),
-    FlawName.NO_UNLOADED_STRETCH: tr_noop("Keep the finger off until the stroke."),
-    FlawName.BEGINS_IN_CONTACT: tr_noop("Keep the finger off until the stroke."),
-    FlawName.ENDS_IN_CONTACT: tr_noop("Lift the finger at the end."),
-    FlawName.NOT_LIFTED: tr_noop("Lift the finger between strokes."),
-    FlawName.DIRECTION_TURNS: tr_noop("Stroke straight, one way."),
-    FlawName.SATURATED: tr_noop("Press less, and check the transducer."),
-    FlawName.DEVICE_FAULT: tr_noop("Check the transducer first."),
-    FlawName.FROZEN: tr_noop("Connect the transducer again first."),
-    FlawName.DEAD: tr_noop("Connect the transducer again first."),
-    FlawName.DRIFT: tr_noop("Zero again, hands off."),
+# Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
+# The other flaws are told by their own sentence; where there is no command another stroke helps.
+FLAWS: Mapping[FlawName, tuple[str, str]] = {
+    FlawName.NO_STROKE: tr_noop(("no stroke was found", "Stroke once, firmly, and lift.")),
+    FlawName.NO_STEADY_SLIDING: tr_noop(("no steady window", "Slide further, at one speed.")),
+    FlawName.ROLLED: tr_noop(("too short a way: the finger may only roll", "Slide further, not roll.")),
+    FlawName.SECOND_STROKE: tr_noop(("second stroke", "Stroke once, then lift.")),
+    FlawName.WRONG_DIRECTION: tr_noop(("wrong direction", "Stroke the way the arrow points.")),
+    FlawName.TOO_LITTLE_FORCE: tr_noop(("pressed too lightly", "Press harder.")),
+    FlawName.NO_UNLOADED_STRETCH: tr_noop(
+        ("no unloaded stretch before the stroke", "Keep the finger off until the stroke.")
+    ),
+    FlawName.BEGINS_IN_CONTACT: tr_noop(
+        ("the finger touched before the stroke", "Keep the finger off until the stroke.")
+    ),
+    FlawName.ENDS_IN_CONTACT: tr_noop(("the finger had not left", "Lift the finger at the end.")),
+    FlawName.NOT_LIFTED: tr_noop(("the finger was not lifted between strokes", "Lift the finger between strokes.")),
+    FlawName.DIRECTION_TURNS: tr_noop(("the direction turned", "Stroke straight, one way.")),
+    FlawName.SATURATED: tr_noop(("the transducer was overloaded", "Press less, and check the transducer.")),
+    FlawName.DEVICE_FAULT: tr_noop(("the transducer reported a fault", "Check the transducer first.")),
+    FlawName.LOST_READINGS: (tr_noop("readings were lost"), ""),
+    FlawName.DRIFT: tr_noop(("the zero drifted", "Zero again, hands off.")),
+    FlawName.FROZEN: tr_noop(("the transducer stood still", "Connect the transducer again first.")),
+    FlawName.DEAD: tr_noop(("the transducer is dead", "Connect the transducer again first.")),
 }
 LEAVING = tr_noop("pressed less than half as hard at the end")
 PRESS_ON = tr_noop("Keep pressing until the end.")
@@ -105,8 +90,8 @@ def stroke_quality(
     analysis = analyse_blocks([(trial, block)], plan, info, settings or AnalysisSettings())
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
-    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in WORDS]
-    remarks = [(flaw.grade, _words(flaw), flaw.sentence, ADVICE.get(flaw.name, "")) for flaw in mentioned]
+    mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]
+    remarks = [(flaw.grade, *_words(flaw)) for flaw in mentioned]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
         at_length = tr(
@@ -120,8 +105,8 @@ def stroke_quality(
     grades = {flaw.grade for flaw in mentioned}
     grade = "refused" if "refused" in grades else "doubtful" if words else "good"
     if stroke is None:
-        known = tuple(words) or (WORDS[FlawName.NO_STROKE],)
-        advice = advice or ADVICE[FlawName.NO_STROKE]
+        known = tuple(words) or FLAWS[FlawName.NO_STROKE][:1]
+        advice = advice or FLAWS[FlawName.NO_STROKE][1]
         return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice, redo=True)
     return Quality(
         grade,
@@ -157,8 +142,10 @@ def _picture(stroke: Stroke) -> StrokePicture | None:
     return StrokePicture(curve.time, values, stroke.onset, stroke.lift, means)
 
 
-def _words(flaw: Flaw) -> str:
-    return WORDS.get(flaw.name, flaw.name.value.replace("_", " "))
+def _words(flaw: Flaw) -> tuple[str, str, str]:
+    """Return a flaw in few words, at length, and what to do about it."""
+    words, advice = FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), ""))
+    return words, flaw.sentence, advice
 
 
 def _fell(stroke: Stroke) -> float | None:

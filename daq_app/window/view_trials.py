@@ -8,24 +8,17 @@ from daq_app.window.stroke_quality import PICTURE, Quality, StrokePicture
 from daq_app.wording import tr, tr_noop
 
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
-MARKS: dict[TileKind, str] = {
-    "done": "✓",
-    "redone": "↻",
-    "flawed": "!",
-    "current": "▶",
-    "skipped": "–",
-    "coming": "○",
+KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that tells the state without colour, and the state in words
+    "done": ("✓", tr_noop("done")),
+    "redone": ("↻", tr_noop("done again")),
+    "flawed": ("!", tr_noop("done, its stroke has a flaw")),
+    "current": ("▶", tr_noop("in hand")),
+    "skipped": ("–", tr_noop("skipped")),
+    "coming": ("○", tr_noop("still to come")),
 }
-STATES: dict[TileKind, str] = {
-    "done": tr_noop("done"),
-    "redone": tr_noop("done again"),
-    "flawed": tr_noop("done, its stroke has a flaw"),
-    "current": tr_noop("in hand"),
-    "skipped": tr_noop("skipped"),
-    "coming": tr_noop("still to come"),
-}
-DIGITS: dict[str, int] = dict(zip(PICTURE, (2, 2, 2, 0), strict=True))
-UNITS: dict[str, str] = dict(zip(PICTURE, ("N", "N", "", "mm/s"), strict=True))
+DIGITS_AND_UNITS: dict[str, tuple[int, str]] = dict(
+    zip(PICTURE, ((2, "N"), (2, "N"), (2, ""), (0, "mm/s")), strict=True)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +36,7 @@ class Tile:
         >>> Tile(3, "D86", "flawed").words
         'trial 3, D86: done, its stroke has a flaw'
         """
-        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(STATES[self.kind]))
+        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(KINDS[self.kind][1]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +70,7 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
         number=number,
         code=trial.code,
         again=again,
-        state=tr(STATES[kind]),
+        state=tr(KINDS[kind][1]),
     )
     shown = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in shown:
@@ -135,4 +128,5 @@ def _without(number: int, heading: str, why: str, details: str) -> Inspection:
 def _value(name: str, mean: float | None) -> str:
     if mean is None:
         return "–"
-    return f"{round(mean, DIGITS[name]) + 0.0:.{DIGITS[name]}f} {UNITS[name]}".strip().replace("-", "−")
+    digits, unit = DIGITS_AND_UNITS[name]
+    return f"{round(mean, digits) + 0.0:.{digits}f} {unit}".strip().replace("-", "−")

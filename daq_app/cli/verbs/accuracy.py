@@ -19,7 +19,6 @@ EXAMPLE = "daq-app accuracy --quick --out accuracy"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare how much is measured, and where it goes."""
     parser.add_argument("--quick", action="store_true", help="20 seconds instead of three minutes, and coarser truths")
     parser.add_argument("--out", type=Path, default=Path("accuracy"), metavar="DIR", help="the folder (accuracy)")
     parser.add_argument("--docs", type=Path, metavar="DIR", help="also write the tables into the pages of these docs")
@@ -29,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Measure, write and tell."""
     from daq_app.accuracy_page.page import PAGE, write
     from daq_app.accuracy_page.tables import fill, tables
 

@@ -23,14 +23,12 @@ WAYS = {1: "p → d", -1: "d → p", None: "–"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session, and what the analysis may be told."""
     add_session(parser)
     add_number(parser, "--bootstrap-seed", int, (0, math.inf), "of the intervals (as before, or 0)", metavar="SEED")
     add_analysis(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Analyse the session, keep the result in its folder and print it."""
     recording = Recording.open(options.session)
     analysis = analyse_session(
         recording, console, area_law(options), seed=options.bootstrap_seed, gain_error=calibration_error(options)

@@ -22,7 +22,6 @@ EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 -
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session, the stroke, and what can be decided of it."""
     add_session(parser)
     parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
     parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
@@ -55,7 +54,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Record the decision and tell what it changes, or list what was decided."""
     recording = Recording.open(options.session)
     before = read(recording.folder)
     if options.list:

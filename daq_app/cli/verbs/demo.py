@@ -26,7 +26,6 @@ PACE = 20.0  # simulated seconds a real second
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare seed, pace and folder."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
     add_seed(parser, "of surfaces' noise, subjects and orders (1)", 1)
     parser.add_argument(
@@ -35,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Run the study and print its table."""
     began = time.monotonic()
     out = options.out or Path("demo-results") / datetime.now().strftime("%Y-%m-%dT%H-%M-%S")
     clock = clock_at(1.0 if options.real_time else PACE, LONGEST_STEP)

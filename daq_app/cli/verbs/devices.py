@@ -28,14 +28,12 @@ PROBED = 3.0  # how long a probe listens [s]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what to list or probe."""
     parser.add_argument(
         "words", nargs="*", metavar="URI", help="further addresses to ask; or 'probe URI' to open that one and listen"
     )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """List or probe."""
     if options.words[:1] == ["probe"]:
         if len(options.words) != 2:
             raise WrongValue("'devices probe' takes one address, for example sim: or net-ft://192.168.1.1")

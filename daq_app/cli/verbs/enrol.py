@@ -23,7 +23,6 @@ HEAD = ["subject", "row", "own finger, angle, depths", "withdrawn"]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the study, the subject, and what is done."""
     parser.add_argument("study", type=Path, metavar="STUDY", help="the study's folder")
     parser.add_argument("--protocol", metavar="PROTOCOL", help="make the study: a built-in protocol, or a TOML file")
     add_seed(parser, "of a new study's orders (one by chance, recorded, unless given)", None, 2**31 - 1)
@@ -37,7 +36,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Do what was asked for, and show the study."""
     folder: Path = options.study
     _refuse_mixtures(options)
     body = body_of(options)

@@ -29,14 +29,12 @@ EXAMPLE = "daq-app export recordings/P07 --format csv --out P07-csv"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session, the format and where it goes."""
     add_session(parser)
     parser.add_argument("--format", required=True, choices=sorted(FORMATS), help="what is written")
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (exports/SESSION-FORMAT)")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Export, and name what the session had lost."""
     recording = revealed(Recording.open(options.session))
     folder = options.out or Path("exports") / f"{options.session.resolve().name}-{options.format}"
     source = _source(recording, console)

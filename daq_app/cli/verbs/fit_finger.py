@@ -39,7 +39,6 @@ AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare session, log, what is known of finger and surface, and where the finger goes."""
     add_visit(parser)
     parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
     parser.add_argument(
@@ -62,7 +61,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Fit the finger and print its layers."""
     if options.scene is not None and not options.scene.parent.is_dir():
         raise WrongValue(f"--scene {options.scene} is not allowed: there is no folder {options.scene.parent}")
     recording = open_visit(options.session, options.subject)

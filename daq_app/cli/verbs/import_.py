@@ -22,7 +22,6 @@ _OF_FOREIGN = ("units", "axes", "normal", "height", "rate", "zeroed", "subject")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the file, what it holds and where it goes."""
     parser.add_argument("file", type=Path, metavar="FILE", help="FILE.csv, or what 'daq-app export' wrote")
     parser.add_argument("--units", metavar="N,Nmm", help="of forces and torques: N,Nmm or N,Nm")
     parser.add_argument("--axes", metavar="t,Fx,...", help="what the columns are, from the first on; - leaves one out")
@@ -35,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Import the file, seal the session and say what nobody stated."""
     from sessions.exchange.exported import exported
 
     session = exported(options.file)

@@ -44,7 +44,6 @@ MARKED = "by the solver's tangent, or where marked * by solving draws"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session and what may be asked of the model."""
     add_visit(parser)
     add_kinematics(
         parser, "small strain (the paper's), or finite strain, where some sticky surfaces have no settled sliding"
@@ -91,7 +90,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Predict, keep the result in the session's folder and print it."""
     afferent = _afferent(options)
     scene, ignored = (None, "") if options.scene is None else finger_in(options.scene)
     console.note(ignored or None)

@@ -24,7 +24,6 @@ EXAMPLE = "daq-app replay recordings/P07 --fast"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session and the pace."""
     add_session(parser)
     pace = parser.add_mutually_exclusive_group()
     pace.add_argument(
@@ -39,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Replay, compare and tell."""
     recording = Recording.open(options.session)
     with tempfile.TemporaryDirectory(prefix="daq-app-replay-") as room:
         began = time.perf_counter()

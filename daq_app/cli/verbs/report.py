@@ -27,7 +27,6 @@ EXAMPLE = "daq-app report recordings/P07 -o P07.html --scores recordings/P01 rec
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session, the page and further scores."""
     add_visit(parser, "; all its scores join in")
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.html", help="the page (SESSION/report.html)")
     parser.add_argument("--scores", type=Path, nargs="+", default=[], metavar="SESSION", help="further visits")
@@ -53,7 +52,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Analyse, predict and write the page."""
     # Imported here: drawing is slow to load, and what is wrong with the session should be said before.
     recording = open_visit(options.session, options.subject)
     score_only = [revealed(Recording.open(folder)) for folder in options.scores]

@@ -21,7 +21,6 @@ EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare session, device and people."""
     add_session(parser)
     parser.add_argument("--device", metavar="URI", help="the transducer (where it was when the session began)")
     parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
@@ -33,7 +32,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Go on to the end, or seal what there is."""
     folder: Path = options.session
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")

@@ -26,7 +26,6 @@ EXAMPLE = "daq-app run sensotact-friction --device sim:?seed=7 --subject P07 --h
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare protocol, device, people and folder."""
     parser.add_argument(
         "protocol", nargs="?", metavar="PROTOCOL", help="a built-in one such as sensotact-friction, or a TOML file"
     )
@@ -60,7 +59,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Run the session and say where it lies."""
     simulated_bench = options.device is not None and options.device.startswith("sim:")
     _refuse_mixtures(options, simulated_bench=simulated_bench)
     chosen, seed, body, place = _decided(options)

@@ -18,14 +18,12 @@ EXAMPLE = "daq-app selftest --out recordings"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare where to try."""
     parser.add_argument(
         "--out", type=Path, metavar="DIR", default=Path("recordings"), help="where sessions will be (recordings/)"
     )
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Try, and write the certificate."""
     out: Path = options.out
     out.mkdir(parents=True, exist_ok=True)
     warning = unsafe(out)

@@ -32,7 +32,6 @@ SAMPLES, OF_FINGERS = 32, 64  # usual ones
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare scene, design, samples and seed, and what is asked of many fingers."""
     parser.add_argument("scene", type=Path, nargs="?", metavar="SCENE.toml", help="without it: many fingers")
     parser.add_argument("--design", type=Path, metavar="FILE", help="which numbers are varied, and how far")
     parser.add_argument(
@@ -50,7 +49,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Solve the design and print the indices, or ask the fingers and print their signs."""
     samples: int = options.samples or (OF_FINGERS if options.scene is None else SAMPLES)
     if not 2 <= samples <= 4096 or samples & (samples - 1):
         raise WrongValue(f"--samples {samples} is not allowed: a power of two from 2 to 4096")

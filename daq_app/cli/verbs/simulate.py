@@ -21,7 +21,6 @@ OF_ONE_WIRE = {"rdt_port": "net-ft", "tcp_port": "net-ft", "http_port": "net-ft"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the wire, its ports and what happens on it."""
     parser.add_argument("wire", choices=WIRES)
     parser.add_argument("--port", "--rdt-port", type=_port, dest="rdt_port", help="UDP port (49152)")
     parser.add_argument("--tcp-port", type=_port, help="TCP command port (49151)")
@@ -35,7 +34,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Serve until Ctrl-C."""
     settings = {name: getattr(options, name) for name in OF_ONE_WIRE if getattr(options, name) is not None}
     for name in settings:
         if OF_ONE_WIRE[name] != options.wire:

@@ -36,7 +36,6 @@ AUDITS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the scene file."""
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="finger, materials, friction, loading, receptor")
     parser.add_argument(
         "--row",

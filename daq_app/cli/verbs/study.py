@@ -42,7 +42,6 @@ PLANTED = "planted.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the folder of sessions, or the seed of a synthetic study."""
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
     meaning = "make a study of ten simulated subjects instead"
     add_number(parser, "--synthetic", int, (0, LARGEST_SEED), meaning, metavar="SEED")

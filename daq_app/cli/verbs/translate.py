@@ -28,7 +28,6 @@ PROGRAM = Path(__file__).parents[2]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what is translated, into which language, and where it goes."""
     parser.add_argument("protocol", nargs="?", metavar="PROTOCOL", help="a built-in one, or a TOML file")
     parser.add_argument("--program", action="store_true", help="the texts of the subject's page instead")
     parser.add_argument("--window", action="store_true", help="the texts of the experimenter's windows instead")
@@ -39,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Write or print the file."""
     if (options.protocol is not None) + options.program + options.window != 1:
         raise WrongValue("give a PROTOCOL, --program or --window; one of the three")
     try:

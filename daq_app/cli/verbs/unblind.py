@@ -22,14 +22,12 @@ EXAMPLE = "daq-app unblind studies/friction --by E02"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare what is unblinded, and by whom."""
     parser.add_argument("path", type=Path, metavar="SESSION|STUDY")
     parser.add_argument("--by", required=True, metavar="CODE", help="who opens the key: a code, never a name")
     parser.add_argument("--study", type=Path, metavar="DIR", help="of a session that lies elsewhere (the folder above)")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Open the key and say what was unblinded."""
     path: Path = options.path
     check_code("--by", options.by)
     whole = is_study(path)

@@ -20,12 +20,10 @@ EXAMPLE = "daq-app verify recordings/P07"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the session folder."""
     add_session(parser)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    """Verify and tell."""
     folder: Path = options.session
     flaws = list(problems(folder))
     recording = Recording.open(folder)

@@ -11,7 +11,7 @@ from daq_app.window.bench_state import BenchState
 from daq_app.window.messages import Judged
 from daq_app.window.stroke_quality import StrokePicture
 from daq_app.window.view_course import course_view
-from daq_app.window.view_trials import MARKS, inspection, tiles, verdict
+from daq_app.window.view_trials import KINDS, inspection, tiles, verdict
 from sessions.plan.plan import Shown
 from sessions.run import steps
 
@@ -34,7 +34,7 @@ def test_each_trial_is_one_tile_with_a_state_of_its_own():
 
 
 def test_no_two_states_share_a_shape_or_words():
-    assert len(set(MARKS.values())) == len(MARKS)
+    assert len({mark for mark, _ in KINDS.values()}) == len(KINDS)
     shown = tiles(after(*SCORE, Judged(1, 1, GOOD), *KEPT).session)
     assert [tile.words for tile in shown[:3]] == [
         f"trial 1, {FIRST.stimulus.code}: done",

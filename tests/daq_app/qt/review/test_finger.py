@@ -129,19 +129,19 @@ def test_colours_that_are_fixed_stay_through_the_history_and_another_field_frees
     fields.low.setValue(1.0)
     fields.high.setValue(2.5)
     for _ in range(2):
-        assert canvas._look.range == (1.0, 2.5)
+        assert canvas.look.range == (1.0, 2.5)
         QTest.keyClick(window.model.player, Qt.Key.Key_Left)
     canvas._bar.region.setRegion((63, 207))  # as a handle of the colour bar is dragged, a quarter of the way to its end
     canvas._bar.region.sigRegionChangeFinished.emit(canvas._bar.region)
     assert fields.mode == FIXED
-    assert canvas._look.range == pytest.approx((1.0, fields.high.value()), abs=0.015)
+    assert canvas.look.range == pytest.approx((1.0, fields.high.value()), abs=0.015)
     assert fields.high.value() > 2.5
     fields.high.setValue(2.5)
     fields.low.setValue(2.5)  # no range: the automatic one is shown
-    assert canvas._look.range != (2.5, 2.5)
+    assert canvas.look.range != (2.5, 2.5)
     fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
     assert fields.mode == ALL_TRIALS
-    assert canvas._look.field.unit == "mm"
+    assert canvas.look.field.unit == "mm"
     assert not canvas.grab().isNull()
     fields.which.setCurrentIndex(0)
 
@@ -152,9 +152,9 @@ def test_a_failed_solve_says_where_when_and_why_and_its_last_good_state_stays(wi
     words = window.model.why.text()
     assert "is step 4: at 0.300 s" in words
     assert words.endswith("The drag wedges it.")
-    assert window.model.finger._look.lost == (0.5, 0.5)
+    assert window.model.finger.look.lost == (0.5, 0.5)
     window.model.player.step(-1)
-    assert window.model.finger._look.lost is None
+    assert window.model.finger.look.lost is None
 
 
 def test_how_far_a_failed_solve_came_is_asked_for_without_being_told(window):
@@ -214,7 +214,7 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     for _ in range(5):  # the columns have found their widths
         application.processEvents()
     ranges, show = set(), window.model._moved
-    window.model._moved = lambda at: (show(at), ranges.add(window.model.finger._look.range))
+    window.model._moved = lambda at: (show(at), ranges.add(window.model.finger.look.range))
     window.model.write_film(tmp_path / "film.gif")
     until(application, lambda: "Saved" in window._words.accessibleName())
     window.model._moved = show
@@ -283,7 +283,7 @@ def test_the_compared_session_s_finger_stands_beside_and_both_are_moved_as_one(a
     wheel(application, second.viewport(), QPoint(60, 90), 2)
     shown = [(canvas.view().x, canvas.view().y, canvas.view().per_mm) for canvas in (first, second)]
     assert shown[0] == pytest.approx(shown[1], rel=0.01)  # one may be a pixel wider
-    assert first._look.range == second._look.range
+    assert first.look.range == second.look.range
     drag(application, first.viewport(), QPoint(60, 90), QPoint(90, 90), Qt.KeyboardModifier.ShiftModifier)
     assert second.sight.line == first.sight.line is not None
     window.model.together.click()
