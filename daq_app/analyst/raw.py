@@ -39,16 +39,6 @@ class RawReadings:
         """Return the number of readings."""
         return len(self.time)
 
-    def at(self, time: float) -> int:
-        """Return the position of the reading at or just before an instant [s]; 0 where all come later.
-
-        >>> import numpy as np
-        >>> none = np.empty(0, np.int64)
-        >>> RawReadings("", "", none, none, none, none, np.array([1.0, 2.0]), none, none, none, "").at(1.5)
-        0
-        """
-        return max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-
 
 class RawFile:
     """The readings of a recording, with the rows they have in its file; what is needed again is kept."""

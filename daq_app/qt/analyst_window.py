@@ -93,15 +93,15 @@ class AnalystWindow(QMainWindow):
         self.trials = TrialsColumn(tokens)
         self.stroke = StrokeColumn(tokens)
         self.stroke.replayed.connect(self._replay_next)
+        self._words = Wrapped("quiet", keeps_room=True)
         self.model = ModelColumn(tokens, type_scale())
         self.model.other_wanted.connect(self._choose_other)
-        self.model.said.connect(self._say)
+        self.model.said.connect(self._words.show_text)
         for column in (self.trials, self.stroke, self.model):
             column.requested.connect(self.ask)
         self.trials.responded.connect(self.take)  # no work: the model answers with every quantity
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
-        self._words = Wrapped("quiet", keeps_room=True)
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
         self.go_on = button(
             tr("Go on"), tr("have the model answer the trials that are left"), lambda: self.ask(m.GoOn())
@@ -237,9 +237,6 @@ class AnalystWindow(QMainWindow):
         if self.state.row + 1 < len(rows(self.state)):
             self.stroke.play()
             self.ask(m.Choose(self.state.row + 1))
-
-    def _say(self, sentence: str) -> None:
-        self._words.show_text(sentence)
 
     def _show(self) -> None:
         state = self.state

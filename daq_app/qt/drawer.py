@@ -65,13 +65,10 @@ class Drawer(QSplitter):
         if isinstance(sizes, QByteArray):
             self.restoreState(sizes)
         self.handle(1).setAccessibleName(tr("edge of the drawer"))
-        self.splitterMoved.connect(self._keep_sizes)
+        self.splitterMoved.connect(lambda: settings().setValue(DRAWER_SIZES, self.saveState()))
         self.open = Openness(DRAWER, self._place)
         self._place()
 
     def _place(self) -> None:
         self._drawer.setVisible(bool(self.open))
         self._main.setVisible(self.open.room or not self.open)
-
-    def _keep_sizes(self) -> None:
-        settings().setValue(DRAWER_SIZES, self.saveState())

@@ -1,10 +1,8 @@
 """Which field is drawn over the finger and where its colours end, and the field as a curve."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
@@ -13,10 +11,8 @@ from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Finger, Range
 from daq_app.analyst.probe import Line, along_line, along_skin, read_out
 from daq_app.qt.parts import bare, button, choice, fill, hbox, vbox
 from daq_app.qt.tokens import GRID, MODEL, TARGET, Tokens
-from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.qt.zoomed_plot import ZoomedPlot, pg
 from daq_app.wording import tr, tr_noop
-
-pg: Any = pyqtgraph  # it has no types
 
 Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 NOTHING: Curve = (np.empty(0), np.empty(0))

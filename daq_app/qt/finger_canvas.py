@@ -4,7 +4,6 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
@@ -13,10 +12,8 @@ from daq_app.analyst.frame import FIELD_CHOICES, Frame, Parts, View
 from daq_app.analyst.probe import Line, probe_words
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.tokens import SMALL, Tokens, font
-from daq_app.qt.zoomed_plot import name_axis, style_axis
+from daq_app.qt.zoomed_plot import name_axis, pg, style_axis
 from daq_app.wording import tr
-
-pg: Any = pyqtgraph  # it has no types
 
 NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
@@ -273,11 +270,8 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         style_axis(bar.getAxis("bottom"), self._tokens, self._font)
         self.ci.layout.setRowFixedHeight(1, BAR_LINES * line)  # colours, ticks and the field's name keep their place
         bar.hide()
-        bar.sigLevelsChangeFinished.connect(self._choose_range)
+        bar.sigLevelsChangeFinished.connect(lambda: self.range_chosen.emit(bar.levels()))
         return bar
-
-    def _choose_range(self) -> None:
-        self.range_chosen.emit(self._bar.levels())
 
 
 class _Box(pg.ViewBox):

@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 from daq_app.analyst.frame import Box, FieldChoice, Frame, Parts, Range, View, halved, seen
 from daq_app.analyst.probe import Line
 from daq_app.qt.indicators import paint_lost
-from daq_app.qt.shapes import faces
+from daq_app.qt.shapes import faces, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 
@@ -68,10 +68,10 @@ class FingerPainter:
         ground = self._placed(np.array([[0.0, 0.0]]))[0].y()
         painter.save()
         painter.setClipRect(self.box)
-        below = QColor(self.tokens.quiet)
-        below.setAlpha(40)
         top = max(ground, self.box.top())
-        painter.fillRect(QRectF(self.box.left(), top, self.box.width(), self.box.bottom() - top), below)
+        painter.fillRect(
+            QRectF(self.box.left(), top, self.box.width(), self.box.bottom() - top), sheer(self.tokens.quiet, 40)
+        )
         self._paint_tissue(look, shades)
         if look.mesh:
             self._paint_mesh()
@@ -107,9 +107,7 @@ class FingerPainter:
         self.painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _paint_mesh(self) -> None:
-        ink = QColor("black")
-        ink.setAlpha(110)
-        self.painter.setPen(QPen(ink, 0.6))
+        self.painter.setPen(QPen(sheer("black", 110), 0.6))
         points = self._placed(self.frame.nodes)
         around: list[list[int]] = self.parts.elements.tolist()
         for element in around:

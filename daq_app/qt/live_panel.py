@@ -121,14 +121,6 @@ class LivePanel(Panel):
         if 0 <= at < len(LENGTHS):
             self.show_seconds(LENGTHS[at])
 
-    def toggle_hold(self) -> None:
-        """Hold the picture, or go on."""
-        self.bar.hold.click()
-
-    def toggle_finite(self) -> None:
-        """Follow the model at finite strain, or at small strain again."""
-        self.bar.finite.click()
-
     def show_finite(self, finite: bool) -> None:
         """Follow the finger at finite strain, or at small strain."""
         self.bar.finite.setChecked(finite)

@@ -13,7 +13,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
 from daq_app.qt.painted import PaintedWidget
-from daq_app.qt.shapes import blank, draw_line, fine
+from daq_app.qt.shapes import blank, draw_line, fine, sheer
 from daq_app.qt.tokens import SMALL, font
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, Columns
@@ -147,9 +147,7 @@ class LivePlot(PaintedWidget):
         room = (inside.height() + above - below - 2.0 * moved) / line  # the numbers at the edges are moved inside
         for value in ticks(self._scale.low, self._scale.high, room):
             y = inside.bottom() - (value - low) * per_unit
-            faint = QColor(self.theme.line)
-            faint.setAlpha(110)
-            painter.setPen(fine(faint))
+            painter.setPen(fine(sheer(self.theme.line, 110)))
             painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
             painter.setPen(QColor(self.theme.quiet))
             top = min(max(y - line / 2.0, 0.0), self.height() - line)
@@ -208,9 +206,8 @@ class LivePlot(PaintedWidget):
         for mark in self._marks:
             start, stop = (inside.right() + (at - self._now) * across for at in (mark.start, mark.stop))
             if mark.kind == "steady":
-                fill = QColor(self.theme.act)
-                fill.setAlpha(36)
-                painter.fillRect(QRectF(start, inside.top(), stop - start, inside.height()), fill)
+                window = QRectF(start, inside.top(), stop - start, inside.height())
+                painter.fillRect(window, sheer(self.theme.act, 36))
                 painter.setPen(fine(self.theme.act, Qt.PenStyle.DotLine))
                 painter.drawLine(QPointF(start, inside.top()), QPointF(start, inside.bottom()))
                 painter.drawLine(QPointF(stop, inside.top()), QPointF(stop, inside.bottom()))

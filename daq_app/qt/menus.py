@@ -126,7 +126,7 @@ class Menus:
         self._add(help_menu, "keys", tr("Keys"))
         docs = help_menu.addAction(tr("Documentation"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(DOCS))))
         docs.setEnabled(DOCS.exists())
-        help_menu.addAction(tr("About daq-app"), self._about)
+        help_menu.addAction(tr("About daq-app"), lambda: about_box(window).show())
 
     def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
         """Offer what can be done now."""
@@ -165,9 +165,6 @@ class Menus:
             self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
         if not listed:
             self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
-
-    def _about(self) -> None:
-        about_box(self._window).show()
 
 
 def about_box(parent: QWidget) -> QMessageBox:

@@ -27,6 +27,13 @@ def blank(widget: QWidget, colour: str) -> QPixmap:
     return pixmap
 
 
+def sheer(colour: str, alpha: int) -> QColor:
+    """Return a colour that lets what is behind it through, from 0 all of it to 255 nothing."""
+    shown = QColor(colour)
+    shown.setAlpha(alpha)
+    return shown
+
+
 def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
     """Return a pen one pixel of the screen wide, whatever the scaling."""
     pen = QPen(QColor(colour), 1, style)

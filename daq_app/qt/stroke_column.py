@@ -39,7 +39,9 @@ class StrokeColumn(QWidget):
         self.player.ended.connect(self.replayed.emit)
         self.decisions = DecisionsBar()
         self.decisions.requested.connect(self.requested.emit)
-        self.save = SaveButtons(tr("the stroke"), self._save)
+        self.save = SaveButtons(
+            tr("the stroke"), lambda name, path: self.requested.emit(m.Write(f"picture {name}", path))
+        )
         self._lines: tuple[tuple[str, str], ...] = ()
         self.readings = ReadingsTable()
         self.tabs = QTabWidget()
@@ -151,6 +153,3 @@ class StrokeColumn(QWidget):
         self.stroke.show_moment(at)
         if not self.player.playing:
             self.readings.go_to(at)
-
-    def _save(self, name: str, path: str) -> None:
-        self.requested.emit(m.Write(f"picture {name}", path))

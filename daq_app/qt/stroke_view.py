@@ -3,19 +3,19 @@
 from typing import Any
 
 import numpy as np
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.edges import LEAP, STEP, Placed, edges_of, within
 from daq_app.analyst.messages import EDGES, Edge
 from daq_app.analyst.probe import read_out
 from daq_app.analyst.raw import RawReadings
-from daq_app.qt.parts import bare
+from daq_app.qt.parts import hbox, vbox
 from daq_app.qt.remembered import type_scale
+from daq_app.qt.shapes import sheer
 from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
-from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.qt.zoomed_plot import ZoomedPlot, pg
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 
@@ -96,9 +96,6 @@ class EdgeHandle(QPushButton):
         self.setAccessibleName(f"{spoken} {at} s, {state}{', Enter records' if self._away else ''}")
 
 
-pg: Any = pyqtgraph  # it has no types
-
-
 class StrokeView(QWidget):
     """Two plots above each other, and a handle for each edge; the time is since contact onset."""
 
@@ -112,21 +109,17 @@ class StrokeView(QWidget):
         self._time = np.empty(0)
         self._columns = [np.empty(0)] * 3
         self._raw: RawReadings | None = None
-        layout = bare(QVBoxLayout(self), GRID // 2)
         self._plots = [_plot(tokens, name) for name in (tr("N and T [N]"), "µ = T/N [-]")]
         for plot in self._plots:
-            layout.addWidget(plot, 1)
             plot.reset, plot.read = self.show_all, self._read
         self._plots[0].getPlotItem().getAxis("bottom").setLabel("")
         self._plots[1].setXLink(self._plots[0])
-        fill = QColor(tokens.act)
-        fill.setAlpha(36)
         self._windows = [
-            pg.LinearRegionItem(brush=fill, pen=pg.mkPen(None), movable=False, span=(0, 1)) for _ in self._plots
+            pg.LinearRegionItem(brush=sheer(tokens.act, 36), pen=pg.mkPen(None), movable=False, span=(0, 1))
+            for _ in self._plots
         ]
-        quiet = QColor(tokens.quiet)
-        quiet.setAlpha(110)
-        self._recorded = [pg.PlotCurveItem(pen=pg.mkPen(quiet, width=1), connect="finite") for _ in range(2)]
+        pen = pg.mkPen(sheer(tokens.quiet, 110), width=1)
+        self._recorded = [pg.PlotCurveItem(pen=pen, connect="finite") for _ in range(2)]
         self._curves = [
             pg.PlotCurveItem(pen=pg.mkPen(colour, width=2), connect="finite", name=name)
             for colour, name in ((N, "N"), (T, "T"), (MU, "µ"))
@@ -142,13 +135,11 @@ class StrokeView(QWidget):
             line.hide()
         self._lines = {edge: [self._line(edge, plot) for plot in self._plots] for edge in EDGES}
         self.handles: dict[Edge, EdgeHandle] = {edge: EdgeHandle(edge) for edge in EDGES}
-        strip = QHBoxLayout()
-        strip.setSpacing(GRID // 2)
         for handle in self.handles.values():
             handle.moved.connect(self._try)
             handle.recorded.connect(self.moved.emit)
-            strip.addWidget(handle, 1)
-        layout.addLayout(strip)
+        strip = hbox(*((handle, 1) for handle in self.handles.values()), spacing=GRID // 2)
+        vbox(*((plot, 1) for plot in self._plots), strip, on=self, spacing=GRID // 2)
         self.show_stroke(None)
 
     def show_stroke(self, stroke: StrokeFinding | None) -> None:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QListWidget, QWidget
@@ -12,12 +11,10 @@ from daq_app.analyst.shown import greatest_errors, marks_of, points, row_words
 from daq_app.analyst.state import AnalystState, chosen, rows
 from daq_app.qt.parts import Wrapped, choice, label, vbox
 from daq_app.qt.tokens import MODEL, Tokens
-from daq_app.qt.zoomed_plot import ZoomedPlot
+from daq_app.qt.zoomed_plot import ZoomedPlot, pg
 from daq_app.wording import tr
 from sessions.prediction import QUANTITIES
 from sessions.report.wording import shown_response
-
-pg: Any = pyqtgraph  # it has no types
 
 
 class TrialsColumn(QWidget):
@@ -36,7 +33,7 @@ class TrialsColumn(QWidget):
         self.responses = choice(tr("quantity that is held against the score"))
         for shown in (shown_response(quantity.name) for quantity in QUANTITIES):
             self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
-        self.responses.activated.connect(self._respond)
+        self.responses.activated.connect(lambda: self.responded.emit(m.Respond(self.responses.currentData())))
         self.errors = Wrapped("quiet")
         self.relation, self.points = self._relation()
         vbox(
@@ -86,9 +83,6 @@ class TrialsColumn(QWidget):
     def _chosen(self, row: int) -> None:
         if row >= 0:
             self.requested.emit(m.Choose(row))
-
-    def _respond(self) -> None:
-        self.responded.emit(m.Respond(self.responses.currentData()))
 
     def _relation(self) -> tuple[Any, Any]:
         plot = ZoomedPlot(self._tokens)

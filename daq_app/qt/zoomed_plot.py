@@ -12,7 +12,7 @@ from daq_app.qt.remembered import type_scale
 from daq_app.qt.tokens import GRID, SMALL, Tokens, font
 from daq_app.wording import tr
 
-pg: Any = pyqtgraph  # it has no types
+pg: Any = pyqtgraph  # it has no types: who draws by it imports it from here
 
 
 def style_axis(axis: Any, tokens: Tokens, type_face: QFont) -> None:  # noqa: ANN401  pyqtgraph has no types

@@ -3,7 +3,7 @@
 import random
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -108,38 +108,33 @@ class _Watched:
 
     def until(self, kind: type[AReport]) -> AReport:
         """Note reports until one of a kind comes, and return it."""
-        deadline = time.monotonic() + DEADLINE
-        while time.monotonic() < deadline:
-            self._waiting += self.recorder.poll(0.02)
-            while self._waiting:
-                report = self._waiting.pop(0)
-                self._note(report)
-                if isinstance(report, kind):
-                    return report
-                if isinstance(report, m.Failed | m.Gone):
-                    raise SelfTestFailed(report.sentence)
+        for report in self._reports(DEADLINE):
+            if isinstance(report, kind):
+                return report
+            if isinstance(report, m.Failed | m.Gone):
+                raise SelfTestFailed(report.sentence)
         raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
 
     def hear(self, seconds: float) -> None:
         """Note what comes within so many seconds."""
-        deadline = time.monotonic() + seconds
-        while time.monotonic() < deadline:
-            for report in (*self._waiting, *self.recorder.poll(0.01)):
-                self._note(report)
-            self._waiting = []
+        for _ in self._reports(seconds):
+            pass
 
     def killed(self) -> None:
         """Kill it, and note what was still on its way."""
         self.recorder.kill()
-        deadline = time.monotonic() + DEADLINE
+        if not any(isinstance(report, m.Gone) for report in self._reports(DEADLINE)):
+            raise SelfTestFailed("a recorder that was killed did not end")
+
+    def _reports(self, seconds: float) -> Iterator[m.Report]:
+        """Yield what comes within so many seconds, each noted; what nobody takes any more waits for the next call."""
+        deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
-            reports = (*self._waiting, *self.recorder.poll(0.02))
-            self._waiting = []
-            for report in reports:
+            self._waiting += self.recorder.poll(0.01)
+            while self._waiting:
+                report = self._waiting.pop(0)
                 self._note(report)
-            if any(isinstance(report, m.Gone) for report in reports):
-                return
-        raise SelfTestFailed("a recorder that was killed did not end")
+                yield report
 
     def _note(self, report: m.Report) -> None:
         match report:

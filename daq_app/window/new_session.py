@@ -286,7 +286,9 @@ def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | No
 def unfinished(folder: Path) -> tuple[Unfinished, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
     unfinished: list[Unfinished] = []
-    places = sorted((*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")), key=_age)
+    places = sorted(
+        (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")), key=lambda place: -place.stat().st_mtime
+    )
     for place in places:
         session = place.parent
         if len(unfinished) == SHOWN:
@@ -307,10 +309,6 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
         )
         unfinished.append(Unfinished(session, words))
     return tuple(unfinished)
-
-
-def _age(path: Path) -> float:
-    return -path.stat().st_mtime
 
 
 def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:

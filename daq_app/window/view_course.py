@@ -182,7 +182,8 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
         case "taring":
             return tr("Hands off: zero is being measured with sample {code} on.", code=code), None
         case "ready":
-            return _stroke_sentence(session, trial), _stroke_button(session)
+            done = Button(tr("Stroke done"), "Space", sends=steps.StrokeDone())
+            return _stroke_sentence(session, trial), None if session.plan.forces else done
         case "stroking":
             return tr("Stroke on {code} is being recorded.", code=code), None
         case "settling":
@@ -244,10 +245,6 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
         finger=finger,
     )
     return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
-
-
-def _stroke_button(session: SessionState) -> Button | None:
-    return None if session.plan.forces else Button(tr("Stroke done"), "Space", sends=steps.StrokeDone())
 
 
 def _ended(session: SessionState) -> tuple[str, Button | None]:

@@ -243,7 +243,7 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
         assert cut_off(shown) == []
     shown.close()
     window.bridge.blockSignals(True)
-    window.live.toggle_hold()
+    window.live.bar.hold.click()
     for messages in (MOUNT, (*SCORE, Judged(1, 1, BAD)), PAUSED, CLOSING):
         window.show_view(derive_view(after(*messages)))
         for words in MODEL_SAYS:
