@@ -169,8 +169,8 @@ def _with_moved_edges(
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
     kept = newton.condensed.equilibrium is state.u  # the tangent of the last iteration is there still
-    linearise = newton.relinearise if kept else newton.linearise
-    solvable, alone = linearise(state, state.load, x, 0, forces), np.count_nonzero(state.touching) == 1
+    solvable = newton.linearise(state, state.load, x, 0, forces, kept=kept)
+    alone = np.count_nonzero(state.touching) == 1
     return [
         [
             _moved(newton, state, forces, x, *pair) if solvable else None

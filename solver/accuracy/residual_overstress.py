@@ -17,7 +17,7 @@ from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, relaxing_laws
-from solver.equilibrium.load_path import PRESSING_TIME, Aim, RelaxingWay, Way, way_of
+from solver.equilibrium.load_path import PRESSING_TIME, Aim, Way, way_of
 from solver.equilibrium.load_stepping import load_of
 from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
 from solver.failures import SolveFailure
@@ -109,7 +109,6 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
             way.go(aim)
     except SolveFailure:
         return None
-    assert isinstance(way, RelaxingWay)
     return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), lasting) if at_last > 0.0 else None
 
 
@@ -119,7 +118,7 @@ def _small(scene: Scene) -> tuple[Way, float]:
     body = copy(body)  # each course has a past of its own
     body.rest()
     tissue = LinearTissue(body, (finger.ending.endings,))
-    way = RelaxingWay(tissue, finger.newton, load_of(scene), scene.loading_per_mm)
+    way = Way(finger.newton, load_of(scene), scene.loading_per_mm, tissue=tissue)
     return way, finger.sed_ending(finger.displacement(settled(scene, finger)))
 
 

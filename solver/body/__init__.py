@@ -237,6 +237,13 @@ class Endings:
         area = np.bincount(self.patch, self.weights, self.count)
         return np.where(area > 0.0, area, np.nan)
 
+    def means(self, values: Array) -> Array:
+        """Return values (p, ...) averaged over each patch (r, ...); nan where there is no patch."""
+        wide = (slice(None), *([None] * (values.ndim - 1)))
+        total = np.zeros((self.count, *values.shape[1:]), values.dtype)
+        np.add.at(total, self.patch, values * self.weights[wide])
+        return total / self.areas[wide]
+
 
 class Patches(Protocol):
     """Endings of one body, r of them."""
@@ -252,17 +259,6 @@ class Patches(Protocol):
     def responses(self, displacement: Array) -> Array:
         """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
         ...
-
-
-def patch_means(values: Array, weights: Array, patch: Indices, areas: Array) -> Array:
-    """Return values (p, ...) averaged over patches (r, ...) by weights (p,); `patch` (p,) says whose each is.
-
-    `areas` (r,) are the sums of weights, nan where there is no patch.
-    """
-    wide = (slice(None), *([None] * (values.ndim - 1)))
-    total = np.zeros((len(areas), *values.shape[1:]), values.dtype)
-    np.add.at(total, patch, values * weights[wide])
-    return total / areas[wide]
 
 
 def inverse(matrices: Array) -> Array:

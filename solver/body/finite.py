@@ -20,7 +20,7 @@ from solver.arrays import (
     ProbeArrays,
     SymbolicFactorization,
 )
-from solver.body import Endings, inverse, patch_means
+from solver.body import Endings, Probes, inverse
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization
@@ -272,84 +272,70 @@ class FinitePatches:
     """Endings of a body at finite strain: p places inside elements, averaged with weights over r patches."""
 
     body: FiniteBody
-    element: Narrow  # (p,)
-    grad_x: Array  # (p, 9)
-    grad_y: Array  # (p, 9)
-    modes: Array  # (p, 3)
-    weights: Array  # (p,) areas [mm2]
-    patch: Indices  # (p,)
-    areas: Array  # (r,) [mm2]; nan where there is no patch
-    tangent: Array  # (p, 2) direction of the undeformed skin above each probe, towards the tip
+    places: ProbeArrays  # of its elements, as loops take them
+    endings: Endings  # the same probes, element by element
 
     @staticmethod
     def of(body: FiniteBody, endings: Endings) -> "FinitePatches":
         """Carry the probes of `endings` over to `body`, element by element."""
-        probes = endings.probes
-        order = np.argsort(probes.element, kind="stable")
-        element = probes.element[order]
-        modes = (body.combination[element] @ probes.modes[order][:, :, None])[:, :, 0]
-        gradient = probes.gradient[order]
-        return FinitePatches(
-            body,
-            element.astype(np.int32),
-            np.ascontiguousarray(gradient[..., 0]),
-            np.ascontiguousarray(gradient[..., 1]),
-            modes,
-            endings.weights[order],
-            endings.patch[order],
-            endings.areas,
-            endings.tangent[order],
-        )
+        order, at = np.argsort(endings.probes.element, kind="stable"), endings.probes
+        at = Probes(at.element[order], at.gradient[order], at.modes[order])
+        places = ProbeArrays(
+            at.element.astype(np.int32), np.ascontiguousarray(at.gradient[..., 0]),
+            np.ascontiguousarray(at.gradient[..., 1]), (body.combination[at.element] @ at.modes[:, :, None])[:, :, 0],
+        )  # fmt: skip
+        weights, patch = endings.weights[order], endings.patch[order]
+        return FinitePatches(body, places, Endings(at, weights, patch, endings.count, endings.tangent[order]))
 
     def nodes(self) -> Indices:
         """Do as `Patches` says."""
-        return distinct(self.body.mesh.elements[distinct(self.element)])
+        return distinct(self.body.mesh.elements[distinct(self.places.element)])
 
     def energy(self, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...), ln J being each element's best fit of it."""
         if displacement.ndim > 2:
             every = [self.energy(np.ascontiguousarray(one)) for one in np.moveaxis(displacement, -1, 0)]
             return np.stack(every, axis=-1)
-        out = np.empty(len(self.element))
-        probes = ProbeArrays(self.element, self.grad_x, self.grad_y, self.modes)
-        element_loops.energies(displacement, self.body.elements, probes, out)
+        out = np.empty(len(self.places.element))
+        element_loops.energies(displacement, self.body.elements, self.places, out)
         return out
 
     def deformation(self, displacement: Array) -> Array:
         """Return F (p, 2, 2) for displacements (nodes, 2)."""
-        local = displacement[self.body.elements.nodes[self.element]]
-        gradient = np.stack([self.grad_x, self.grad_y], axis=-1)
+        local = displacement[self.body.elements.nodes[self.places.element]]
+        gradient = np.stack([self.places.grad_x, self.places.grad_y], axis=-1)
         return np.eye(2) + np.einsum("pia,piA->paA", local, gradient)
 
     def average(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
-        return patch_means(self.energy(displacement), self.weights, self.patch, self.areas)
+        return self.endings.means(self.energy(displacement))
 
     def responses(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
         state = self.state(displacement)
-        values = (quantity.finite(state) for quantity in QUANTITIES)
-        return np.stack([patch_means(each, self.weights, self.patch, self.areas) for each in values])
+        return np.stack([self.endings.means(quantity.finite(state)) for quantity in QUANTITIES])
 
     def state(self, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
         body = self.body
         wide = (slice(None), *([None] * (displacement.ndim - 2)))
-        held, place = np.unique(self.element, return_inverse=True)
+        held, place = np.unique(self.places.element, return_inverse=True)
         local = displacement[body.elements.nodes[held]]  # (e, 9, 2, ...)
         log = _log_volume(body.elements.grad_x[held], body.elements.grad_y[held], local)
         fit = np.einsum("eq,eqm,eq...->em...", body.elements.weight[held], body.elements.modes[held], log)[place]
-        gradient = [np.einsum("pi,pi...->p...", grad, local[place]) for grad in (self.grad_x, self.grad_y)]
+        gradient = [
+            np.einsum("pi,pi...->p...", grad, local[place]) for grad in (self.places.grad_x, self.places.grad_y)
+        ]
         return LocalState(
             xx=gradient[0][:, 0],
             xy=gradient[1][:, 0],
             yx=gradient[0][:, 1],
             yy=gradient[1][:, 1],
-            dilatation=np.einsum("pm,pm...->p...", self.modes, fit),
-            shear=body.elements.shear[self.element][wide],
-            lame=body.elements.lame[self.element][wide],
-            stiffening=body.elements.stiffening[self.element][wide],
-            tangent=(self.tangent[:, 0][wide], self.tangent[:, 1][wide]),
+            dilatation=np.einsum("pm,pm...->p...", self.places.modes, fit),
+            shear=body.elements.shear[self.places.element][wide],
+            lame=body.elements.lame[self.places.element][wide],
+            stiffening=body.elements.stiffening[self.places.element][wide],
+            tangent=(self.endings.tangent[:, 0][wide], self.endings.tangent[:, 1][wide]),
         )
 
 

@@ -13,7 +13,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import hooke, multifrontal
 from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import Array, Indices, LinearElements, LinearMesh, RecoveryArrays, ShapeFunctions
-from solver.body import CondensedLinear, Endings, Probes, inverse, patch_means
+from solver.body import CondensedLinear, Endings, Probes, inverse
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import PLAIN, Elasticity
 from solver.linalg import factors_of, symbolic_factorization
@@ -360,10 +360,7 @@ class LinearPatches:
     def responses(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
         state = self.elastic.state(self.mesh, self.endings.probes, displacement, self.endings.tangent)
-        return np.stack([self._means(quantity.small(state)) for quantity in QUANTITIES])
-
-    def _means(self, values: Array) -> Array:
-        return patch_means(values, self.endings.weights, self.endings.patch, self.endings.areas)
+        return np.stack([self.endings.means(quantity.small(state)) for quantity in QUANTITIES])
 
 
 def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:

@@ -208,14 +208,19 @@ def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
     return np.where(far, wide, value), np.where(far, bend, slope)
 
 
-def _parts(F: Array) -> tuple[Array, Array, Array]:
-    """Return J (...), F^-T (..., 2, 2) and Q (...)."""
+def inverse_transposed(F: Array) -> tuple[Array, Array]:
+    """Return J (...) and F^-T (..., 2, 2)."""
     J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
     adjugate = np.empty_like(F)
     adjugate[..., 0, 0], adjugate[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
     adjugate[..., 0, 1], adjugate[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
-    Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
-    return J, adjugate / J[..., None, None], Q
+    return J, adjugate / J[..., None, None]
+
+
+def _parts(F: Array) -> tuple[Array, Array, Array]:
+    """Return J (...), F^-T (..., 2, 2) and Q (...)."""
+    J, inverse = inverse_transposed(F)
+    return J, inverse, np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
 
 
 def stress(law: Law, F: Array) -> Array:

@@ -8,8 +8,8 @@ Meth. Appl. Mech. Eng. 60, 153): with B = (C J^-2/3)^-1,
     dA/dt = (B - A)/tau,    W = g G/2 (tr(A B^-1) - 3 - ln det A),    S = g G J^-2/3 (A - (A:C)/3 C^-1).
 
 Nothing is gained ever: what is lost is g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues a of A B^-1. After
-a sudden strain S falls as exp(-t/tau), and at small strain this is the generalised Maxwell solid of `materials.Prony`.
-Within a step B grows evenly, for which the recursion is exact (that of `relaxing`), and all terms together pull by the
+a sudden strain S falls as exp(-t/tau), and at small strain this is the generalised Maxwell solid of `Prony`.
+Within a step B grows evenly, for which the recursion is exact (as in `equilibrium.relaxation`), and all terms pull by
 one tensor T = sum g G A', A' being A without what it takes from the B at the end, which has no stress: a step is
 elastic with W = 1/2 J^-2/3 T:C. Tensors are (..., 4): xx, yy, xy, zz, the two others zero; plane strain, F_zz = 1.
 """
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import kept
+from solver.constitutive import inverse_transposed, kept
 
 
 def unstrained(F: Array) -> Array:
@@ -38,13 +38,8 @@ def unstrained(F: Array) -> Array:
 
 def turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
-    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
-    adjugate = np.empty_like(F)
-    adjugate[..., 0, 0], adjugate[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
-    adjugate[..., 0, 1], adjugate[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
-    plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    pulled = F @ plane
-    return J, adjugate / J[..., None, None], pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
+    pulled = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
+    return *inverse_transposed(F), pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
 
 
 def stress(T: Array, F: Array) -> Array:

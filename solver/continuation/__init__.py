@@ -138,8 +138,7 @@ def follow(
 ) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
-    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length
-    (`folding.folds_at`). Raises Cancelled.
+    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length (`folds_at`).
     """
     way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
     if way[0].value >= target * (1.0 - 1e-12):

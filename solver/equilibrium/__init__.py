@@ -204,23 +204,24 @@ class Newton:
         self._meet = bind_arguments(active_set.meet, self.skin, self.system.length)
 
     def linearise(
-        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int = 0, forces: ForceLoad | None = None
+        self,
+        state: EquilibriumState,
+        load: LoadState,
+        anchor: Array,
+        rounds: int = 0,
+        forces: ForceLoad | None = None,
+        *,
+        kept: bool = False,
     ) -> bool:
         """Set up the system at `state` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
 
         `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
-        times until none contradicts the linearised body. Where there are `forces`, the first step meets them too.
+        times until none contradicts the linearised body. Where there are `forces`, the first step meets them too. With
+        `kept` the tangent and its factors are those that are there already.
         """
-        self.systems += 1
-        if not self.condensed.linearise(state.u, state.pressure):
-            return False
-        return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
-
-    def relinearise(
-        self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
-    ) -> bool:
-        """Do the same with the forces at `state`, but the tangent and its factors that are there already."""
-        if not self.condensed.relinearise(state.u):
+        self.systems += 0 if kept else 1
+        body = self.condensed
+        if not (body.relinearise(state.u) if kept else body.linearise(state.u, state.pressure)):
             return False
         return self.solve_contact(state, load, anchor, rounds, forces) != SINGULAR
 
@@ -291,7 +292,7 @@ class Newton:
         scale, last, new, alike = 1.0, 0.0, False, 0
         for _ in range(limit):
             if kept:
-                if not self.relinearise(state, load, anchor, CONTROL.rounds):
+                if not self.linearise(state, load, anchor, CONTROL.rounds, kept=True):
                     kept = False
                     continue
                 before = state

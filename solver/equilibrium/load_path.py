@@ -97,7 +97,7 @@ class Aim(NamedTuple):
 
 
 class Way:
-    """The states so far, and how the next one is found."""
+    """The states so far, and how the next one is found; where tissues relax, with what they store."""
 
     def __init__(
         self,
@@ -105,11 +105,15 @@ class Way:
         friction: LoadState,
         loading: Loading,
         tolerance: float = SMALL.tolerance,
+        tissue: Tissue | None = None,
     ) -> None:
         """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found.
 
-        Displacements are found to a `tolerance` [mm] where depth and travel are given.
+        Displacements are found to a `tolerance` [mm] where depth and travel are given. `tissue` is one that relaxes.
         """
+        self.tissue = tissue
+        self.energies: list[tuple[float, ...]] = []  # of the places that it watches, at every instant after rest [MPa]
+        self.sense = 0  # of the friction force on all relaxing skin that touches; 0: it is found
         self.newton, self._tolerance = newton, tolerance
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
@@ -139,36 +143,19 @@ class Way:
         return followed_to(self.last.load.depth, self.last.load.travel, reason)
 
     def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim`, coming from `before`. Raises NotConverged."""
-        if not self.by_force:
-            return self.newton.settle(before, before.load._replace(depth=aim.press, travel=-aim.along), self._tolerance)
-        forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
-        return balanced(self.newton, lowered(self.newton.condensed, before), forces)
-
-
-class RelaxingWay(Way):
-    """The way of a body that relaxes, with the SED of one ending and one point at every instant after rest."""
-
-    def __init__(
-        self,
-        tissue: Tissue,
-        newton: Newton,
-        friction: LoadState,
-        loading: Loading,
-        tolerance: float = SMALL.tolerance,
-    ) -> None:
-        """Start at rest, as `Way`."""
-        super().__init__(newton, friction, loading, tolerance)
-        self.tissue = tissue
-        self.energies: list[tuple[float, ...]] = []
-        self.sense = 0  # of the friction force on all that touches, whatever comes to touch; 0: it is found
-
-    def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim`, and let the body come to it. Raises NotConverged."""
+        """Return the state at `aim`, coming from `before`, and let tissues come to it. Raises NotConverged."""
         step = aim.time - self.aim.time
-        self.newton = self.tissue.ready(step)
-        state = super().solve_step(replace(before, load=before.load._replace(sense=self.sense)), aim)
-        self.energies.append(self.tissue.took(state, step))
+        if self.tissue is not None:
+            self.newton = self.tissue.ready(step)
+            before = replace(before, load=before.load._replace(sense=self.sense))
+        if self.by_force:
+            forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
+            state = balanced(self.newton, lowered(self.newton.condensed, before), forces)
+        else:
+            load = before.load._replace(depth=aim.press, travel=-aim.along)
+            state = self.newton.settle(before, load, self._tolerance)
+        if self.tissue is not None:
+            self.energies.append(self.tissue.took(state, step))
         return state
 
 
@@ -189,7 +176,7 @@ def march(
     steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
     way = way_of(scene, finger, relaxing=relaxing)
     follow(way, finger, loading, steps, times, report)
-    if isinstance(way, RelaxingWay):
+    if way.tissue is not None:
         _wait(way, loading, scene.materials.longest_creep, times, report)
     return way
 
@@ -233,9 +220,8 @@ def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> 
     good = steps.tolerance
     if loading.normal_force is None:
         good = min(good, steps.by_depth * loading.depth)
-    if not relaxing:
-        return Way(finger.newton, load_of(scene), loading, good)
-    return RelaxingWay(tissue_of(scene, finger), finger.newton, load_of(scene), loading, good)
+    tissue = tissue_of(scene, finger) if relaxing else None
+    return Way(finger.newton, load_of(scene), loading, good, tissue)
 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
@@ -272,7 +258,7 @@ def follow(
 
 
 def _why(way: Way) -> str:
-    return ", since the tissues relax" if isinstance(way, RelaxingWay) else ""
+    return ", since the tissues relax" if way.tissue is not None else ""
 
 
 class _Settled:
@@ -293,7 +279,7 @@ class _Settled:
             slips = (state.sense == -self._direction) | self._way.frictionless
             return bool(((state.state == OPEN) | ((state.state != STICK) & slips)).all())
         before = self._sed
-        relaxes = isinstance(self._way, RelaxingWay)
+        relaxes = self._way.tissue is not None
         sed = self._sed = 0.0 if relaxes else self._finger.sed_ending(state.u)
         still = before is not None and (relaxes or abs(sed - before) * self._times <= SED_STILL * sed)
         return still and not (state.state == STICK).any()
@@ -323,7 +309,7 @@ def _slide(way: Way, speed: float, steps: CourseSteps, settled: Callable[[], boo
         go(distance + beyond * number / steps.plateau)
 
 
-def _wait(way: RelaxingWay, loading: Loading, slowest: float, times: float, report: Report) -> None:
+def _wait(way: Way, loading: Loading, slowest: float, times: float, report: Report) -> None:
     """Go on in steps that double until the `slowest` tissue [s] has relaxed, the bone sliding on where it slid last.
 
     Longer where the energy at the ending still moves: near a limit of sliding a body settles more slowly than any of

@@ -161,8 +161,7 @@ def corrected(
     load = state.load
     if forces.tangential is None:
         load = load._replace(travel=forces.travel)
-    linearise = newton.relinearise if kept else newton.linearise
-    if not linearise(state, load, origin + load.travel - before, 0, forces):
+    if not newton.linearise(state, load, origin + load.travel - before, 0, forces, kept=kept):
         return None
     deeper, along = newton.system.motion.tolist()
     load = load._replace(depth=load.depth + deeper, travel=load.travel + along)

@@ -1,4 +1,4 @@
-"""Bodies whose tissues relax (`constitutive.linear.Prony`), step by step in time.
+"""Bodies whose tissues relax (`constitutive.Prony`), step by step in time.
 
 At small strain, of every term of a series the strain that has not yet relaxed is kept, h(t) = integral of
 exp(-(t - s)/tau) de/ds ds. It is linear in the displacements, so it is kept as displacements of each element's nodes,
@@ -22,7 +22,7 @@ import numpy as np
 
 from solver._kernels import overstress as overstress_loops
 from solver.arrays import Array, Indices
-from solver.body import CondensedLinear, Endings, Probes, patch_means
+from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearBody
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
@@ -60,16 +60,14 @@ class RelaxingBody:
             check_driven(mesh)
             check_held(mesh)
         self.mesh, self._laws = mesh, laws
-        count, most = len(mesh.elements), max(len(law.terms) for law in laws)
-        self._g, self._tau = np.zeros((count, most)), np.ones((count, most))
-        for number, law in enumerate(laws):
-            for place, (g, tau) in enumerate(law.terms):
-                self._g[mesh.region == number, place], self._tau[mesh.region == number, place] = g, tau
+        self._g, self._tau = _terms(laws, mesh.region)
         shear = [Moduli(law.shear, -2.0 / 3.0 * law.shear) for law in laws]
         self.elastic = Elastic.of(mesh, shear)  # of the shear moduli alone, at once
         self._bulk = np.array([law.bulk for law in laws])[mesh.region]
         self.displacement = np.zeros(mesh.nodes.shape)
-        self._left = np.zeros((count, 18, most))  # h of each term, as displacements of the elements' nodes
+        self._left = np.zeros(
+            (len(mesh.elements), 18, self._g.shape[1])
+        )  # h of each term, as displacements of the elements' nodes
         self._steps: dict[str, LinearBody] = {}
         self._next: tuple[Callable[[Array], Array], float] | None = None
 
@@ -122,7 +120,7 @@ class RelaxingBody:
 
     def average(self, endings: Endings) -> Array:
         """Return the stored energy averaged over each patch (r,) [MPa]; nan where there is no patch."""
-        return patch_means(self.energy(endings.probes), endings.weights, endings.patch, endings.areas)
+        return endings.means(self.energy(endings.probes))
 
     def _strain(self, probes: Probes, local: Array) -> tuple[Array, Array]:
         """Return e:e of the strain's deviator and the volume strain (p,) for element displacements (p, 18)."""
@@ -159,7 +157,7 @@ class CondensedRelaxing(CondensedFinite):
         super().__init__(body)
         check_moduli(body.mesh, laws)
         check_terms(laws)
-        self.past = Past.at_rest(*_terms(laws, np.repeat(body.mesh.region, body.elements.weight.shape[1])))
+        self.past = _at_rest(laws, np.repeat(body.mesh.region, body.elements.weight.shape[1]))
         self.tensor = np.zeros((*body.elements.weight.shape, 4))
 
     def ready(self, step: float) -> None:
@@ -203,13 +201,19 @@ class CondensedRelaxing(CondensedFinite):
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
-    """Return g G and tau (p, m) of the terms at points in regions (p,)."""
+    """Return g and tau (p, m) of the terms at points in regions (p,)."""
     most = max(len(law.terms) for law in laws)
-    shear, tau = np.zeros((len(region), most)), np.ones((len(region), most))
+    g, tau = np.zeros((len(region), most)), np.ones((len(region), most))
     for number, law in enumerate(laws):
-        for place, (g, time) in enumerate(law.terms):
-            shear[region == number, place], tau[region == number, place] = g * law.shear, time
-    return shear, tau
+        for place, term in enumerate(law.terms):
+            g[region == number, place], tau[region == number, place] = term
+    return g, tau
+
+
+def _at_rest(laws: Sequence[Prony], region: Indices) -> Past:
+    """Return the past of points in regions (p,) that were never strained."""
+    g, tau = _terms(laws, region)
+    return Past.at_rest(g * np.array([law.shear for law in laws])[region, None], tau)
 
 
 class LinearTissue:
@@ -236,7 +240,7 @@ class FiniteTissue:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used."""
         self._relaxing, self._watched = CondensedRelaxing(body, laws), watched
         self._newton = Newton(self._relaxing)
-        self._pasts: list[Past] = [Past.at_rest(*_terms(laws, body.mesh.region[probes.element])) for probes in watched]
+        self._pasts: list[Past] = [_at_rest(laws, body.mesh.region[patches.places.element]) for patches in watched]
 
     def ready(self, step: float) -> Newton:
         """Do as `Tissue` says."""
@@ -252,5 +256,5 @@ class FiniteTissue:
         means: list[float] = []
         for past, at in zip(self._pasts, self._watched, strict=True):
             energy = at.energy(state.u) + past.energy()
-            means.append(float(energy @ at.weights / at.weights.sum()))
+            means.append(float(energy @ at.endings.weights / at.endings.weights.sum()))
         return tuple(means)

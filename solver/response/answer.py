@@ -13,7 +13,7 @@ from solver.body import Patches
 from solver.contact import STATE_NAMES
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger
-from solver.equilibrium.load_path import Instant, RelaxingWay, Way
+from solver.equilibrium.load_path import Instant, Way
 from solver.prediction import FORCES_AND_PLACES, ROW, History, NestedNumbers, Prediction, Row, Skin, drag, sed_alone
 from solver.scene import Scene
 
@@ -35,7 +35,7 @@ class Solved:
     @property
     def elastic_way(self) -> tuple[Instant, ...] | None:
         """The way, where it can be drawn from forces alone: nothing relaxes on it."""
-        return None if self.way is None or isinstance(self.way, RelaxingWay) else tuple(self.way.instants)
+        return None if self.way is None or self.way.tissue is not None else tuple(self.way.instants)
 
 
 def prediction(
@@ -100,7 +100,7 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
 
 def history(scene: Scene, finger: Finger[Patches], way: Way) -> History:
     """Return a course as arrays; at small strain the finger at rest comes first."""
-    relaxing = isinstance(way, RelaxingWay)
+    relaxing = way.tissue is not None
     first = 0 if isinstance(finger, LinearFinger) else 1
     instants = way.instants[first:]
     states = [instant.state for instant in instants]

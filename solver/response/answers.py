@@ -22,7 +22,7 @@ from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue,
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_path import Instant, RelaxingWay, end, march
+from solver.equilibrium.load_path import Instant, end, march
 from solver.equilibrium.load_stepping import forces_of
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure
@@ -80,7 +80,7 @@ def _audited(
     checks |= audit.forces_missed(scene, float(state.force[1]), float(state.force[0]))
     if way is None:
         return
-    relaxing = isinstance(way, RelaxingWay)
+    relaxing = way.tissue is not None
     checks |= audit.course_audits(newton, [instant.state for instant in way.instants], relaxing=relaxing)
     if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
         checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(one.displacement) - 1.0)

@@ -242,14 +242,16 @@ def average(body, probes, u):
     inside = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
     log = np.log(determinant(np.eye(2) + np.einsum("eia,eqiA->eqaA", u[body.elements.nodes], inside)))
     volume = np.einsum("eq,eqm,eq->em", body.elements.weight, body.elements.modes, log)
-    here = np.stack([probes.grad_x, probes.grad_y], axis=-1)
-    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[probes.element]], here)
+    here = np.stack([probes.places.grad_x, probes.places.grad_y], axis=-1)
+    F = np.eye(2) + np.einsum("pia,piA->paA", u[body.elements.nodes[probes.places.element]], here)
     Q = np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(determinant(F))
-    shear, lame = body.elements.shear[probes.element], body.elements.lame[probes.element]
-    stretched = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[probes.element], Q)
-    energy = shear / 2.0 * stretched + lame / 2.0 * np.sum(probes.modes * volume[probes.element], axis=1) ** 2
-    totals = [np.sum((energy * probes.weights)[probes.patch == n]) for n in range(3)]
-    return np.array(totals) / np.bincount(probes.patch, probes.weights)
+    shear, lame = body.elements.shear[probes.places.element], body.elements.lame[probes.places.element]
+    stretched = Q if body.elements.stiffening[0] == 2.0 else grown(body.elements.stiffening[probes.places.element], Q)
+    energy = (
+        shear / 2.0 * stretched + lame / 2.0 * np.sum(probes.places.modes * volume[probes.places.element], axis=1) ** 2
+    )
+    totals = [np.sum((energy * probes.endings.weights)[probes.endings.patch == n]) for n in range(3)]
+    return np.array(totals) / np.bincount(probes.endings.patch, probes.endings.weights)
 
 
 def determinant(f):

@@ -203,7 +203,7 @@ def test_probed_energy_of_an_even_squeeze_is_the_laws_own():
     u = body.mesh.nodes @ (F - np.eye(2)).T
     Q = np.sum(F * F) - 2.0 - 2.0 * np.log(np.linalg.det(F))
     expected = body.elements.shear / 2.0 * Q + body.elements.lame / 2.0 * np.log(np.linalg.det(F)) ** 2
-    np.testing.assert_allclose(probes.energy(u), expected[probes.element], rtol=1e-9)
+    np.testing.assert_allclose(probes.energy(u), expected[probes.places.element], rtol=1e-9)
 
 
 def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one_is():
