@@ -11,10 +11,11 @@ import pytest
 from solver import Friction, Loading, Scene, Solve, solve, stepper
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.load_stepping import march, press_and_slide
+from solver.equilibrium.load_stepping import march
 from solver.mesh.mesher import Sizing
 from solver.prediction import ROW
 from solver.response.stepper import FiniteStepper, SmallStepper
+from solver.verification.histories import press_and_slide
 
 KINEMATICS = ("small", "finite")
 
