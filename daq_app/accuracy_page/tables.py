@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import TypeVar
@@ -63,8 +64,8 @@ def _of_rows(name: str, caption: str, rows: Sequence[R], columns: Mapping[str, C
 def tables(measured: Measured) -> dict[str, Table]:
     """Return the tables that there are rows for, by name."""
     builders: tuple[Callable[[Measured], Table], ...] = (
-        machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems, hard_small,
-        hard_finite,
+        machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems,
+        *(partial(_hard, kinematics=kinematics) for kinematics in ("small", "finite")),
     )  # fmt: skip
     return {table.name: table for table in (make(measured) for make in builders) if table.rows}
 
@@ -205,12 +206,13 @@ def costs(measured: Measured) -> Table:
 def starts(measured: Measured) -> Table:
     """Return cold starts."""
     rows: list[Cold] = measured.of(Cold)
-    cells = [(row.what, str(row.runs), _ms(row.took_s), _ms(row.passed_s)) for row in rows]
-    header = ("process", "runs", "processor time [ms]", "time that passed [ms]")
     caption = (
         "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones."
     )
-    return Table("starts", caption, header, tuple(cells))
+    return _of_rows("starts", caption, rows, {
+        "process": lambda row: row.what, "runs": lambda row: str(row.runs),
+        "processor time [ms]": lambda row: _ms(row.took_s), "time that passed [ms]": lambda row: _ms(row.passed_s),
+    })  # fmt: skip
 
 
 def orders(measured: Measured) -> Table:
@@ -237,22 +239,14 @@ def problems(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def hard_small(measured: Measured) -> Table:
-    """Return the hard cases at small strain."""
-    return _hard(measured, "small")
-
-
-def hard_finite(measured: Measured) -> Table:
-    """Return the hard cases at finite strain."""
-    return _hard(measured, "finite")
-
-
 def _hard(measured: Measured, kinematics: str) -> Table:
     rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
-    cells = [(row.case, row.must, f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary) for row in rows]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
-    return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), tuple(cells))
+    return _of_rows(f"hard-{kinematics}", caption, rows, {
+        "case": lambda row: row.case, "must": lambda row: row.must,
+        "outcome": lambda row: f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary,
+    })  # fmt: skip
 
 
 def _ms(seconds: float | None) -> str:

@@ -1,23 +1,57 @@
-"""Sessions of a study computed by the workers of an existing Dask cluster."""
+"""What one session brings to a study, computed where it lies, or from its files by workers of a Dask cluster."""
 
 import asyncio
 import importlib
 import logging
+import tempfile
 import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, cast
 
-from daq_app.batch.session_numbers import Answer, computed_from, content_of
+from sessions.prediction.sealed_predictions import SEAL
+from sessions.recording import Recording
+from sessions.recording.derived import GAIN_ERROR
 from sessions.recording.provenance import software_versions
-from sessions.statistics.pooling.visit import VisitOptions
+from sessions.recording.schema import LIVE_FILE
+from sessions.recording.visits import UNBLINDING
+from sessions.statistics.pooling.visit import VisitOptions, visit_of
+from sessions.strokes.decisions import DECISIONS
 
 LOOK = 0.1  # between two looks whether something is done [s]
 WITHOUT_WORKERS = 30.0  # that a cluster may have no worker before it is given up [s]
 ANSWERS = 20.0  # that a scheduler may take to answer [s]
 AGAIN = "run this again once it is there: what is done is kept"
 NUMBERS_BY = ("daq-app", "numpy", "scipy", "numba")  # whose other versions may give other numbers
+# All that a visit's numbers come from.
+CONTENT = (LIVE_FILE, f"{LIVE_FILE}-wal", UNBLINDING, SEAL, DECISIONS, GAIN_ERROR)
+
+Answer = tuple[str, dict[str, Any] | str]  # session, and what it brings or why it brings nothing
+
+
+def content_of(session: Path) -> dict[str, bytes]:
+    """Return the files of a session that its numbers come from. Raises OSError."""
+    return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
+
+
+def computed(folder: Path, options: VisitOptions) -> Answer:
+    """Return what the session in a folder brings; for a worker: nothing is raised."""
+    try:
+        return folder.name, visit_of(Recording.open(folder), options, software_versions()).to_dict()
+    except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
+        sentence = " ".join(str(error).split()) or type(error).__name__
+        return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
+
+
+def computed_from(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
+    """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
+    with tempfile.TemporaryDirectory() as room:
+        folder = Path(room) / name
+        folder.mkdir()
+        for file, data in content.items():
+            (folder / file).write_bytes(data)
+        return computed(folder, options)
 
 
 class SchedulerError(Exception):

@@ -13,8 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from daq_app.batch.cluster import by_cluster
-from daq_app.batch.session_numbers import Answer, computed, content_of
+from daq_app.batch.cluster import Answer, by_cluster, computed, content_of
 from daq_app.child_process import process_pool
 from daq_app.console import Console
 from sessions.atomic_file import write_whole

@@ -12,8 +12,8 @@ import pytest
 
 from daq_app.batch import cluster
 from daq_app.batch import pool as pooling
+from daq_app.batch.cluster import computed, computed_from, content_of
 from daq_app.batch.pool import Shelf, visits
-from daq_app.batch.session_numbers import computed, computed_from, content_of
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study

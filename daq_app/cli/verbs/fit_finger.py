@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from daq_app.batch.derived import open_visit, stored_settings
-from daq_app.cli.analysis_options import add_calibration, calibration_error
 from daq_app.cli.options import add_number, add_seed, add_visit
+from daq_app.cli.session_options import add_calibration, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.atomic_file import write_whole
 from sessions.exchange.displacement_log import displacement_log

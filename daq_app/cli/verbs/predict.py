@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
-from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
 from daq_app.cli.options import (
     add_kinematics,
     add_number,
@@ -22,6 +21,7 @@ from daq_app.cli.options import (
     add_visit,
     numbers_by_key,
 )
+from daq_app.cli.session_options import add_analysis, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.prediction import (
     BY_NAME,

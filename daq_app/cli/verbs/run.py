@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import get_args
 
 from daq_app.cli.attending import attend_session, open_device
-from daq_app.cli.body_options import add_body_arguments, body_of, own_sentence
+from daq_app.cli.session_options import add_body_arguments, body_of, own_sentence
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.pool import Shelf, visits
-from daq_app.cli.analysis_options import add_analysis, area_law, calibration_error
 from daq_app.cli.options import (
     LARGEST_SEED,
     add_kinematics,
@@ -24,6 +23,7 @@ from daq_app.cli.options import (
     add_tau,
     add_workers,
 )
+from daq_app.cli.session_options import add_analysis, area_law, calibration_error
 from daq_app.cli.study_power import add_power, print_power
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from sessions.atomic_file import json_text
