@@ -5,7 +5,8 @@ import ctypes
 import gc
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -82,6 +83,18 @@ def command_line() -> argparse.ArgumentParser:
     return parser
 
 
+@contextmanager
+def _kept() -> Generator[None]:
+    """Look for no garbage: what is made now stays, and looking through it again and again would hold the window up."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+@_kept()
 def opened(
     application: "QApplication",
     start: "Callable[[], Client] | None" = None,
@@ -92,20 +105,6 @@ def opened(
 
     Without a `theme` that of the system is followed. With a `tablet` the subject's page is there.
     """
-    gc.disable()  # what is made now stays: looking through it again and again would only hold the window up
-    try:
-        return _opened(application, start, theme, tablet)
-    finally:
-        gc.freeze()
-        gc.enable()
-
-
-def _opened(
-    application: "QApplication",
-    start: "Callable[[], Client] | None",
-    theme: "Tokens | None",
-    tablet: "TabletScreen | None",
-) -> "MainWindow":
     from daq_app.recorder.client import Recorder
     from daq_app.recorder.messages import Connect
 
