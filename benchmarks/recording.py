@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.calibration import Calibration
+from drivers.clock import SimulatedClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
@@ -27,21 +28,6 @@ BLOCK = 140  # readings handed over at once: 20 ms
 INFO = TransducerInfo(
     "bench://", "bench", "bench", "0", True, RATE, RATE, Calibration("0", "counts", np.eye(6), np.ones(6), "none")
 )
-
-
-class SimulatedClock:
-    """A clock that is told the time."""
-
-    factor = 1.0
-    ns = 0
-
-    def now_ns(self) -> int:
-        """Return the simulated time [ns]."""
-        return self.ns
-
-    def sleep(self, seconds: float) -> None:
-        """Move the time on."""
-        self.ns += round(seconds * 1e9)
 
 
 def main() -> None:
@@ -77,7 +63,7 @@ def measure(folder: Path, seconds: int) -> None:
     worked = time.process_time()
     for first in range(0, seconds * RATE, BLOCK):
         i = np.arange(first, first + BLOCK)
-        block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.ns), raw)
+        block = ReadingBlock(i, i, i * 0, i / RATE, np.full(BLOCK, clock.now_ns()), raw)
         clock.sleep(BLOCK / RATE)
         began = time.perf_counter()
         writer.readings(block)

@@ -177,7 +177,6 @@ def _only(elements: list[tuple[tuple[str, ...], _Attributes]], path: tuple[str, 
 
 
 def _by_name(elements: list[tuple[tuple[str, ...], _Attributes]], tag: str) -> dict[str, _Attributes]:
-    """Return the elements `tag` of the calibration by their axis."""
     axes: dict[str, _Attributes] = {}
     for path, attributes in elements:
         if path == (*_BODY, tag):

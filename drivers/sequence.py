@@ -97,7 +97,6 @@ class SequenceAccount:
         return Accounted(np.arange(len(numbers)), sequence, counter, undecided=False)
 
     def _one_by_one(self, records: list[_Record], end: bool) -> Accounted:
-        """Judge each record on its own."""
         kept: list[int] = []
         places: list[tuple[int, int]] = []
         undecided: int | None = None

@@ -13,8 +13,8 @@ from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
 from simulators.gauges import FT32831
-from simulators.line_box import LineBox
 from simulators.pseudo_terminal import ROOM, PseudoTerminal
+from simulators.served_box import LineBox
 from simulators.simulator import Simulator, served
 
 Array = NDArray[np.float64]
@@ -66,7 +66,6 @@ class DigitalFtBox(LineBox):
         return f"digital-ft://{self.path}?parity=none"
 
     def _calibration(self) -> bytes:
-        """Return the registers of calibration 1."""
         serial = f"SIM{self._bench.seed:05d}".encode()[:8]
         stated = np.vstack([FT32831[:3], FT32831[3:] / 1000.0]) * (_COUNTS / COUNTS_PER_VOLT)
         ratings = np.concatenate([self._rated[:3], self._rated[3:] / 1000.0])
@@ -104,7 +103,6 @@ class DigitalFtBox(LineBox):
             port.say(self._answers())
 
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
-        """Send the packets that are due, and whatever was delayed until now."""
         if self._streaming_since is None:
             return
         since, age = self.faults.aged(np.array([self._streaming_since, now])).tolist()

@@ -140,7 +140,6 @@ class Faults:
         return leaving
 
     def _overdue(self, time: float) -> list[bytes]:
-        """Return what was delayed until `time`."""
         leaving: list[bytes] = []
         while self._delayed and self._delayed[0][0] <= time:
             leaves, datagram = heapq.heappop(self._delayed)

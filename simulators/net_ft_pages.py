@@ -160,7 +160,7 @@ class Pages:
             self._kept[name] = text
 
     def _set_rate(self, rate: int) -> None:
-        """Send every so-many-th tick, at `asked` readings a second or the next higher rate that divides the ticks."""
+        """Send every so-many-th tick, at `rate` readings a second or the next higher rate that divides the ticks."""
         self.step = int(self.product.ticks // rate)
 
 

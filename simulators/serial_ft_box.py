@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.line_box import LineBox
 from simulators.pseudo_terminal import PseudoTerminal
+from simulators.served_box import LineBox
 from simulators.simulator import Simulator, served
 
 Array = NDArray[np.float64]
@@ -122,7 +122,6 @@ class SerialFtBox(LineBox):
         return float(self.faults.instants(np.array([since + record * self._period]))[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
-        """Take one byte from the line."""
         if byte == 0x17:
             self.power_up(self.now())
         elif byte == 0x14:

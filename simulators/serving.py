@@ -8,7 +8,7 @@ from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Faults
 from simulators.net_ft_box import NetFtBox
 from simulators.serial_ft_box import SerialFtBox
-from simulators.timetable import ScriptedBench, Timetable, load_timetable, usual_timetable
+from simulators.timetable import ScriptedBench, load_timetable, usual_timetable
 
 
 def serve_net_ft(
@@ -26,16 +26,10 @@ def serve_net_ft(
     Without `http_port` it takes 80, or a free port where 80 is refused. Time runs `factor` times as fast as real.
     Raises SetupError when a port is in use or the script is missing, TimetableError when the script is wrong.
     """
-    timetable = _timetable(script)
 
     def box(port: int) -> NetFtBox:
-        return NetFtBox(
-            ScriptedBench(seed, timetable),
-            clock_at(factor),
-            rate=rate,
-            ports=(rdt_port, tcp_port, port),
-            faults=_faults(timetable, seed),
-        )
+        bench, faults = _scripted(script, seed)
+        return NetFtBox(bench, clock_at(factor), rate=rate, ports=(rdt_port, tcp_port, port), faults=faults)
 
     if http_port is None:
         usual = box(80)
@@ -57,23 +51,21 @@ def serve_serial_ft(
 
     Raises SetupError where there are no pseudo-terminals or the script is missing, TimetableError when it is wrong.
     """
-    timetable = _timetable(script)
-    box = SerialFtBox(ScriptedBench(seed, timetable), clock_at(factor), baud=baud, faults=_faults(timetable, seed))
+    bench, faults = _scripted(script, seed)
+    box = SerialFtBox(bench, clock_at(factor), baud=baud, faults=faults)
     box.start()
     return box
 
 
 def serve_digital_ft(*, seed: int = 0, factor: float = 1.0, script: Path | None = None) -> DigitalFtBox:
     """Return an RS-485 transducer that serves on a pseudo-terminal until it is closed. Raises as `serve_serial_ft`."""
-    timetable = _timetable(script)
-    box = DigitalFtBox(ScriptedBench(seed, timetable), clock_at(factor), faults=_faults(timetable, seed))
+    bench, faults = _scripted(script, seed)
+    box = DigitalFtBox(bench, clock_at(factor), faults=faults)
     box.start()
     return box
 
 
-def _timetable(script: Path | None) -> Timetable:
-    return usual_timetable() if script is None else load_timetable(script)
-
-
-def _faults(timetable: Timetable, seed: int) -> Faults:
-    return Faults(timetable.faults, seed=seed, repeat=timetable.repeat)
+def _scripted(script: Path | None, seed: int) -> tuple[ScriptedBench, Faults]:
+    """Return the bench and the faults of a script, or of the usual timetable."""
+    timetable = usual_timetable() if script is None else load_timetable(script)
+    return ScriptedBench(seed, timetable), Faults(timetable.faults, seed=seed, repeat=timetable.repeat)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts, SkinLine
-from sessions.prediction import Way
+from sessions.prediction.predicting import Way
 from sessions.report.contents import Field
 from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step

@@ -18,7 +18,8 @@ from daq_app.batch.derived import analysis_document, stored_options, stored_sett
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
 from sessions.plan.plan import Blinded
-from sessions.prediction import PredictionOptions, TrialPrediction, Way, predict
+from sessions.prediction import PredictionOptions, TrialPrediction, predict
+from sessions.prediction.predicting import Way
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.provenance import software_versions

@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -38,7 +39,7 @@ def content_of(session: Path) -> dict[str, bytes]:
 def computed(folder: Path, options: VisitOptions) -> Answer:
     """Return what the session in a folder brings; for a worker: nothing is raised."""
     try:
-        return folder.name, visit_of(Recording.open(folder), options, software_versions()).to_dict()
+        return folder.name, asdict(visit_of(Recording.open(folder), options, software_versions()))
     except Exception as error:  # noqa: BLE001  one bad session must not stop the rest
         sentence = " ".join(str(error).split()) or type(error).__name__
         return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed

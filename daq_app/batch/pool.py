@@ -17,6 +17,7 @@ from daq_app.batch.cluster import Answer, by_cluster, computed, content_of
 from daq_app.child_process import process_pool
 from daq_app.console import Console
 from sessions.atomic_file import write_whole
+from sessions.json_document import converted
 from sessions.recording import RecordingError
 from sessions.recording.provenance import software_versions
 from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions
@@ -47,7 +48,7 @@ class Shelf:
         with suppress(OSError, ValueError, KeyError, TypeError):
             kept = json.loads(self.file(key).read_bytes())
             if kept["sha256"] == _digest(kept["visit"]):
-                return Visit.from_dict(kept["visit"])
+                return converted(kept["visit"], Visit)
         return None
 
     def file(self, key: str) -> Path:
@@ -106,7 +107,7 @@ def visits(
                 console.note(f"{name}: {answer}")
             else:
                 shelf.keep(named[name], answer)
-                done.append(Visit.from_dict(answer))
+                done.append(converted(answer, Visit))
             left = (time.monotonic() - begun) / count * (len(missing) - count)
             remaining = "" if console.at_terminal else f", {left:.0f} s left"
             console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{remaining}")

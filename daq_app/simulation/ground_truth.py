@@ -15,7 +15,8 @@ from daq_app.simulation.synthetic import PROTOCOL
 from daq_app.simulation.wiring import planted_surface
 from sessions.plan.plan import Block
 from sessions.plan.protocols import plan, protocol
-from sessions.prediction import PredictionOptions, seds_at
+from sessions.prediction import PredictionOptions
+from sessions.prediction.solving import seds_at
 from sessions.strokes.friction import FIXED, AreaLaw
 from simulators.subject import SimulatedSubject, SubjectSettings
 from simulators.surface import Surface

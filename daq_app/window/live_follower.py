@@ -15,7 +15,8 @@ import numpy as np
 from daq_app.window.live_model import Forces, Kinematics, Picture, Provisional, Settle, Settled, Use
 from daq_app.wording import tr
 from sessions.plan.plan import SessionPlan
-from sessions.prediction import DEFAULT_SPEED, SLIDES, PredictionOptions, with_own_finger
+from sessions.prediction import PredictionOptions, with_own_finger
+from sessions.prediction.scenes import DEFAULT_SPEED, SLIDES
 from sessions.prediction.stored import known_error
 from sessions.strokes import FrictionParameters
 from sessions.strokes.settings import RatioSettings

@@ -80,7 +80,6 @@ def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
 
 
 def _line(place: _Where, _deadline: Deadline) -> SerialLink:
-    """Return the line, open."""
     return SerialLink(place.port, place.baud, place.parity)
 
 

@@ -204,7 +204,6 @@ def _constants(link: Link) -> wire.Constants:
 
 
 def _said(link: Link, request: bytes) -> bytes | None:
-    """Return the answer to a request, or None."""
     link.send(request)
     return link.receive(_ANSWER)
 

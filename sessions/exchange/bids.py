@@ -154,13 +154,12 @@ def _events(recording: Recording) -> Table:
 
 
 def _write_readings(recording: Recording, folder: Path, names: _Names, progress: Progress) -> None:
-    """Write a file for each stretch of readings without a break."""
     assert recording.info is not None
     calibration = recording.info.calibration
     described = [*columns(calibration), *([_MARK] if recording.simulated else [])]
     mark = (1,) if recording.simulated else ()
     first_ns = recording.events[0].time_ns if recording.events else 0
-    expected = max((event.readings for event in recording.events), default=0) or 1
+    expected = recording.expected_readings or 1
     several = sum(begins for _, begins in _stretches(recording)) > 1
     file: Any = None
     written, part, last = 0, 0, None
@@ -254,7 +253,6 @@ def _blocks(parts: Iterable[Path]) -> Iterator[ReadingBlock]:
 
 
 def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[str, Any] | None = None) -> None:
-    """Write a table beside the description of its columns."""
     columns_written = table.columns
     if recording.simulated:
         count = len(columns_written[0].values) if columns_written else 0

@@ -77,7 +77,7 @@ def _write_rows(file: TextIO, mark: Sequence[Column], header: list[list[str]], r
 def _write_readings(recording: Recording, mark: Sequence[Column], path: Path, progress: Progress) -> None:
     assert recording.info is not None
     calibration = recording.info.calibration
-    expected = max((event.readings for event in recording.events), default=0) or 1
+    expected = recording.expected_readings or 1
     written = 0
     with _open(path) as file:
         _write_rows(file, mark, [[column.heading for column in columns(calibration)]], ())

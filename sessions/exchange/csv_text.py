@@ -10,6 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
+from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
@@ -54,6 +56,14 @@ _DELIMITERS = (",", ";", "\t")
 
 class ImportRefused(Exception):
     """The file cannot be taken as a recording; one sentence names file, line and what to do."""
+
+
+def content_of(path: Path) -> bytes:
+    """Return what a CSV file holds. Raises ImportRefused where it cannot be read."""
+    try:
+        return read_limited(path, LARGEST_TABLE)
+    except OSError as error:
+        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
 
 
 def records(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sessions.exchange.csv_text import ImportRefused, cell_text, number_in, records
-from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+from sessions.exchange.csv_text import ImportRefused, cell_text, content_of, number_in, records
 from sessions.prediction.press_curves import DisplacementLog
 
 DISPLACEMENT = "displacement_mm"
@@ -19,11 +18,7 @@ def displacement_log(path: Path) -> DisplacementLog:
 
     Raises ImportRefused.
     """
-    try:
-        content = read_limited(path, LARGEST_TABLE)
-    except OSError as error:
-        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
-    rows = records(path, content)
+    rows = records(path, content_of(path))
     _, header = next(rows, (0, [""]))
     names = [cell.strip() for cell in header]
     clock = next((name for name in CLOCKS if name in names), None)
@@ -51,6 +46,5 @@ def displacement_log(path: Path) -> DisplacementLog:
 
 
 def _number(cells: Sequence[str], place: int) -> float:
-    """Return the number in a cell; nan where there is none."""
     value = number_in(cells[place]) if place < len(cells) else None
     return np.nan if value is None else value

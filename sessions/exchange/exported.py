@@ -22,6 +22,7 @@ from sessions.recording.head import info_from_dict, plan_from_dict
 from sessions.recording.log import LoggedEvent
 from sessions.recording.provenance import software_versions
 from sessions.recording.reader import Recording
+from sessions.recording.replay import RecordedReadings
 from sessions.recording.schema import FORMAT, FORMAT_VERSION, LIVE_FILE, RecordingError
 from sessions.recording.writer import SessionWriter
 from sessions.strokes.decisions import DECISIONS
@@ -119,22 +120,12 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
 
 def _write(exported: ExportedSession, writer: SessionWriter) -> None:
     """Write readings and events in the order in which they were recorded."""
-    blocks = exported.blocks()
-    waiting = ReadingBlock.empty()
-    written = 0
+    readings = RecordedReadings(exported.blocks())
     for event in exported.events:
-        while written < event.readings:
-            if not len(waiting):
-                waiting = next(blocks, ReadingBlock.empty())
-                if not len(waiting):
-                    break
-            count = min(len(waiting), event.readings - written)
-            writer.readings(waiting.between(0, count))
-            waiting = waiting.between(count, len(waiting))
-            written += count
+        for block in readings.blocks_up_to(event.readings):
+            writer.readings(block)
         writer.event(event.kind, event.trial, event.data, time_ns=event.time_ns, commit=False)
-    writer.readings(waiting)
-    for block in blocks:
+    for block in readings.blocks_up_to(None):
         writer.readings(block)
 
 

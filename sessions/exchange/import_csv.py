@@ -15,8 +15,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.atomic_file import write_whole
 from sessions.exchange.csv_columns import TIME_UNITS, Columns, ColumnsUnknown, columns
-from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, number_in, records
-from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, number_in, records
 from sessions.plan.plan import Frame, Origin, SessionPlan
 from sessions.recording.provenance import Setting, provenance
 from sessions.recording.writer import SessionWriter
@@ -73,10 +72,7 @@ def import_csv(path: Path, folder: Path, options: ImportOptions | None = None) -
     file, RecordingError for a folder that cannot be written.
     """
     stated = options or ImportOptions()
-    try:
-        content = read_limited(path, LARGEST_TABLE)
-    except OSError as error:
-        raise ImportRefused(f"{path} cannot be read ({error.strerror}); {remedy(error)}, a CSV file") from error
+    content = content_of(path)
     layout, rows, lines = _table(path, content, stated)
     time, rate, rate_origin = _times(path, layout, rows, lines, stated)
     raw = rows[:, list(layout.axes)]

@@ -21,7 +21,7 @@ import numpy as np
 
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, tables
-from sessions.recording import LoggedEvent, Recording
+from sessions.recording import Recording
 from sessions.recording.description import description
 from sessions.recording.head import json_text
 
@@ -165,6 +165,7 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
 
 def _events(recording: Recording, first_ns: int) -> Table:
     events = recording.events
+    texts = tuple("; ".join(f"{name}: {value}" for name, value in _flat(event.data)) for event in events)
     return Table(
         "events",
         "Everything that happened, in order.",
@@ -174,13 +175,9 @@ def _events(recording: Recording, first_ns: int) -> Table:
             Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
             Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events)),
             Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-            Column("data", "", "what else is known, for people; exact in the notes", tuple(map(_event_text, events))),
+            Column("data", "", "what else is known, for people; exact in the notes", texts),
         ),
     )
-
-
-def _event_text(event: LoggedEvent) -> str:
-    return "; ".join(f"{name}: {value}" for name, value in _flat(event.data))
 
 
 def _flat(data: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, object]]:

@@ -94,6 +94,7 @@ class Table:
 def tables(source: ExportSource) -> tuple[Table, ...]:
     """Return every table of a session but those of events and readings; predictions only where they were stored."""
     analysis = source.analysis
+    flaws = [{"flaw": row["name"], **{k: v for k, v in row.items() if k != "name"}} for row in analysis["flaws"]]
     measured = (
         trials(source.recording),
         answers(source.recording),
@@ -102,7 +103,7 @@ def tables(source: ExportSource) -> tuple[Table, ...]:
         _table(
             "friction", "what the model is given: a row for each trial with a stroke", _friction(analysis), FRICTION
         ),
-        _table("flaws", "what is wrong with the recording or with a stroke", _flaws(analysis), FLAW),
+        _table("flaws", "what is wrong with the recording or with a stroke", flaws, FLAW),
     )
     if analysis.get("decisions"):
         decisions = _table("decisions", "what people decided, in force", analysis["decisions"], DECISION)
@@ -257,7 +258,6 @@ def _zero(recording: Recording, trial: int, start_ns: int | None) -> tuple[float
 
 
 def _strokes(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the strokes with their bootstrap intervals, where the analysis holds them."""
     strokes: Sequence[dict[str, Any]] = analysis["strokes"]
     bootstrap: Mapping[str, Any] = analysis.get("bootstrap") or {}
     if not bootstrap.get("strokes"):
@@ -294,11 +294,6 @@ def _friction(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
             row["mu_interval_by"] = None if row["mu_interval"] is None else analysis["interval"]
         rows.append(row)
     return rows
-
-
-def _flaws(analysis: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the flaws, with the name of each under `flaw`."""
-    return [{"flaw": row["name"], **{k: v for k, v in row.items() if k != "name"}} for row in analysis["flaws"]]
 
 
 def _table(

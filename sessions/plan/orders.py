@@ -106,5 +106,4 @@ def opaque_codes(count: int, seed: int) -> tuple[str, ...]:
 
 
 def _digest(text: str) -> bytes:
-    """Return the SHA-256 digest of a text."""
     return hashlib.sha256(text.encode()).digest()

@@ -138,7 +138,7 @@ def _new_key(protocol: Protocol) -> Key:
 
 
 def _changed(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Mapping[str, Any]]]) -> Study:
-    """Add the event that `chosen` makes of the study as it stands, while nobody else can change it."""
+    """Add the event that `choose` makes of the study as it stands, while nobody else can change it."""
     open_study(folder)  # says what is wrong where it is none
     with _changing(folder) as connection:
         _tell(connection, *_ordered(subject, *choose(_study(connection, folder))))
@@ -157,7 +157,6 @@ def _tell(connection: sqlite3.Connection, kind: str, subject: str, data: Mapping
 
 
 def _study(connection: sqlite3.Connection, folder: Path) -> Study:
-    """Return the study that a file holds."""
     path = folder / STUDY_FILE
     head = dict(connection.execute("SELECT name, value FROM head").fetchall())
     if head.get("version") != str(VERSION):

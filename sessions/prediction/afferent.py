@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import QUANTITIES, SED, Quantity, SessionPrediction, TrialPrediction
-from sessions.prediction.stored import Ends
-from solver.quantities import NAMES
+from sessions.prediction.stored import Ends, SessionPrediction, TrialPrediction
+from solver.quantities import NAMES, QUANTITIES, SED, Quantity
 
 Array = NDArray[np.float64]
 

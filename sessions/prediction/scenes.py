@@ -83,18 +83,8 @@ def _prepared(case: _Case, options: PredictionOptions) -> Prepared:
         indentation=planned if options.indentation is None else options.indentation,
         direction=direction,
         speed=None if friction is None else friction.speed,
-        sed=None,
-        error_estimate=None,
-        normal_per_mm=None,
-        tangential_per_mm=None,
-        normal_force=None,
-        tangential_force=None,
         measured_normal=None if stroke is None else stroke.normal_force,
         measured_tangential=None if stroke is None else stroke.tangential_force,
-        matching_depth=None,
-        opposite_sed=None,
-        wall_s=None,
-        reasons={},
     )
     why = _missing(row, stroke)
     if why is not None:

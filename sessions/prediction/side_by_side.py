@@ -7,22 +7,21 @@ accurate; between two they are as good as each one's error estimate.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sessions.prediction import (
-    Prediction,
-    PredictionOptions,
-    Progress,
+from sessions.prediction.options import PredictionOptions, tau_scale
+from sessions.prediction.scenes import scene_along
+from sessions.prediction.solving import Progress, doubt_of, part_of, solved, traction_reached
+from sessions.prediction.stored import (
+    Alternative,
+    SedInterval,
     SessionPrediction,
     TrialPrediction,
-    doubt_of,
-    part_of,
-    scene_along,
-    solved,
-    tau_scale,
-    traction_reached,
+    Variant,
+    known_error,
+    variants,
 )
-from sessions.prediction.stored import Alternative, SedInterval, Variant, known_error, variants
 from sessions.prediction.uncertainty import Drawn, draws_of, intervals_of
 from sessions.strokes import Analysis
+from solver import Prediction
 
 
 def with_alternatives(

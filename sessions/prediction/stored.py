@@ -1,7 +1,7 @@
 """What the model says of each trial, in each variant and of a session, and how that is told as plain data."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Annotated, Any, Literal, cast
 
 import msgspec
@@ -19,6 +19,7 @@ from solver.response.fields import Fields, fields_of
 
 Method = Literal["derivatives", "sampling"]  # by the solver's converged tangent; by draws that are solved
 Ends = tuple[float, float]
+Number = float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +90,12 @@ class Alternative:
     """The settled state of a trial in one variant. A number is None where `reason` says why."""
 
     variant: Variant
-    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model was given")]
-    indentation: Annotated[float | None, Meaning("mm", "given, or found under the force")]
-    sed: Annotated[float | None, Meaning("MPa", "strain-energy density averaged over the ending")]
-    error_estimate: Annotated[float | None, Meaning("", "relative, of sed")]
-    normal_force: Annotated[float | None, Meaning("N", "the model's, times the finger's width")]
-    tangential_force: Annotated[float | None, Meaning("N", "likewise")]
+    tau_max: Annotated[Number, Meaning("MPa", "traction bound the model was given")]
+    indentation: Annotated[Number, Meaning("mm", "given, or found under the force")]
+    sed: Annotated[Number, Meaning("MPa", "strain-energy density averaged over the ending")]
+    error_estimate: Annotated[Number, Meaning("", "relative, of sed")]
+    normal_force: Annotated[Number, Meaning("N", "the model's, times the finger's width")]
+    tangential_force: Annotated[Number, Meaning("N", "likewise")]
     reason: Annotated[str, Meaning("", "why there is no number")] = ""
     traction: float | None = None  # the greatest friction traction on the skin: below tau_max that bounds nothing [MPa]
     interval: SedInterval | None = None  # of the SED, where it was asked for
@@ -122,11 +123,11 @@ ERROR_NOT_KNOWN = "The error is not known: the nested mesh has no such state."
 
 
 def known_error(prediction: Prediction, error: float | None) -> float | None:
-    """Return a relative error of `found` [-], or None where its nested mesh has no such state to compare with."""
+    """Return a relative error of a prediction [-], or None where its nested mesh has no such state to compare with."""
     return None if prediction.nested is None else error
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TrialPrediction:
     """What the model says of one trial, or of one stroke of a recording without trials.
 
@@ -137,24 +138,26 @@ class TrialPrediction:
     stroke: Annotated[int | None, Meaning("", "position of the stroke it was made for, from 0")]
     block: Annotated[str | None, Meaning("", "name of the trial's block")]
     stimulus: Stimulus | None
-    mu: Annotated[float | None, Meaning("", "coefficient of friction the model was given")]
+    mu: Annotated[Number, Meaning("", "coefficient of friction the model was given")]
     mu_rule: Annotated[str, Meaning("", "which T/N that is")]
-    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model was given")]
-    indentation: Annotated[float | None, Meaning("mm", "of the model's finger")]
+    tau_max: Annotated[Number, Meaning("MPa", "traction bound the model was given")]
+    indentation: Annotated[Number, Meaning("mm", "of the model's finger")]
     direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back")]
-    speed: Annotated[float | None, Meaning("mm/s", "of the slide")]
-    sed: Annotated[float | None, Meaning("MPa", "strain-energy density averaged over the ending (mJ/mm3)")]
-    error_estimate: Annotated[float | None, Meaning("", "relative, of sed")]
-    normal_per_mm: Annotated[float | None, Meaning("N/mm", "the model's normal force")]
-    tangential_per_mm: Annotated[float | None, Meaning("N/mm", "the model's tangential force")]
-    normal_force: Annotated[float | None, Meaning("N", "the same times the finger's width")]
-    tangential_force: Annotated[float | None, Meaning("N", "the same times the finger's width")]
-    measured_normal: Annotated[float | None, Meaning("N", "mean over the steady window")]
-    measured_tangential: Annotated[float | None, Meaning("N", "mean over the steady window")]
-    matching_depth: Annotated[float | None, Meaning("mm", "indentation at which the model presses as was measured")]
-    opposite_sed: Annotated[float | None, Meaning("MPa", "slid the other way")]
-    wall_s: Annotated[float | None, Meaning("", "time the solve took, in s")]
-    reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")]
+    speed: Annotated[Number, Meaning("mm/s", "of the slide")]
+    sed: Annotated[Number, Meaning("MPa", "strain-energy density averaged over the ending (mJ/mm3)")] = None
+    error_estimate: Annotated[Number, Meaning("", "relative, of sed")] = None
+    normal_per_mm: Annotated[Number, Meaning("N/mm", "the model's normal force")] = None
+    tangential_per_mm: Annotated[Number, Meaning("N/mm", "the model's tangential force")] = None
+    normal_force: Annotated[Number, Meaning("N", "the same times the finger's width")] = None
+    tangential_force: Annotated[Number, Meaning("N", "the same times the finger's width")] = None
+    measured_normal: Annotated[Number, Meaning("N", "mean over the steady window")]
+    measured_tangential: Annotated[Number, Meaning("N", "mean over the steady window")]
+    matching_depth: Annotated[Number, Meaning("mm", "indentation at which the model presses as was measured")] = None
+    opposite_sed: Annotated[Number, Meaning("MPa", "slid the other way")] = None
+    wall_s: Annotated[Number, Meaning("", "time the solve took, in s")] = None
+    reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")] = field(
+        default_factory=dict[str, str]
+    )
     prediction: Prediction | None = None  # all that the solver found
     opposite: Prediction | None = None  # that slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for

@@ -12,22 +12,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import (
-    Nearby,
-    Prediction,
-    Progress,
-    Scene,
-    SessionPrediction,
-    TrialPrediction,
-    derivatives_by,
-    slides,
-    tau_scale,
-    with_loads,
-)
-from sessions.prediction.stored import Ends, SedInterval
+from sessions.prediction.options import tau_scale
+from sessions.prediction.scenes import with_loads
+from sessions.prediction.solving import Progress, derivatives_by, slides
+from sessions.prediction.stored import Ends, SedInterval, SessionPrediction, TrialPrediction
 from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import FrictionDraws, friction_draws
 from sessions.strokes.bootstrap_settings import BootstrapSettings
+from solver import Prediction, Scene
+from solver.response.nearby import Nearby
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

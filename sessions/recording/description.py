@@ -74,7 +74,6 @@ def description(recording: Recording) -> dict[str, Any]:
 
 
 def _trial(record: TrialRecord) -> dict[str, Any]:
-    """Return a trial as `session.json` tells it."""
     return {
         "number": record.trial.number,
         "block": record.trial.block,

@@ -178,7 +178,6 @@ def calibration_hash(calibration: Calibration) -> str:
 
 
 def _none_for_nan(value: float) -> float | None:
-    """Return None for nan."""
     return None if math.isnan(value) else value
 
 

@@ -106,6 +106,11 @@ class Recording:
         return tuple(problems)
 
     @property
+    def expected_readings(self) -> int:
+        """Return how many readings the file holds by its events."""
+        return max((event.readings for event in self.events), default=0)
+
+    @property
     def flaws(self) -> tuple[str, ...]:
         """Name what went wrong while recording, as the event log tells it, a sentence each."""
         trouble: list[str] = []
@@ -363,5 +368,4 @@ def _answers(connection: sqlite3.Connection) -> bool:
 
 
 def _side_file(path: Path, ending: str) -> Path:
-    """Return the side file SQLite keeps next to `path`."""
     return path.with_name(path.name + ending)

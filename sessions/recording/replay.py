@@ -1,7 +1,7 @@
 """A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
 
 from collections import Counter
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,26 +14,23 @@ from sessions.recording.reader import Recording
 
 
 class RecordedReadings:
-    """The readings of a recording in their order, handed over a part at a time and read from the file as they go."""
+    """Recorded readings in their order, handed over a part at a time and read as they go."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, blocks: Iterator[ReadingBlock]) -> None:
         """Begin at the first reading."""
-        self._blocks: Generator[ReadingBlock] = recording.blocks()
+        self._blocks = blocks
         self._waiting: list[ReadingBlock] = []
         self.position = 0  # how many were handed over
 
-    def close(self) -> None:
-        """Close the file; no more readings come."""
-        self._blocks.close()
-
-    def up_to(self, position: int | None) -> ReadingBlock:
+    def blocks_up_to(self, position: int | None) -> Iterator[ReadingBlock]:
         """Hand over the next readings until `position` of them were, or until none are left (None: all that are)."""
-        blocks: list[ReadingBlock] = []
         while (position is None or self.position < position) and self._look():
             first = self._waiting[0]
-            count = len(first) if position is None else min(len(first), position - self.position)
-            blocks.append(self._take(count))
-        return ReadingBlock.joined(blocks)
+            yield self._take(len(first) if position is None else min(len(first), position - self.position))
+
+    def up_to(self, position: int | None) -> ReadingBlock:
+        """Hand the same over as one."""
+        return ReadingBlock.joined(list(self.blocks_up_to(position)))
 
     def received_by(self, instant_ns: int) -> ReadingBlock:
         """Hand over the next readings up to the first that was received later than `instant_ns` [ns]."""
@@ -74,7 +71,8 @@ class ReplayTransducer:
 
     def __init__(self, recording: Recording, clock: Clock, uri: str) -> None:
         """Speak on `clock`, under the address `uri`. Raises SetupError for a recording without readings."""
-        self._readings = RecordedReadings(recording)
+        self._blocks = recording.blocks()
+        self._readings = RecordedReadings(self._blocks)
         first_ns = self._readings.next_received_ns()
         if recording.info is None or first_ns is None:
             raise SetupError(f"{recording.folder} holds no readings to replay; give a session with forces")
@@ -126,10 +124,9 @@ class ReplayTransducer:
     def close(self) -> None:
         """Stop, and close the recording."""
         self.stop()
-        self._readings.close()
+        self._blocks.close()
 
     def _shifted(self, block: ReadingBlock, shift_ns: int) -> ReadingBlock:
-        """Return the readings as received on our clock."""
         if not len(block):
             return block
         block = replace(block, received_ns=block.received_ns + shift_ns)

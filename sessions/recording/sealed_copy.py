@@ -104,7 +104,7 @@ def write_copy(
     recording: Recording, path: Path, more: Iterable[DataSet] = (), progress: Callable[[float], None] | None = None
 ) -> None:
     """Write the copy of a recording, and what else belongs in it, to a new file at `path`. Raises OSError."""
-    expected = max((event.readings for event in recording.events), default=0) or 1
+    expected = recording.expected_readings or 1
     with h5py.File(path, "x", libver=LIBVER) as file:
         if recording.simulated_sentence:
             file.attrs["SIMULATED"] = _attribute(recording.simulated_sentence)
@@ -237,7 +237,6 @@ def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
 
 
 def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
-    """Compare every reading, block by block."""
     start = 0
     for block in recording.blocks():
         stop = start + len(block)
@@ -253,7 +252,6 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
 
 
 def _different_texts(column: TextColumn, file: h5py.File) -> Iterator[str]:
-    """Compare text by text."""
     pairs = zip_longest(read_texts(file, column.name), column.texts())
     if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
         yield f"{column.name} of {SEALED_FILE} differs from the live file"

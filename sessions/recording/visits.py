@@ -48,7 +48,7 @@ def force_visit(folder: Path, subject: str) -> Recording:
     visits = [recording for recording in sessions_of(folder, subject) if recording.plan.forces]
     if not visits:
         raise StudyError(f"{subject} has no visit with forces in {folder}: run one with --device, or give another code")
-    return max(visits, key=lambda visit: (_complete(visit), str(visit.provenance.get("created_utc", ""))))
+    return max(visits, key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", ""))))
 
 
 def score_visits(folder: Path, besides: Recording | None = None) -> tuple[Recording, ...]:
@@ -59,7 +59,3 @@ def score_visits(folder: Path, besides: Recording | None = None) -> tuple[Record
         if any(record.score is not None for record in recording.trials)
         and (besides is None or recording.folder.resolve() != besides.folder.resolve())
     )
-
-
-def _complete(recording: Recording) -> bool:
-    return bool(recording.end is not None and recording.end.get("complete"))

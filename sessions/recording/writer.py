@@ -236,7 +236,8 @@ class SessionWriter:
             return self._block_rows
         self._connection.execute("BEGIN IMMEDIATE")
         rows = self._insert_blocks()
-        self._insert_events()
+        for event in self._events:
+            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", schema.event_row(event))
         self._connection.execute("COMMIT")
         return rows
 
@@ -298,11 +299,6 @@ class SessionWriter:
             values = (rows, len(block), *ends, *received, *columns, schema.blobs_crc(columns))
             self._connection.execute(f"INSERT INTO blocks VALUES ({','.join('?' * len(values))})", values)
         return rows
-
-    def _insert_events(self) -> None:
-        """Insert the waiting events."""
-        for event in self._events:
-            self._connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", schema.event_row(event))
 
     def _fail(self, error: sqlite3.Error) -> NoReturn:
         """Refuse everything from now on."""

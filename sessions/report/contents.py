@@ -1,7 +1,7 @@
 """What a report holds: plain data, ready for any export. Null numbers carry their reason."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from sessions.prediction import Response
@@ -245,7 +245,3 @@ class Report:
     scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
     afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
     afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`
-
-    def to_dict(self) -> dict[str, object]:
-        """Return the report as JSON can hold it."""
-        return asdict(self)

@@ -259,7 +259,7 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         Fact("session folder", recording.folder.name),
         Fact("recording", f"SHA-256 {file_sha256(recording.folder / LIVE_FILE)}", LIVE_FILE),
         Fact("recorded", str(provenance.get("created_utc", "at an unknown time")), "UTC"),
-        Fact("recorded by", _versions(provenance.get("software", {}))),
+        Fact("recorded by", ", ".join(f"{name} {version}" for name, version in provenance.get("software", {}).items())),
         Fact("machine", ", ".join(f"{name} {value}" for name, value in provenance.get("machine", {}).items())),
     ]
     if recording.plan.blocks:
@@ -297,7 +297,3 @@ def _listed(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: AN
             )
             words[-1] += "" if value == default else " (set)"
     return words
-
-
-def _versions(software: Mapping[str, str]) -> str:
-    return ", ".join(f"{name} {version}" for name, version in software.items())

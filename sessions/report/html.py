@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 from collections.abc import Sequence
 from functools import partial
 from itertools import chain
@@ -95,7 +96,7 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
                 (".svg", panel.svg),
                 (".csv", panel_csv(panel, report.head if report.simulated else "")),
             ):
-                path = folder / (_file_name(panel.name) + ending)
+                path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + ending)  # a name any file system takes
                 swap_in(path, text)
                 written.append(path)
     return tuple(written)
@@ -154,11 +155,6 @@ def panel_csv(panel: Panel, head: str) -> str:
     return out.getvalue()
 
 
-def _file_name(name: str) -> str:
-    """Return a name any file system takes."""
-    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)
-
-
 def _is_page(path: Path) -> bool:
     """Say whether a file begins as our pages do; an empty one may be replaced as well."""
     try:
@@ -182,10 +178,6 @@ def swap_in(path: Path, text: str) -> None:
 
 # Tables that are no appendix; that of the trials stands under a heading of its own behind it.
 STUDY_BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals", "table-trials"}
-QUESTION = (
-    "People stroke surfaces and scale what they feel. Does the strain-energy density (SED) that a finger model "
-    "predicts at a receptor, from the friction of the same people's own strokes, follow their scores?"
-)
 
 
 def study_page(study: StudyFindings, name: str) -> str:
@@ -198,17 +190,7 @@ def study_page(study: StudyFindings, name: str) -> str:
     return template("study.html.jinja").render(
         study=study,
         name=name,
-        question=QUESTION,
-        summary=study_prose.summary(study),
-        told_apart=study_prose.told_apart(study),
-        sealed=study_prose.sealed(study),
-        who=study_prose.who(study),
-        excluded=study_prose.excluded(study),
-        remarks=study_prose.remarks(study),
-        modelled=study_prose.modelled(study),
-        versions=study_prose.versions(),
-        again=study_prose.again(study),
-        command=study_prose.command(study, name),
+        prose=study_prose,
         trials=sum(len(visit.rows) for visit in study.visits),
         trials_file=text_address(trials_csv(study)),
         columns_file=text_address(columns_csv(study)),

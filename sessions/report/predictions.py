@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction, doubt_of
+from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
+from sessions.prediction.solving import doubt_of
 from sessions.prediction.stored import model_facts
 from sessions.report.contents import Fact, Field, History, PredictionFinding, same_fields
 from sessions.strokes.friction import AreaLaw

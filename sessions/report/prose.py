@@ -68,7 +68,6 @@ def _words(related: Relation) -> str:
 
 
 def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
-    """Return how the mean scores of an experiment go with a value of its predictions."""
     means = {mean.index: mean.mean for mean in experiment.scores}
     points = [
         (p.index, means[p.index], number)

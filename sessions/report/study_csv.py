@@ -1,7 +1,7 @@
 """A study as CSV files that R's read.csv and pandas' read_csv open as they are: its trials, its many paths."""
 
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 
 from sessions.exchange.csv_text import write_rows
@@ -43,31 +43,29 @@ def columns_csv(study: StudyFindings) -> str:
 
 def paths_csv(study: StudyFindings) -> str:
     """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
-    mark = [SIMULATED] if study.simulated else []
     names = [field.name for field in fields(Path)]
     heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
-    rows: list[list[object]] = [[*mark, "descriptor", *names, *heads]]
+    rows: list[list[object]] = [["descriptor", *names, *heads]]
     for one in study.descriptors:
         for path in one.paths:
             numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
-            cells = [*(["yes"] if mark else []), one.descriptor, *(getattr(path.path, name) for name in names)]
-            rows.append([*cells, "yes" if path.usual else "no", *numbers])
-    return _csv(rows)
+            choices = (getattr(path.path, name) for name in names)
+            rows.append([one.descriptor, *choices, "yes" if path.usual else "no", *numbers])
+    return _csv(rows, simulated=bool(study.simulated))
 
 
 def rivals_csv(study: StudyFindings) -> str:
     """Return a row for each quantity that may follow the scores, of means and within subjects, for R and pandas."""
-    mark = [SIMULATED] if study.simulated else []
     names = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
     heads = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
-    rows: list[list[object]] = [[*mark, "descriptor", "kind", *names, *heads]]
+    rows: list[list[object]] = [["descriptor", "kind", *names, *heads]]
     for one in study.descriptors:
         for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
             for rival in rivals:
                 less = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
                 numbers = [*(getattr(rival, name) for name in names), *less]
-                rows.append([*(["yes"] if mark else []), one.descriptor, kind, *numbers])
-    return _csv(rows)
+                rows.append([one.descriptor, kind, *numbers])
+    return _csv(rows, simulated=bool(study.simulated))
 
 
 def trials_csv(study: StudyFindings) -> str:
@@ -91,7 +89,10 @@ def trials_csv(study: StudyFindings) -> str:
     return _csv(rows)
 
 
-def _csv(rows: Iterable[Iterable[object]]) -> str:
+def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
+    """Return rows as CSV; a first column says of each of a simulated study that it is."""
+    if simulated:
+        rows = [[SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
     out = io.StringIO()
     write_rows(out, [[_plain(value) for value in row] for row in rows])
     return out.getvalue()

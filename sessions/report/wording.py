@@ -45,9 +45,9 @@ def with_error(value: float, error: float | None, least: int) -> str:
 
 
 def between(low: float, high: float, written: Callable[[float], str], unit: float = 1.0) -> str:
-    """Return a range as `told` shows its ends, with more decimals where they would read alike.
+    """Return a range as `written` shows its ends, with more decimals where they would read alike.
 
-    `unit` is what `told` multiplies a number by before it shows it.
+    `unit` is what `written` multiplies a number by first.
 
     >>> between(0.5, 1.25, places(1)), between(-178.12, -178.09, places(0)), between(2.0, 2.0, places(1))
     ('0.5 to 1.2', '−178.12 to −178.09', '2.0 to 2.0')

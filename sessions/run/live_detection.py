@@ -98,5 +98,4 @@ class TakeWatch:
 
 
 def _last(time: Array, duration: float) -> int:
-    """Return the position of the first reading of the last `duration` seconds."""
     return int(np.count_nonzero(time < time[-1] - duration))

@@ -6,7 +6,6 @@ from msgspec import structs
 
 from sessions.plan.plan import SessionPlan
 from sessions.run import steps
-from sessions.run.answers import AnswerEvent, problem
 from sessions.run.states import (
     Closing,
     Ended,
@@ -23,6 +22,7 @@ from sessions.run.states import (
     Stroking,
     Taring,
 )
+from sessions.run.steps import AnswerEvent, answer_problem
 
 Step = tuple[State, tuple[steps.Command, ...]]
 
@@ -112,7 +112,6 @@ def _went_on(state: State, event: steps.Event) -> Step:
 
 
 def _touched(state: State, event: steps.ContactOnset | steps.FingerLifted | steps.Settled) -> Step:
-    """Follow the finger, where a transducer tells of it."""
     match state, event:
         case Ready(place), steps.ContactOnset() if place.plan.forces:
             return Stroking(place.at(place.index)), ()
@@ -139,7 +138,7 @@ def _touched(state: State, event: steps.ContactOnset | steps.FingerLifted | step
 def _answered(state: Scoring, answer: AnswerEvent) -> Step:
     """Take an answer; the take ends once the finger has been off for a moment, so that what follows it is recorded."""
     place = state.place
-    wrong = problem(answer, place.trial.answer)
+    wrong = answer_problem(answer, place.trial.answer)
     if wrong is not None:
         return state, (steps.Refuse(wrong),)
     if isinstance(answer, steps.PairedChoice):

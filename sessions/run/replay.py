@@ -302,7 +302,7 @@ def _run(
 ) -> None:
     """Let the runner conduct the session once more, part by part."""
     logs = parts([event for event in recording.events if event.kind not in LATER])
-    readings = RecordedReadings(recording)
+    readings = RecordedReadings(recording.blocks())
     try:
         for number, log in enumerate(logs):
             after = logs[number + 1] if number + 1 < len(logs) else None
@@ -350,7 +350,7 @@ class _JoinedBefore(Seam):
 def _copy(recording: Recording, writer: _Rewriter) -> None:
     """Hand the readings over once more, and write each event where it stood."""
     writer.follow_part([event for event in recording.events if event.kind not in LATER])
-    readings = RecordedReadings(recording)
+    readings = RecordedReadings(recording.blocks())
     for event in recording.events:
         if event.kind not in LATER:
             writer.readings(readings.up_to(event.readings))

@@ -25,10 +25,9 @@ from sessions.prediction import (
     Scene,
     SessionPrediction,
     part_of,
-    scenes_of,
-    settled,
-    slides,
 )
+from sessions.prediction.scenes import scenes_of
+from sessions.prediction.solving import settled, slides
 from sessions.recording import Recording
 from sessions.statistics.scores import pearson, surface_means
 from sessions.statistics.within_subjects import repeated_correlation

@@ -184,7 +184,7 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     low, high = fisher_interval(r, n)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
     rho = _rank_correlation(x, y)
-    ends = _rank_interval(rho, n)
+    ends = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
     return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
 
 
@@ -298,11 +298,6 @@ def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | No
         return None, None
     half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
-
-
-def _rank_interval(rho: float, n: int) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of Spearman's rho (Bonett & Wright 2000, Psychometrika 65:23, equation 4)."""
-    return fisher_interval(rho, n, 1 + rho * rho / 2)
 
 
 def _ranks(values: Sequence[float]) -> NDArray[np.float64]:

@@ -78,13 +78,8 @@ def spreads(
         share = float(np.trace(error) - error.mean(axis=0).sum()) / (k - 1)  # of `square` in the mean square
         return difference_of_squares(float(coefficients[part].var(ddof=1)), k - 1, share * square, dof)
 
-    return Spreads(between(0), None if x is None else between(k), _of_square(square, dof), k, dof)
-
-
-def _of_square(square: float, dof: int) -> Spread:
-    """Return the standard deviation whose square is estimated by `square` with `dof` degrees of freedom."""
     sd = math.sqrt(square)
-    return Spread(sd, *sd_interval(sd, dof + 1))
+    return Spreads(between(0), None if x is None else between(k), Spread(sd, *sd_interval(sd, dof + 1)), k, dof)
 
 
 def difference_of_squares(first: float, n: int, second: float, m: int) -> Spread:

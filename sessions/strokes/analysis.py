@@ -73,7 +73,7 @@ class Analysis:
             "friction": [asdict(parameters) for parameters in self.friction],
             "flaws": [asdict(flaw) for flaw in self.flaws],
             "decisions": [decision.to_dict() for decision in self.decisions],
-            "tilt": None if self.tilt is None else self.tilt.to_dict(),
+            "tilt": None if self.tilt is None else asdict(self.tilt),
             "filter": self.filtered,
             "interval": self.bootstrap.kind,
             "settings": self.settings.to_dict(),
@@ -160,7 +160,6 @@ def _without_intervals(parts: Blocks, context: _Context, flaws_before: Iterable[
 
 
 def _with_intervals(analysis: Analysis) -> Analysis:
-    """Return an analysis with the bootstrap intervals of its numbers."""
     bootstrap = analysis.bootstrap
     intervals = tuple(stroke_intervals(stroke, at, bootstrap) for at, stroke in enumerate(analysis.strokes))
     strokes = tuple(

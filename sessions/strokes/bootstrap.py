@@ -87,10 +87,6 @@ class StrokeIntervals:
     break_away: Interval | None  # [s, device time]
     slide_onset: Interval | None  # [s, device time]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
-
 
 # The numbers of a stroke that have an interval.
 NUMBERS = tuple(
@@ -120,7 +116,7 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
     """Return intervals as plain data, with what they are and the settings they were drawn with."""
-    rows = [one.to_dict() for one in intervals]
+    rows = [asdict(one) for one in intervals]
     return {"kind": settings.kind, "kinds": dict(settings.kinds), "settings": asdict(settings), "strokes": rows}
 
 

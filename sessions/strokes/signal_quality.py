@@ -200,7 +200,6 @@ def _wild_flaws(wild: Mask, time: Array) -> _FlawParts:
 
 
 def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _FlawParts:
-    """Name the faults that the device reported."""
     faulty = table.faulty(block.status)
     if not faulty.any():
         return []

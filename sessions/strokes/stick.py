@@ -209,7 +209,6 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
 
 
 def _beginnings(marked: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Return where each run of marked readings begins."""
     return np.flatnonzero(marked & ~np.concatenate([[False], marked[:-1]]))
 
 

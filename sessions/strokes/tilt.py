@@ -6,8 +6,7 @@ weight in place of a finger, tell the face from the hand.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,10 +44,6 @@ class Tilt:
     def error(self) -> Pair:
         """The standard uncertainty [degrees] of the mean of two presses or more, from how they scatter."""
         return _mean_error(self.presses)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
 
 
 def press_of(

@@ -87,6 +87,15 @@ def _served(hostile, listener, answer, *, drip=0.0):
     hostile.serve(one)
 
 
+def web(status, body):
+    """Return a web server that gives every page the same answer, at the address of a box."""
+    hostile = Hostile()
+    http = _port(hostile)
+    _served(hostile, http, f"HTTP/1.0 {status} X\r\n\r\n".encode() + body)
+    hostile.uri = f"net-ft://127.0.0.1?http={http.getsockname()[1]}"
+    return hostile
+
+
 def net_ft(datagram, *, page_drip=0.0):
     """Return a box whose page is in order, and whose stream is this datagram, every millisecond."""
     hostile = Hostile()

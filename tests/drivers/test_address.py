@@ -11,6 +11,8 @@ from drivers.catalog import open_transducer
 from drivers.clock import RealClock
 from drivers.transducer import LinkLost, SetupError
 
+SERIAL = "serial-ft:///dev/ttyUSB0?counts_per_N=20"
+
 
 def test_an_address_is_cut_into_its_parts():
     address = parse_address("net-ft://127.0.0.1?rdt=49152&tcp=49151&http=8080")
@@ -67,6 +69,12 @@ def test_any_text_is_an_address_or_refused_in_a_sentence(text):
         ("net-ft://127.0.0.1?rate=8000", "rate=8000"),
         ("net-ft://127.0.0.1?baud=1", "'baud'"),
         ("net-ft://no.such.host.invalid", "cannot be found"),
+        ("serial-ft:///dev/ttyUSB0", "cannot tell its units"),
+        ("serial-ft:///dev/ttyUSB0?counts_per_N=20", "cannot tell its units"),
+        (f"{SERIAL}&counts_per_Nm=-3", "counts_per_Nm=-3 must be a number above 0"),
+        (f"{SERIAL}&counts_per_Nm=3_0", "must be a number above 0"),
+        (f"{SERIAL}&counts_per_Nm=30&format=morse", "format=morse"),
+        (f"{SERIAL}&counts_per_Nm=30&baud=fast", "baud=fast"),
     ],
 )
 def test_an_address_that_cannot_be_opened_is_refused_in_a_sentence(uri, reason):

@@ -173,22 +173,6 @@ def test_the_baud_rate_of_a_controller_is_found_by_trying():
         box.close()
 
 
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        ("", "cannot tell its units"),
-        ("?counts_per_N=20", "cannot tell its units"),
-        ("?counts_per_N=20&counts_per_Nm=-3", "counts_per_Nm=-3 must be a number above 0"),
-        ("?counts_per_N=20&counts_per_Nm=3_0", "must be a number above 0"),
-        ("?counts_per_N=20&counts_per_Nm=30&format=morse", "format=morse"),
-        ("?counts_per_N=20&counts_per_Nm=30&baud=fast", "baud=fast"),
-    ],
-)
-def test_a_controllers_address_without_sense_is_refused(options, complaint):
-    with pytest.raises(SetupError, match=complaint):
-        open_serial_ft(parse_address(f"serial-ft:///dev/ttyUSB0{options}"), PacedClock(1.0), Deadline.for_opening())
-
-
 def test_a_transducer_left_streaming_is_stopped_when_it_is_opened_and_left_alone_when_it_is_looked_for():
     device = digital_ft(streaming=True)
     try:

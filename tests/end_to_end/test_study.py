@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from daq_app.batch import cluster
@@ -98,7 +99,7 @@ def test_what_was_kept_and_is_not_as_it_was_written_is_named_and_computed_anew(p
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pooling, "_in_pool", lambda *_: iter([("S01", visit)]))
         done, _ = visits([study / "S01"], STEADY, shelf, Console(as_json=True))
-    assert done[0].to_dict()["rows"][0]["mu"] == visit["rows"][0]["mu"]
+    assert done[0].rows[0].mu == visit["rows"][0]["mu"]
     assert f"{key}.json is damaged; the session is computed anew" in capsys.readouterr().err
     assert shelf.file(key).read_bytes() == whole
 
@@ -207,7 +208,7 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
             Console(as_json=True),
             scheduler=workers.scheduler_address,
         )
-    here = [Visit.from_dict(json.loads(json.dumps(computed(study / name, STEADY)[1]))) for name in ("S01", "S02")]
+    here = [msgspec.convert(computed(study / name, STEADY)[1], Visit) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
 
 

@@ -10,6 +10,8 @@ from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import Exclusion, TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
+MEASURED = {"tau_max": 0.02, "speed": 20.0, "normal_force": 2.5}
+ENDS = {"tau_max": (0.0196, 0.0204), "speed": (19.8, 20.3), "normal_force": (2.4, 2.7)}
 
 
 def visit(number, *, gain=0.8, noise=3.0, sed=lambda index: 0.008 + 1e-5 * index, simulated=""):
@@ -50,26 +52,20 @@ def study():
     return pooled(visits, [("S11", "session.sqlite is damaged")], out, planted, VisitOptions(paths="small"))
 
 
+def _with_ends(**ends):
+    lows = {f"{name}_low": low for name, (low, _) in ends.items()}
+    return lows | {f"{name}_high": high for name, (_, high) in ends.items()}
+
+
 def _full(made):
     small = [path for path in PATHS if path.kinematics == "small"]
     rows = [
         replace(
             row,
             rule="maximum",
-            mu_low=row.mu - 0.02,
-            mu_high=row.mu + 0.02,
-            tau_max=0.02,
-            tau_max_low=0.0196,
-            tau_max_high=0.0204,
-            speed=20.0,
-            speed_low=19.8,
-            speed_high=20.3,
-            sed_low=0.98 * row.sed,
-            sed_high=1.03 * row.sed,
             sed_interval="by derivatives",
-            normal_force=2.5,
-            normal_force_low=2.4,
-            normal_force_high=2.7,
+            **MEASURED,
+            **_with_ends(mu=(row.mu - 0.02, row.mu + 0.02), sed=(0.98 * row.sed, 1.03 * row.sed), **ENDS),
             error_estimate=0.002,
             model_normal_force=2.1,
             matching_depth=2.2,

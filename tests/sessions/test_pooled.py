@@ -2,8 +2,9 @@
 
 import csv
 import io
-from dataclasses import replace
+from dataclasses import asdict, replace
 
+import msgspec
 import numpy as np
 import pytest
 from study_example import INDICES, study, visit
@@ -29,7 +30,7 @@ def test_the_order_in_which_visits_come_changes_no_bit():
 
 
 def test_a_visit_survives_its_way_through_plain_data():
-    assert Visit.from_dict(VISITS[0].to_dict()) == VISITS[0]
+    assert msgspec.convert(asdict(VISITS[0]), Visit) == VISITS[0]
 
 
 def test_a_study_says_what_to_type_for_its_numbers():

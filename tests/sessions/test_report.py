@@ -73,7 +73,7 @@ def visit(subject, value, *, simulated=False):
 
 
 def test_findings_are_plain_data_without_numbers_that_json_lacks(report):
-    text = json.dumps(report.to_dict(), allow_nan=False)
+    text = json.dumps(dataclasses.asdict(report), allow_nan=False)
     assert json.loads(text)["strokes"][0]["mu_dynamic"] == report.strokes[0].mu_dynamic
 
 
@@ -237,7 +237,7 @@ def test_the_page_says_what_was_left_out_and_how_much_it_may_matter(predicted):
     assert "smallest volume ratio: 0." in checks
     assert "det F" not in checks
     assert "What was modelled, and what was left out" in page(report, ())  # its words alone
-    json.dumps(report.to_dict(), allow_nan=False)
+    json.dumps(dataclasses.asdict(report), allow_nan=False)
 
 
 def test_a_trial_without_friction_keeps_its_row_with_a_dash_and_the_reason(tmp_path):

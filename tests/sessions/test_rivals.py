@@ -1,7 +1,7 @@
 """Rivals of a model's quantity: what else follows the scores, compared as published methods compare it."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -228,7 +228,7 @@ def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_su
     assert len(shown.caption.split()) <= 60
     drawn = picture(report, "relation", "stickiness").svg.replace("\N{NO-BREAK SPACE}", " ")
     assert "τ max +0.95" in drawn
-    in_data = report.to_dict()["experiments"][0]["rivals"][1]["contrast"]
+    in_data = asdict(report)["experiments"][0]["rivals"][1]["contrast"]
     assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
     said = " ".join(told_apart(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said

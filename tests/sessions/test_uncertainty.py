@@ -8,8 +8,10 @@ import pytest
 import test_planted_truth as planted_truth
 
 from sessions.plan.plan import Block, SessionPlan
-from sessions.prediction import PredictionOptions, predict, scene_along, settled, uncertainty, with_loads
+from sessions.prediction import PredictionOptions, predict, uncertainty
+from sessions.prediction.scenes import scene_along, with_loads
 from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.solving import settled
 from sessions.prediction.uncertainty import with_intervals
 from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings

@@ -207,14 +207,12 @@ class _Blocks:
         return self._block(outline, "pre-evaluation", name, [self._shuffled(outline, name)], instruction)
 
     def _practice(self, outline: BlockOutline) -> Block:
-        """Return the practice of a block, in the order the protocol lists."""
         order = outline.practice
         if self.protocol.scale.answer == "choice":
             order = tuple(index for pair in pairwise(order) for index in pair)
         return self._block(outline, "practice", f"{outline.name}, practice", [order], outline.instruction)
 
     def _orders(self, outline: BlockOutline) -> list[tuple[int, ...]]:
-        """Return the order of each repetition."""
         orders: list[tuple[int, ...]] = []
         if outline.adaptive is not None and outline.standard is not None:
             return self._adaptive_orders(outline, outline.standard, outline.adaptive)

@@ -289,7 +289,6 @@ class Protocol:
             raise NotAllowed(f"{key}.practice", list(block.practice), "a choice takes at least two")
 
     def _check_order(self, key: str, block: BlockOutline) -> None:
-        """Check that there is an order as asked for."""
         if self.order.constrained and (self.order.rule == "williams" or self.scale.answer == "choice"):
             what = (
                 "a Williams design fixes its orders" if self.order.rule == "williams" else "pairs are in no such order"

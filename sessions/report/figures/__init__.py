@@ -15,8 +15,7 @@ from sessions.report.figures.courses import (
     stroke_panel,
 )
 from sessions.report.figures.finger import common_levels, finger_panels
-from sessions.report.figures.multiverse import CAPTION, paths_panel
-from sessions.report.figures.relation import relation_panel
+from sessions.report.figures.relation import PATHS_CAPTION, paths_panel, relation_panel
 from sessions.report.figures.scores import score_panel
 from sessions.report.figures.style import Panel, Plate, look
 from sessions.report.wording import shown_response
@@ -136,7 +135,7 @@ def _relations(report: Report) -> Plate:
 
 def _paths(report: Report) -> Plate:
     panels = [paths_panel(e.name, e.paths, simulated=report.simulated) for e in report.experiments if e.paths]
-    return Plate("paths", CAPTION, tuple(panel for panel in panels if panel is not None))
+    return Plate("paths", PATHS_CAPTION, tuple(panel for panel in panels if panel is not None))
 
 
 def _model(report: Report) -> str:

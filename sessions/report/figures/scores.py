@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from sessions.report.contents import Answers, Experiment
-from sessions.report.figures.multiverse import CAPTION, paths_panel
+from sessions.report.figures.relation import PATHS_CAPTION, paths_panel
 from sessions.report.figures.style import GREEN, GREY, INK, PALE, Panel, Plate, Sheet, look, sheet, svg
 from sessions.report.predictions import model_in_short
 from sessions.report.tables.rivals import rival_words
@@ -99,7 +99,6 @@ def _draw_identity(axes: Axes, place: tuple[float, bool] | None) -> None:
 
 
 def _draw_mean(drawn: Sheet, axes: Axes, mean: MeanScore) -> None:
-    """Draw one mean score with its interval; hovering tells its numbers."""
     text = f"index {mean.index}: mean {mean.mean:.1f}, {mean.n} subjects"
     if mean.low is not None and mean.high is not None:
         text += f", 95 % interval {mean.low:.1f} to {mean.high:.1f}"
@@ -124,7 +123,7 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
             relations,
         ),
         Plate("scores", SCORES, scores),
-        Plate("paths", CAPTION, paths),
+        Plate("paths", PATHS_CAPTION, paths),
     )
     return tuple(plate for plate in plates if plate.panels)
 

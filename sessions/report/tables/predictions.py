@@ -196,7 +196,6 @@ def _ways(report: Report) -> tuple[str, ...]:
 
 
 def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows]:
-    """Return the rows of each experiment at each strain."""
     first = next((p.alternatives for p in report.predictions if p.alternatives), ())
     groups: list[Rows] = []
     for strain in dict.fromkeys(one.variant.kinematics for one in first):

@@ -205,7 +205,6 @@ def _mean_percent(log_difference: float) -> float:
 
 
 def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
-    """Yield the row of the means, where there are two subjects."""
     pse, jnd = means
     if pse is None or jnd is None or pse.n < LEAST_OF_A_MEAN:
         return

@@ -139,12 +139,8 @@ def _normalised(study: StudyFindings) -> Table | None:
 def _differences(study: StudyFindings) -> Table | None:
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         for pair in one.differences:
-            yield (
-                f"{pair.high_index} − {pair.low_index}",
-                *_with_interval(pair, 1),
-                p_value(pair.p),
-                p_value(pair.p_holm),
-            )
+            name = f"{pair.high_index} − {pair.low_index}"
+            yield (name, *_with_interval(pair, 1), p_value(pair.p), p_value(pair.p_holm))
 
     columns = "index | subjects | difference of scores [0–100] | 95 % interval [0–100] | p | p, Holm"
     caption = (
@@ -166,7 +162,7 @@ def _estimates(study: StudyFindings) -> Table | None:
             yield (index, geometric.n, *(cell for mean in means for cell in _geometric(mean, notes)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
-    out = [f"{name}: {', '.join(s)}" for name, s in _without_logarithm(study)]
+    out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
     left = f" Left out for an estimate that is not above 0: {'; '.join(out)}." if out else ""
     caption = (
         "Magnitude estimates, each subject on a scale of its own: geometric means over subjects with t intervals of "
@@ -182,10 +178,6 @@ def _geometric(mean: Average, notes: Notes) -> Row:
     low, high = (None, None) if ends is None else map(math.exp, ends)
     interval = notes.interval(low, high, three_figures, "one subject alone has no interval")
     return three_figures(math.exp(mean.mean)), interval
-
-
-def _without_logarithm(study: StudyFindings) -> list[tuple[str, tuple[str, ...]]]:
-    return [(o.descriptor, o.estimates.left_out) for o in study.descriptors if o.estimates and o.estimates.left_out]
 
 
 def _surfaces(study: StudyFindings) -> Table | None:
@@ -313,7 +305,6 @@ def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
 
 
 def _of_means(name: str, related: Relation | None, notes: Notes) -> Iterable[Row]:
-    """Return the row of the correlation of means over subjects, where there is one."""
     if related is not None and related.pearson is not None:
         yield (
             name,
@@ -334,7 +325,6 @@ def _within_subjects(
     adjusted: float | None = None,
     without: Sequence[tuple[str, float]] = (),
 ) -> Iterable[Row]:
-    """Return the row of the correlation within subjects, where there is one."""
     if repeated is not None:
         yield (
             name,

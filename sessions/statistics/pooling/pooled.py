@@ -178,7 +178,6 @@ def _descriptor(
 
 
 def _rival_trial(subject: str, row: TrialRow, score: float) -> RivalTrial:
-    """Return a scored trial with those quantities that its row has."""
     numbers = {name: getattr(row, attribute) for name, attribute in FIELDS.items()}
     numbers |= {label: row.response(name) for label, name in RESPONSES.items()}
     return RivalTrial(subject, row.index, score, {name: value for name, value in numbers.items() if value is not None})

@@ -4,11 +4,9 @@ Decisions to leave a subject out stand in a file that people keep beside the ses
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
-
-import msgspec
+from typing import Annotated, Literal
 
 from sessions.plan.plan import Block
 from sessions.prediction import BY_NAME, SED, PredictionOptions, SessionPrediction, TrialPrediction, predict
@@ -167,15 +165,6 @@ class Visit:
     calibration: str = ""  # the calibration's uncertainty that its intervals hold, set or assumed
     model: tuple[tuple[str, str, str], ...] = ()  # what was modelled: name, value, remark
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data."""
-        return asdict(self)
-
-    @staticmethod
-    def from_dict(data: Mapping[str, Any]) -> "Visit":
-        """Return the visit that `to_dict` gave `data` for. Raises ValueError where it is none."""
-        return msgspec.convert(data, Visit)
-
 
 def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, str]) -> Visit:
     """Return what a session brings to a study: analysed, and predicted where it has forces.
@@ -260,7 +249,6 @@ def _row(
 
 
 def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analysis) -> TrialRow:
-    """Return the row with what was measured in the trial's stroke."""
     stroke, intervals = analysis.strokes[friction.stroke], analysis.intervals[friction.stroke]
     numbers = {
         "mu": (friction.mu, intervals.mu_max if friction.rule == "maximum" else intervals.mu_dynamic),
@@ -282,7 +270,6 @@ def _with_friction(row: TrialRow, friction: FrictionParameters, analysis: Analys
 
 
 def _with_prediction(row: TrialRow, answer: TrialPrediction) -> TrialRow:
-    """Return the row with what the model predicts of the trial."""
     interval = answer.interval
     return replace(
         row,

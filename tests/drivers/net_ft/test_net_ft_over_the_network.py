@@ -1,13 +1,14 @@
 """The driver against the simulated box, over real ports of this computer."""
 
+import contextlib
 import re
 import socket
 import struct
-import threading
 import time
 
 import numpy as np
 import pytest
+from hostile_devices import web
 
 from drivers.catalog import open_transducer, reachable
 from drivers.clock import PacedClock, RealClock
@@ -174,36 +175,6 @@ def test_a_box_with_its_output_disabled_is_refused(box):
         open_transducer(one.uri, PacedClock(10.0))
 
 
-@pytest.fixture
-def web():
-    """Serve the same answer to every page of a web server that is no simulated box."""
-    ends = []
-
-    def serve(status, body):
-        listener = socket.create_server(("127.0.0.1", 0))
-
-        def answer():
-            while True:
-                try:
-                    connection, _ = listener.accept()
-                except OSError:
-                    return
-                with connection:
-                    connection.recv(4096)
-                    connection.sendall(f"HTTP/1.0 {status} X\r\n\r\n".encode() + body)
-
-        thread = threading.Thread(target=answer)
-        thread.start()
-        ends.append((listener, thread))
-        return f"net-ft://127.0.0.1?http={listener.getsockname()[1]}"
-
-    yield serve
-    for listener, thread in ends:
-        listener.shutdown(socket.SHUT_RDWR)
-        listener.close()
-        thread.join(5)
-
-
 PAGE = (
     b"<netft><prodname>%s</prodname><cfgcpf>1</cfgcpf><cfgcpt>1</cfgcpt><scfgfu>N</scfgfu><scfgtu>Nm</scfgtu>%s</netft>"
 )
@@ -220,15 +191,15 @@ PAGE = (
         (200, PAGE % (b"Net F/T", b""), "&rate=200", "shows no rate"),
     ],
 )
-def test_a_box_that_is_not_as_asked_is_refused_with_its_address_and_the_reason(web, status, body, options, reason):
-    uri = web(status, body) + options
-    with pytest.raises(SetupError, match=reason) as refused:
-        open_transducer(uri, RealClock())
-    assert uri in str(refused.value)
+def test_a_box_that_is_not_as_asked_is_refused_with_its_address_and_the_reason(status, body, options, reason):
+    with contextlib.closing(web(status, body)) as server, pytest.raises(SetupError, match=reason) as refused:
+        open_transducer(server.uri + options, RealClock())
+    assert server.uri + options in str(refused.value)
 
 
-def test_what_is_not_simulated_does_not_say_so(web):
-    info = open_transducer(web(200, PAGE % (b"Net F/T", b"")), RealClock()).info
+def test_what_is_not_simulated_does_not_say_so():
+    with contextlib.closing(web(200, PAGE % (b"Net F/T", b""))) as server:
+        info = open_transducer(server.uri, RealClock()).info
     assert not info.simulated
     assert info.serial == ""
     assert np.isnan(info.rate)
