@@ -31,16 +31,19 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
-FROM_EDGES = 0.5  # of what a number changes by when an edge of contact moves by one node
-SHIFT = 4  # place of the bone's shift among the numbers
+# Of what a number changes by when an edge of contact moves by one node. Numbers follow an edge's place by a parabola
+# about the true one, half a node away at most; the width follows it by a line.
+FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
+SHIFT, WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
+_PARTS_OF_EDGES = np.where(np.arange(COUNT) == WIDTH, WIDTH_FROM_EDGES, FROM_EDGES)
 
 
-def half_width(change: Array, edges: Array) -> Array:
+def half_width(change: Array, edges: Array, part: Array | float = FROM_EDGES) -> Array:
     """Return how far numbers may be off which change by so much on the nested mesh.
 
-    `edges` is what they change by there when edges of contact move by a node.
+    `edges` is what they change by there when edges of contact move by a node, of which a `part` counts.
     """
-    return FROM_HALVING * np.abs(change) + FROM_EDGES * edges
+    return FROM_HALVING * np.abs(change) + part * edges
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -207,7 +210,7 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     """
     if nested is None:
         return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
-    off = half_width(nested.numbers - numbers, nested.of_edges)
+    off = half_width(nested.numbers - numbers, nested.of_edges, _PARTS_OF_EDGES)
     if steps is not None:
         off += steps.error
     relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)

@@ -26,10 +26,10 @@ def test_what_halving_the_elements_changes_alike_in_all_surfaces_falls_out_of_th
     assert contrast_error(changed).share == pytest.approx(4.0 / 3.0 * 0.03 / 0.2)
 
 
-def test_edges_of_contact_put_differences_off_by_half_of_what_a_node_changes_in_each_surface():
+def test_edges_of_contact_put_differences_off_by_a_third_of_what_a_node_changes_in_each_surface():
     one, other = (1.0, 2.0, 0.5, 1.0), (1.2, 2.2, 0.7, 1.0)
     found = [surface(one, one, (0.03, 0.0, 0.0, 0.0)), surface(other, other, (0.04, 0.0, 0.0, 0.0))]
-    assert contrast_error(found).share == pytest.approx(0.5 * 0.05 / 0.2)
+    assert contrast_error(found).share == pytest.approx(0.05 / 3.0 / 0.2)
 
 
 @pytest.mark.parametrize(("changed", "warned"), [(0.004, True), (0.0005, False)])
