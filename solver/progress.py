@@ -79,21 +79,22 @@ def report_part(progress: Progress | None, part: float) -> None:
 
 @contextmanager
 def aside(doing: str) -> Generator[None]:
-    """Say what is done in between, until the block ends; then again what was said before.
+    """Say what is done in between, until the block ends; then again what was said before, "solving" where nothing was.
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append(doing)):
-    ...     report_progress("solving", 0.5)
+    ...     with aside("compiling"):
+    ...         pass
+    ...     report_progress("estimating", 0.5)
     ...     with aside("compiling"):
     ...         pass
     >>> heard
-    ['solving', 'compiling', 'solving']
+    ['compiling', 'solving', 'estimating', 'compiling', 'estimating']
     """
     audience = _AUDIENCE.get()
-    before = audience.doing if audience is not None else ""
+    before = (audience.doing if audience is not None else "") or "solving"
     report_progress(doing)
     try:
         yield
     finally:
-        if before:
-            report_progress(before)
+        report_progress(before)
