@@ -178,8 +178,9 @@ def _tilt_assumed(analysis: Analysis) -> Iterable[Flaw]:
     count, fewest = len(analysis.presses), analysis.settings.press.press_fewest
     if count < fewest and any(stroke.mu_dynamic is not None for stroke in analysis.strokes):
         prior = analysis.settings.systematic.tilt_prior
+        too_few = {0: "No press has measured", 1: "One press is too few to measure"}
         sentence = (
-            f"The tilt of the face is not known from {count or 'no'} press{'' if count == 1 else 'es'}: intervals of "
+            f"{too_few.get(count, f'{count} presses are too few to measure')} the tilt of the face: intervals of "
             f"friction assume a standard deviation of {prior:g}° about each axis. Press {fewest} times without sliding "
             "to narrow them."
         )
