@@ -45,7 +45,7 @@ class LimitSearch:
 LIMIT_SEARCH = LimitSearch()
 
 
-def continue_branch(
+def continue_in_friction(
     newton: Newton, load: LoadState, force: float | None = None, first: EquilibriumState | None = None
 ) -> tuple[EquilibriumState | None, float]:
     """Return the settled sliding state under `load` reached by following it from mu = 0, and the largest mu with one.
@@ -120,7 +120,7 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
     """
 
     def slides(depth: float) -> bool:
-        return continue_branch(bodies.at(depth), load._replace(depth=depth))[0] is not None
+        return continue_in_friction(bodies.at(depth), load._replace(depth=depth))[0] is not None
 
     least = LIMIT_SEARCH.least * high
     while low is None:
@@ -129,7 +129,7 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
         low, high = (high / 2.0, high) if slides(high / 2.0) else (None, high / 2.0)
     deepest = _largest(slides, low, high)
     finer = bodies.build_for(deepest, LIMIT_SEARCH.finer * FINENESS)
-    ends = [continue_branch(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
+    ends = [continue_in_friction(finer, load._replace(depth=part * deepest))[0] is None for part in (0.97, 1.03)]
     return deepest if ends == [False, True] else None
 
 
@@ -142,7 +142,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
     bare = load._replace(mu=0.0)
 
     def reached(newton: Newton, force: float) -> EquilibriumState | None:
-        return continue_branch(newton, load, force, slide_under(newton, bare, force, bone))[0]
+        return continue_in_friction(newton, load, force, slide_under(newton, bare, force, bone))[0]
 
     def rubless(force: float) -> float:
         return slide_under(bodies.at(bone / 2.0), bare, force, bone).load.depth
@@ -189,7 +189,7 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
 
 
 def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
-    """Return full slip under the normal force of a scene, continued from mu = 0 as `continue_branch` does.
+    """Return full slip under the normal force of a scene, continued from mu = 0 as `continue_in_friction` does.
 
     Raises NoSteadyState where that force presses the finger to its bone.
     """
@@ -199,7 +199,7 @@ def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState
         first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
     except ContactLost:
         return None, 0.0
-    reached, limit = continue_branch(finger.newton, load, force, first)
+    reached, limit = continue_in_friction(finger.newton, load, force, first)
     if limit == 0.0:
         in_tissue(scene, finger, first.load.depth)
     return reached, limit
@@ -259,7 +259,7 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
-        reached, _ = continue_branch(finger.newton, sliding_load(scene))
+        reached, _ = continue_in_friction(finger.newton, sliding_load(scene))
         if reached is None:
             raise
         return reached
@@ -283,7 +283,7 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
     if scene.normal_force is None:
-        reached, limit = continue_branch(finger.newton, sliding_load(scene))
+        reached, limit = continue_in_friction(finger.newton, sliding_load(scene))
     else:
         reached, limit = followed_under(scene, finger)
     if reached is None:
