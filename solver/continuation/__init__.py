@@ -86,13 +86,7 @@ class Branch:
         return self.states[-1]
 
 
-def continue_branch(
-    finger: Followed,
-    start: EquilibriumState,
-    by: int,
-    target: float,
-    folds: float,
-) -> Branch:
+def continue_branch(finger: Followed, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
     """Do as `follow`, and go on where the branch only turns back for a moment."""
     branch = follow(finger, start, by, target, folds)
     for _ in range(BRANCH.hops):
@@ -129,13 +123,7 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
     return None
 
 
-def follow(
-    finger: Followed,
-    start: EquilibriumState,
-    by: int,
-    target: float,
-    folds: float,
-) -> Branch:
+def follow(finger: Followed, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
     It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length (`folds_at`).

@@ -176,10 +176,7 @@ APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another p
 
 
 def steady(
-    finger: FiniteFinger,
-    load: LoadState,
-    tolerance: float = 1e-10,
-    start: EquilibriumState | None = None,
+    finger: FiniteFinger, load: LoadState, tolerance: float = 1e-10, start: EquilibriumState | None = None
 ) -> EquilibriumState:
     """Return the settled sliding state under `load`, proven to lie on the branch that begins without friction.
 

@@ -40,10 +40,7 @@ FORCE_SEARCH = ForceSearch()
 
 
 def settled(
-    finger: FiniteFinger,
-    scene: Scene,
-    start: EquilibriumState | None = None,
-    times: float = 1.0,
+    finger: FiniteFinger, scene: Scene, start: EquilibriumState | None = None, times: float = 1.0
 ) -> EquilibriumState:
     """Return the settled state of a scene, sought first from `start`, a proven state nearby.
 
@@ -90,11 +87,7 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
 
 
 def _settled_under(
-    finger: FiniteFinger,
-    scene: Scene,
-    force: float,
-    start: EquilibriumState | None,
-    times: float,
+    finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, times: float
 ) -> EquilibriumState:
     """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
 
@@ -263,10 +256,7 @@ def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
 
 
 def steady_body(
-    whole: FiniteBody,
-    load: LoadState,
-    skin: Law,
-    start: EquilibriumState | None = None,
+    whole: FiniteBody, load: LoadState, skin: Law, start: EquilibriumState | None = None
 ) -> EquilibriumState:
     """Return the settled sliding state under `load`, followed on this mesh from the one without friction.
 

@@ -38,10 +38,7 @@ WHOLE = StepControl()
 
 
 def advance(
-    step: Step,
-    refusal: Refusal,
-    control: StepControl = WHOLE,
-    exhausted: Callable[[], bool] = lambda: False,
+    step: Step, refusal: Refusal, control: StepControl = WHOLE, exhausted: Callable[[], bool] = lambda: False
 ) -> None:
     """Call `step` with growing fractions of the path up to 1, each the last that succeeded plus a step.
 
@@ -253,10 +250,7 @@ SLIP_CONTROL = SlipControl()
 
 
 def settled(
-    newton: Newton,
-    load: LoadState,
-    start: EquilibriumState | None = None,
-    tolerance: float = 1e-10,
+    newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = 1e-10
 ) -> EquilibriumState:
     """Return the sliding state under `load` (sense +1 or -1), from undeformed or from `start`, in one step.
 

@@ -20,15 +20,7 @@ from solver.body import Patches
 from solver.contact import STATE_NAMES
 from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
-from solver.equilibrium import (
-    BY_DEPTH,
-    BY_FRICTION,
-    EquilibriumState,
-    ForceLoad,
-    LoadState,
-    Newton,
-    load_arguments,
-)
+from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_arguments
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import balanced, settled, slide_beside, sliding_load
 from solver.failures import NotConverged

@@ -7,17 +7,7 @@ scene leads to.
 import math
 from dataclasses import dataclass, field, replace
 
-from solver.scene.tables import (
-    LAWS_OF,
-    TISSUES,
-    Finger,
-    Friction,
-    Loading,
-    Materials,
-    Receptor,
-    SceneError,
-    Solve,
-)
+from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Materials, Receptor, SceneError, Solve
 from solver.tolerances import STIFFNESSES
 
 
