@@ -1,4 +1,4 @@
-"""Types of arrays that every module shares, and the arrays that belong together as the compiled loops take them."""
+"""Types of arrays that every module shares, two-by-two matrices, and the arrays that compiled loops take together."""
 
 from typing import NamedTuple
 
@@ -9,6 +9,19 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Narrow = NDArray[np.int32]
 Flags = NDArray[np.bool_]
+
+
+def determinant(matrices: Array) -> Array:
+    """Return the determinants (...) of matrices (..., 2, 2), complex ones too."""
+    return matrices[..., 0, 0] * matrices[..., 1, 1] - matrices[..., 0, 1] * matrices[..., 1, 0]
+
+
+def inverse(matrices: Array) -> Array:
+    """Return the inverses of matrices (..., 2, 2), complex ones too."""
+    adjugate = np.empty_like(matrices)
+    adjugate[..., 0, 0], adjugate[..., 1, 1] = matrices[..., 1, 1], matrices[..., 0, 0]
+    adjugate[..., 0, 1], adjugate[..., 1, 0] = -matrices[..., 0, 1], -matrices[..., 1, 0]
+    return adjugate / determinant(matrices)[..., None, None]
 
 
 class ElementArrays(NamedTuple):

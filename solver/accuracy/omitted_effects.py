@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from solver.arrays import Array, Indices
+from solver.arrays import Array, Indices, determinant
 from solver.body import Patches
 from solver.constitutive import HUMAN_SKIN
 from solver.equilibrium import EquilibriumState
@@ -143,7 +143,7 @@ def _finite_strain(finger: LinearFinger, displacement: Array) -> dict[str, Any]:
     probes, weights = finger.ending.endings.probes, finger.ending.endings.weights
     gradient = probes.displacement_gradient(mesh, displacement)
     f = gradient + np.eye(2)
-    det = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
+    det = determinant(f)
     shear, lame = elastic.shear[probes.element], elastic.lame[probes.element]
     estimate = None
     if det.min() > 0.0:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from solver.arrays import Array, Indices, Narrow
+from solver.arrays import Array, Indices, Narrow, inverse
 from solver.mesh import Q2P1, Mesh
 from solver.tolerances import UNHELD
 
@@ -259,12 +259,6 @@ class Patches(Protocol):
     def responses(self, displacement: Array) -> Array:
         """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
         ...
-
-
-def inverse(matrices: Array) -> Array:
-    """Return the inverses of matrices (..., 2, 2), in closed form."""
-    (a, b), (c, d) = np.moveaxis(matrices, (-2, -1), (0, 1))
-    return np.moveaxis(np.array([[d, -b], [-c, a]]) / (a * d - b * c), (0, 1), (-2, -1))
 
 
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:

@@ -19,8 +19,9 @@ from solver.arrays import (
     Narrow,
     ProbeArrays,
     SymbolicFactorization,
+    inverse,
 )
-from solver.body import Endings, Probes, inverse
+from solver.body import Endings, Probes
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Law, log1p, shape, slopes
 from solver.linalg import Elimination, symbolic_factorization

@@ -12,8 +12,17 @@ from numpy.linalg import LinAlgError
 
 from solver._kernels import hooke, multifrontal
 from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import Array, Indices, LinearElements, LinearMesh, RecoveryArrays, ShapeFunctions
-from solver.body import CondensedLinear, Endings, Probes, inverse
+from solver.arrays import (
+    Array,
+    Indices,
+    LinearElements,
+    LinearMesh,
+    RecoveryArrays,
+    ShapeFunctions,
+    determinant,
+    inverse,
+)
+from solver.body import CondensedLinear, Endings, Probes
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import PLAIN, Elasticity
 from solver.linalg import factors_of, symbolic_factorization
@@ -278,7 +287,7 @@ class LinearBody:
 
     def smallest_det(self, displacement: Array) -> float:
         """Do as `Body` says, of the corners of elements, where strains are largest."""
-        return float(_determinant(self._at_corners(displacement)).min())
+        return float(determinant(self._at_corners(displacement)).min())
 
     def stretches(self, displacement: Array) -> Array:
         """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
@@ -286,7 +295,7 @@ class LinearBody:
         They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
         """
         f = self._at_corners(displacement)
-        det = _determinant(f)
+        det = determinant(f)
         total = np.sum(f * f, axis=(1, 2))
         plus, minus = np.sqrt(total + 2.0 * det), np.sqrt(np.maximum(total - 2.0 * det, 0.0))
         return np.stack([(plus - minus) / 2.0, (plus + minus) / 2.0])
@@ -301,11 +310,6 @@ class LinearBody:
         slopes = Q2P1.shape(Q2P1.corners)[1]  # (4, 9, 2)
         gradient = slopes @ inverse(jacobians(self.mesh, Q2P1.corners)[0])
         return np.ascontiguousarray(np.swapaxes(gradient, 2, 3).reshape(-1, 8, 9))
-
-
-def _determinant(f: Array) -> Array:
-    """Return the determinants (p,) of matrices (p, 2, 2)."""
-    return f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
 
 
 @dataclass(frozen=True, eq=False)  # without slots: the energy forms are made when they are first needed

@@ -11,7 +11,7 @@ from typing import ClassVar, Protocol, cast
 
 import numpy as np
 
-from solver.arrays import Array
+from solver.arrays import Array, determinant, inverse
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
 HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
@@ -208,19 +208,10 @@ def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
     return np.where(far, wide, value), np.where(far, bend, slope)
 
 
-def inverse_transposed(F: Array) -> tuple[Array, Array]:
-    """Return J (...) and F^-T (..., 2, 2)."""
-    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
-    adjugate = np.empty_like(F)
-    adjugate[..., 0, 0], adjugate[..., 1, 1] = F[..., 1, 1], F[..., 0, 0]
-    adjugate[..., 0, 1], adjugate[..., 1, 0] = -F[..., 1, 0], -F[..., 0, 1]
-    return J, adjugate / J[..., None, None]
-
-
 def _parts(F: Array) -> tuple[Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2) and Q (...)."""
-    J, inverse = inverse_transposed(F)
-    return J, inverse, np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
+    J = determinant(F)
+    return J, inverse(np.swapaxes(F, -2, -1)), np.sum(F * F, axis=(-2, -1)) - 2.0 - 2.0 * np.log(J)
 
 
 def stress(law: Law, F: Array) -> Array:

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.arrays import Array
-from solver.constitutive import inverse_transposed, kept
+from solver.arrays import Array, determinant, inverse
+from solver.constitutive import kept
 
 
 def unstrained(F: Array) -> Array:
@@ -28,7 +28,7 @@ def unstrained(F: Array) -> Array:
     >>> unstrained(np.array([[1.0, 0.5], [0.0, 1.0]])).tolist()  # simple shear
     [1.25, 1.0, -0.5, 1.0]
     """
-    J = F[..., 0, 0] * F[..., 1, 1] - F[..., 0, 1] * F[..., 1, 0]
+    J = determinant(F)
     xx = F[..., 0, 0] ** 2 + F[..., 1, 0] ** 2
     yy = F[..., 0, 1] ** 2 + F[..., 1, 1] ** 2
     xy = F[..., 0, 0] * F[..., 0, 1] + F[..., 1, 0] * F[..., 1, 1]
@@ -39,7 +39,7 @@ def unstrained(F: Array) -> Array:
 def turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
     pulled = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
-    return *inverse_transposed(F), pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
+    return determinant(F), inverse(np.swapaxes(F, -2, -1)), pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
 
 
 def stress(T: Array, F: Array) -> Array:

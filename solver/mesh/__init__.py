@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.arrays import Array, Flags, Indices
+from solver.arrays import Array, Flags, Indices, determinant
 
 # Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
 GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
@@ -170,7 +170,7 @@ def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
     Raises MeshError where one is not positive: the element is folded there.
     """
     jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(at)[1]
-    det = jacobian[..., 0, 0] * jacobian[..., 1, 1] - jacobian[..., 0, 1] * jacobian[..., 1, 0]
+    det = determinant(jacobian)
     if not det.min() > 0.0:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
         raise MeshError(f"an element of the mesh is folded, near x = {worst[0]:.3g}, y = {worst[1]:.3g} mm")
