@@ -10,7 +10,7 @@ newest reading of each hand-over.
     python -m benchmarks.net_ft_throughput --beyond 14000 28000 56000 112000
 
 Beyond 7000 Hz, which no box gives, records packed before are sent by a process that does nothing else, since the
-simulated box cannot keep up there; time is told to run faster.
+simulated box cannot keep up there; the session's clock runs faster.
 """
 
 import argparse
@@ -119,7 +119,7 @@ def row(rate: int, seconds: float, every: float, *, drawing: bool, ready: bool) 
 
 
 def serve(rate: int, factor: float, pipe: Connection) -> None:
-    """Be the box's process: serve until told to end. First tell its address and when its time began [s]."""
+    """Be the box's process: serve until asked to end. First send its address and when its time began [s]."""
     box = NetFtBox(Bench(1), clock_at(factor), rate=rate)
     box.start()
     pipe.send((box.uri, time.monotonic() - box.now() / factor))

@@ -83,7 +83,7 @@ def logged(kind: str, trial: int | None = None, **data: object) -> LoggedEvent:
 
 
 def status(safe_ns: int) -> Status:
-    """Return a status whose acknowledgement has come so far; the course is told by commands alone."""
+    """Return a status whose acknowledgement has come so far; commands alone reach the course."""
     return Status("", 1, 10, 1000, 0, 2.0, Acknowledged(1000, 3, safe_ns))
 
 

@@ -3,7 +3,7 @@
 Records follow each other at a steady rate that is known within a few per cent. Their times advance at that rate, and
 are led by the session's clock: slowly, so that the system's handing over of bytes in lumps does not shake them. A
 loss that left broken bytes behind is counted from those. A loss that left nothing behind shows as a pause that no
-lump of records makes up for; one shorter than GAP cannot be told from a lump and stays unnoticed in the numbers,
+lump of records makes up for; one shorter than GAP looks like a lump and stays unnoticed in the numbers,
 while the times recover within seconds. A device that changes its rate by more than a few per cent is found out within
 seconds too (`drivers.rate`), and followed; what was taken for lost until then stays named as lost.
 """
@@ -20,7 +20,7 @@ _SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
 _STEADY = 0.3  # records come as fast as they are made where their lateness changes by less of the time passed [-]
 _LONGEST = 1.0  # that records are kept back while they come faster or slower [real s]
 _LEAD = 1.0  # how fast times and rate follow the session's clock [rad/s]
-_SPREAD = 0.05  # how far the true rate may lie from the one told [-]
+_SPREAD = 0.05  # how far the true rate may lie from the stated one [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,7 +15,7 @@ class ScanCount:
     """
 
     def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
-        """Expect `rate` scans in a second [Hz] of the session's clock; losses are told up to multiples of `wrap`.
+        """Expect `rate` scans in a second [Hz] of the session's clock; losses are known up to multiples of `wrap`.
 
         The session's clock runs `factor` times real time.
         """

@@ -30,7 +30,7 @@ def bit(number: int, words: str, verdict: Verdict) -> StatusBit:
 class StatusTable:
     """A maker's table of status bits, the gravest first. A bit that is in no entry is doubtful.
 
-    Where nothing but notes is listed, as in early recordings, a fault cannot be told from values out of range: then
+    Where nothing but notes is listed, as in early recordings, a fault looks like values out of range: then
     such a bit makes the values invalid, whichever it is.
     """
 

@@ -1,4 +1,4 @@
-"""A transducer that streams records without full numbers: thread, times, loss and return. Its wire is told to it."""
+"""A transducer that streams records without full numbers: thread, times, loss, return. A `Conversation` runs it."""
 
 import math
 import time
@@ -211,7 +211,7 @@ class StreamingTransducer(ThreadedTransducer):
         self.news.set()
 
     def _stream(self) -> None:
-        """Stream over one opening of the line until told to stop. Raises LinkLost when no records come any more."""
+        """Stream over one opening of the line until asked to stop. Raises LinkLost when no records come any more."""
         limit = Deadline(CONNECTING, self.stopping) if self._ever else self.begin_by
         link = self._connect(limit)
         try:

@@ -1,4 +1,4 @@
-"""The user's tool transform: any transducer, its wrench told about another point and other axes.
+"""The user's tool transform: any transducer, its wrench about another point and other axes.
 
 It is given in the address, `tool=dx,dy,dz,rx,ry,rz`: where the new origin lies in the transducer's own frame [mm], then
 the turns about x, y and z [degrees], in the maker's order (`drivers.calibration.wrench_transform`). It comes after
@@ -35,7 +35,7 @@ def without_tool(address: Address) -> tuple[Address, Tool]:
 
 
 def with_tool(info: TransducerInfo, tool: Tool) -> TransducerInfo:
-    """Return who the transducer is, its wrench told as the tool transform says."""
+    """Return who the transducer is, its wrench as the tool transform says."""
     if not tool:
         return info
     words = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)

@@ -78,7 +78,7 @@ def tables_in(text: str, where: str) -> dict[str, Any]:
         raise SettingsError(f"{where}: this is not TOML: {error}") from error
     except RecursionError as error:
         raise SettingsError(f"{where}: lists or tables are nested too deep; write it with fewer brackets") from error
-    except ValueError as error:  # Python's limit, 4300 unless told
+    except ValueError as error:  # Python's limit, 4300 by default
         raise SettingsError(f"{where}: a whole number has thousands of digits; shorten it") from error
 
 

@@ -41,7 +41,7 @@ class Simulator:
     statuses: tuple[int, ...] = ()  # that its maker's manual lists, to be planted one after the other
     unshown: float = 0.0  # share of damaged records that no check on this wire shows
     serial_line: bool = False  # so that hostile bytes on a line are tried on its driver too
-    at_start: bool = False  # a status can only be told in full where it is set when a stream begins
+    at_start: bool = False  # a status is sent in full only where it is set when a stream begins
 
 
 class _Box(Protocol):

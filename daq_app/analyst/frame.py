@@ -82,7 +82,7 @@ class Finger:
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """What is told of a state on the way."""
+    """Numbers of a state on the way."""
 
     time: float  # [s]
     depth: float  # of the bone [mm]

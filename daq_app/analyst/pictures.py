@@ -13,7 +13,7 @@ from solver.prediction import ROW, Skin
 from solver.response.fields import Fields, Sketch, Still, fields_of, most_squeezed, stills, way_until
 
 MOST = 150  # states of a way that did not settle, which may be long
-AT_ONCE = 8  # states that are drawn before progress is told
+AT_ONCE = 8  # states that are drawn between two reports of progress
 Progress = Callable[[float], bool]
 
 

@@ -45,7 +45,7 @@ class _Server:
 
         try:
             work = Work(folder, self._say, self._urgent)
-        except Exception as error:  # noqa: BLE001  whatever it is, the window is told and stays
+        except Exception as error:  # noqa: BLE001  whatever it is, the window gets a message and stays
             self._say(m.Problem(sentence_of(error)))
             return
         while True:

@@ -23,7 +23,7 @@ class Point:
 
 
 def words_of(row: Row) -> str:
-    """Return a line of the list of trials; what its marks mean is told by `marks_of`."""
+    """Return a line of the list of trials; `marks_of` explains its marks."""
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
         return _named(row.prediction) + tr("  no stroke")

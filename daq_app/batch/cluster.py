@@ -66,7 +66,7 @@ def cluster_client(address: str) -> Generator[Any]:
         library: Any = importlib.import_module("distributed")
     except ImportError as error:
         raise SchedulerError("a cluster needs the package distributed: pip install 'daq-app[cluster]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what it logs as errors is told in a sentence below
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # a sentence below says what it logs as errors
     security: Any = library.Security()  # certificates as Dask's own configuration names them, for tls:// addresses
     kind = asyncio.run(_identity(library, address, security))
     if kind != "Scheduler":

@@ -39,7 +39,7 @@ def analyse_session(
     seed: int | None = None,
     gain_error: float | None = None,
 ) -> Analysis:
-    """Return the analysis of a session, tau_max told by a law of the area, and keep it in the session's folder.
+    """Return the analysis of a session, with tau_max by a law of the area, and keep it in the session's folder.
 
     `seed` is that of its intervals; `gain_error` is how uncertain each axis' gain is [-]. Where nobody
     says, area and seed are as in the analysis that was kept before, and the gain's error as it was last set: what

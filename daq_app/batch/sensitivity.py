@@ -116,7 +116,7 @@ def sensitivity(
 ) -> tuple[tuple[Index, ...], NDArray[np.float64]]:
     """Return the index of each number, greatest total first, and the SEDs (samples * (numbers + 2),) [MPa].
 
-    `samples` is a power of two. `sed` answers one scene; the solver does unless told. Raises TooFewAnswers where a
+    `samples` is a power of two. `sed` answers one scene; the solver does by default. Raises TooFewAnswers where a
     scene of the design has no answer, SceneError where a range leaves what a scene may hold.
     """
     points = saltelli_points(design, samples, seed)

@@ -1,4 +1,4 @@
-"""The command line: verbs, exit codes, and the one sentence a failure is told in."""
+"""The command line: verbs, exit codes, and the one sentence of a failure."""
 
 import argparse
 import importlib
@@ -9,7 +9,7 @@ from typing import NoReturn
 
 from daq_app.console import DONE, FAILED, STOPPED, WRONG, Console, WrongValue, harmless, takes_all
 
-LONGEST = 1500  # of the sentence a failure is told in [characters]: half a page of a terminal
+LONGEST = 1500  # of the sentence of a failure [characters]: half a page of a terminal
 
 # Verb to module and to what it does. A verb's module is imported only when it is the one asked for.
 VERBS = {

@@ -13,7 +13,7 @@ SHARES = (500, 300)  # of the width, before somebody moved the handle [-]
 
 
 class Openness:
-    """Open or closed, remembered under a `key` where there is room for both the part and what is beside it.
+    """Whether a part is open, remembered under a `key` where there is room for the part and its neighbour.
 
     Where there is none it begins closed, and can be opened all the same, which is not remembered. `place` is called
     when it has changed.

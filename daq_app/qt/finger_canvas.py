@@ -229,7 +229,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def _place(self) -> None:
         """Show the part that is looked at, or all of it at the foot of the box."""
         above, line = self._above(), QFontMetricsF(self._font).height()
-        least = self._least * (1 if self.look.lost is None else 2)  # a place that is marked can be told from others
+        least = self._least * (1 if self.look.lost is None else 2)  # a marked place must differ from others
         self.setMinimumSize(80, round(above + BAR_LINES * line) + least)  # two stand beside each other
         self.ci.layout.setContentsMargins(0.0, above, 0.0, 0.0)
         axis: Any = self._bar.getAxis("bottom")

@@ -79,7 +79,7 @@ class Notice(Panel):
         hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
     def show_view(self, banner: Banner | None, notice: str) -> None:
-        """Show a banner, or else what was told."""
+        """Show a banner, or else the last message."""
         if banner is None and self._warning is not None:
             notice = self._warning
         if banner is not None:

@@ -32,7 +32,7 @@ class LiveBar(QWidget):
     def __init__(
         self, scale: float, length: Callable[[int], None], hold: Callable[[], None], finite: Callable[[bool], None]
     ) -> None:
-        """Show no numbers; `length` takes what is chosen [s], `hold` is told of a press, `finite` takes a choice."""
+        """Show no numbers; `length` takes what is chosen [s], `hold` is called at a press, `finite` takes a choice."""
         super().__init__()
         self._forces_shown = True
         self._on_hold = False

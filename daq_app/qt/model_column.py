@@ -33,11 +33,11 @@ from daq_app.wording import tr
 from solver.quantities import SED
 
 FINGER, SESSION, COMPARISON = range(3)  # tabs
-STEPS_A_SECOND = 10.0  # of a history that plays: its steps are told, for pressing takes long and sliding little time
+STEPS_A_SECOND = 10.0  # of a history that plays: it counts steps, for pressing takes long and sliding little time
 
 
 class ModelColumn(QWidget):
-    """Three tabs; `requested` tells what the work is to do."""
+    """Three tabs; `requested` carries orders for the worker process."""
 
     requested = Signal(object)
     other_wanted = Signal()

@@ -261,7 +261,7 @@ def say(widget: QLabel, text: str, name: str = "") -> None:
 
 
 def field(words: str, widget: QWidget, *more: QWidget) -> QVBoxLayout:
-    """Return words over the field that they ask for, and what stands beside it."""
+    """Return a caption over an input field, and further widgets beside the field."""
     caption = label(words, "quiet", wrap=True)
     if not isinstance(widget, _Choice):  # it has a label of its own
         caption.setBuddy(widget)

@@ -21,7 +21,7 @@ NUMBERS, READINGS = range(2)  # tabs
 
 
 class StrokeColumn(QWidget):
-    """`requested` tells what the work is to do."""
+    """`requested` carries orders for the worker process."""
 
     requested = Signal(object)
     replayed = Signal()  # to the end of the trial

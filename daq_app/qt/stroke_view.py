@@ -23,7 +23,7 @@ NAMES: dict[Edge, str] = tr_noop({"onset": "onset", "steady begin": "steady", "s
 
 
 class EdgeHandle(QPushButton):
-    """Says where an edge is; `moved` tells where it would be, `recorded` where it was left."""
+    """Shows where an edge is; `moved` carries its place during a drag, `recorded` its last one."""
 
     moved = Signal(str, float)  # the edge, and the instant [s, device time]
     recorded = Signal(str, float)  # likewise
@@ -39,7 +39,7 @@ class EdgeHandle(QPushButton):
         self.show_edge(None, 0.0)
 
     def show_edge(self, placed: Placed | None, origin: float) -> None:
-        """Show an edge, its time told since `origin` [s]."""
+        """Show an edge, its time counted from `origin` [s]."""
         self._placed, self._origin = placed, origin
         self._time = 0.0 if placed is None else placed.time
         self.setEnabled(placed is not None)

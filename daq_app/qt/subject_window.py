@@ -195,7 +195,7 @@ class SubjectWindow(QWidget):
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
         """Follow the window to screens of another size from now on."""
         super().showEvent(event)
-        # Not on a move: that is told before the screen is the other one.
+        # Not on a move: that event comes before the screen is the other one.
         self.windowHandle().screenChanged.connect(self._screen_changed, Qt.ConnectionType.UniqueConnection)
         self._screen_changed()
 

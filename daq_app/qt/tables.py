@@ -65,7 +65,7 @@ class _ByNumber(QSortFilterProxyModel):
 
 
 class TextTable(CopiedTable):
-    """Lines of cells under a head; a click on the head sorts, and a line is told when somebody goes to it."""
+    """A table of texts: a click on a column's head sorts by it, and `chosen` says which line is current."""
 
     chosen = Signal(int)  # its number before any sorting
 

@@ -20,7 +20,7 @@ from daq_app.wording import tr
 from sessions.recording import Setting
 
 FORCE_EVERY = 0.05  # between two values of the bar [s]
-STEPS = 200  # of the bar, that are told apart
+STEPS = 200  # of the bar, that can be distinguished
 
 
 class TabletScreen(QObject):
@@ -37,7 +37,7 @@ class TabletScreen(QObject):
         self.session_offset = 0.0  # session clock minus this machine's monotonic one [s]
         self._pixels: float | None = None  # in a millimetre, measured with a ruler
         self._part = 0.0
-        self._last_sent = 0.0  # when the bar was told last [s]
+        self._last_sent = 0.0  # when the bar got its last value [s]
         self._arrived.connect(self._take, Qt.ConnectionType.QueuedConnection)
         self._moved.connect(self.changed, Qt.ConnectionType.QueuedConnection)
         self.server = TabletServer(address or own_address(), port, self._arrived.emit, self._moved.emit)

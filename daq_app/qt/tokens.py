@@ -11,7 +11,7 @@ TARGET = 40  # least height of what is clicked or touched
 SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before the system's font scale
 USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
 
-# Okabe and Ito's palette, told apart with every common colour blindness.
+# Okabe and Ito's palette, distinct with every common colour blindness.
 FX, FY, N, T, MU, MODEL = "#0072B2", "#E69F00", "#56B4E9", "#D55E00", "#CC79A7", "#009E73"
 
 

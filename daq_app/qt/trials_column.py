@@ -18,7 +18,7 @@ from sessions.report.wording import shown_response
 
 
 class TrialsColumn(QWidget):
-    """`requested` tells which row was chosen, `responded` which quantity is held against the score."""
+    """`requested` carries the chosen row, `responded` the quantity that is compared with the score."""
 
     requested = Signal(object)
     responded = Signal(object)

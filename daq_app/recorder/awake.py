@@ -8,7 +8,7 @@ from collections.abc import Generator, Sequence
 from contextlib import contextmanager, suppress
 
 WHY = "a session is being recorded"
-# For SetThreadExecutionState of Windows: until told otherwise; the system must stay on (its screen may not).
+# For SetThreadExecutionState of Windows: until the next call; the system must stay on (its screen may not).
 CONTINUOUS, SYSTEM_REQUIRED = 0x8000_0000, 0x0000_0001
 
 

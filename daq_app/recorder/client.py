@@ -16,7 +16,7 @@
 Requests and reports are the dataclasses of `messages.py`, the events and commands of `run.steps`, `LoggedEvent`
 and `Status`. The recorder answers what it cannot do with `Failed(request, sentence)`; events that mean nothing now come
 back as the command `Refuse`. `Stop` is answered within 0.2 s: what waits for a device is broken off, a session gets its
-written end. No call waits, save `poll` for as long as it is told, `close`, and `Recorder.start` for the process to be
+written end. No call waits, save `poll` for its timeout, `close`, and `Recorder.start` for the process to be
 made. `Recorder` may be used by one thread; `wake` is called by another whenever something new can be polled.
 
 The recorder is a child process at the other end of two pipes; nothing listens anywhere. Ctrl-C and the closing of a

@@ -90,7 +90,7 @@ class Outbox:
         threading.Thread(target=self._write, name="reports", daemon=True).start()
 
     def send(self, report: Report) -> None:
-        """Have a report sent. Readings the client does not fetch are left out, and their number is told."""
+        """Have a report sent. Readings the client does not fetch are left out, and their number is sent."""
         with self._lock:
             if self._broken:
                 return

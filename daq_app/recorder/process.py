@@ -89,7 +89,7 @@ class Recorder:
             self._bench.stream()
 
     def _attempt(self, name: str, work: Callable[[], None]) -> None:
-        """Do something asked for; what goes wrong is told, and ends nothing else."""
+        """Do something asked for; what goes wrong is reported, and ends nothing else."""
         try:
             work()
         except EXPECTED as error:

@@ -96,7 +96,7 @@ def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[st
 
 
 class _Watched:
-    """A recorder on the simulated bench, and what it told."""
+    """A recorder on the simulated bench, and what it sent."""
 
     def __init__(self) -> None:
         self.recorder = Recorder.start(PACE)

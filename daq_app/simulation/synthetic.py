@@ -47,7 +47,7 @@ PEOPLE = SubjectSettings(
 CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
 LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
 JUDGING = 0.8  # from lift to score [s]
-TICK = 0.1  # between two looks at the transducer [s, told]: five times as seldom as with people
+TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
 
 
 SPOILT: Mapping[str, Spoilt] = {

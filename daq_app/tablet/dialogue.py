@@ -73,7 +73,7 @@ class Dialogue:
             self._send(page)
 
     def take(self, answer: AnswerGiven, clock: Callable[[float], float]) -> Event | None:
-        """Return what the recorder is to be told of an answer; None where it knows already, or no session runs.
+        """Return the recorder's command for an answer; None where it knows already, or no session runs.
 
         `clock` makes of the tablet's clock [ms] that of the session [s]. An answer that nobody asks for any more is
         returned as a note, so that it is not lost.

@@ -1,6 +1,6 @@
 """Serves the subject's page to one tablet on the lab's own network, and nothing else to anybody.
 
-There are two addresses: `/` is the page, which is the same for everybody and tells nothing, and `/socket` is the
+There are two addresses: `/` is the page, which is the same for everybody and holds no data, and `/socket` is the
 conversation. Whoever talks there must first say the code that the experimenter's window shows. It holds for one
 device. After `TRIES` wrong codes there is a new one. What is said crosses the network as plain text.
 """

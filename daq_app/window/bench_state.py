@@ -53,7 +53,7 @@ class BenchState:
 
 
 def bench_after(bench: BenchState, message: Message) -> BenchState:
-    """Return the bench after a message; the same object where it tells nothing of the bench."""
+    """Return the bench after a message; the same object where it does not concern the bench."""
     match message:
         case m.Connect() | m.Device() | m.NoDevice() | m.LinkDown() | m.LinkBack() | m.Failed():
             return _linked(bench, message)

@@ -140,7 +140,7 @@ def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
 
 
 def session_after(session: SessionState, message: Message, now: float) -> SessionState:
-    """Return the session after a message that came at `now` [s]; the same object where it tells nothing of it."""
+    """Return the session after a message that came at `now` [s]; the same object where it does not concern it."""
     after = _after(session, message, now)
     return after if after.phase == session.phase else replace(after, since=now)
 

@@ -153,7 +153,7 @@ class Follower:
         return lambda: _settled(request, self._kinematics, provisional, seen)
 
     def _step(self, normal: float, pull: float) -> tuple[float, bool]:
-        """Return the SED under forces [N], and whether finite strain told it; nothing that touches is within reach."""
+        """Return the SED under forces [N], and whether it is of finite strain; nothing that touches is within reach."""
         if normal < TOUCH:
             self._untouched()
             return 0.0, True

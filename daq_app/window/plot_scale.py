@@ -53,7 +53,7 @@ def ticks(low: float, high: float, room: float) -> tuple[float, ...]:
     ((-5.0, -2.5, 0.0, 2.5, 5.0), (-5.0, 0.0, 5.0), (-5.0, 5.0), (0.0, 2.5, 5.0))
     """
     taken: list[float] = []
-    for value in (high, 0.0, low, high / 2, low / 2):  # the more telling first
+    for value in (high, 0.0, low, high / 2, low / 2):  # the more informative first
         apart = min((abs(value - other) for other in taken), default=np.inf)
         if low <= value <= high and apart * room >= high - low:
             taken.append(value)

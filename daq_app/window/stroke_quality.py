@@ -20,7 +20,7 @@ from sessions.strokes.stroke import Stroke
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 
 # Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
-# The other flaws are told by their own sentence; where there is no command another stroke helps.
+# The other flaws show their own sentence. Where there is no command, the advice is another stroke.
 FLAWS: Mapping[FlawName, tuple[str, str]] = {
     FlawName.NO_STROKE: tr_noop(("no stroke was found", "Stroke once, firmly, and lift.")),
     FlawName.NO_STEADY_SLIDING: tr_noop(("no steady window", "Slide further, at one speed.")),

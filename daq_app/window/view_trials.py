@@ -8,7 +8,7 @@ from daq_app.window.stroke_quality import PICTURE, Quality, StrokePicture
 from daq_app.wording import tr, tr_noop
 
 TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
-KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that tells the state without colour, and the state in words
+KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
     "done": ("✓", tr_noop("done")),
     "redone": ("↻", tr_noop("done again")),
     "flawed": ("!", tr_noop("done, its stroke has a flaw")),

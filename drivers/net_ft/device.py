@@ -135,7 +135,7 @@ class NetFtTransducer(ThreadedTransducer):
         link.close()
 
     def _listen(self, link: Link) -> None:
-        """Take datagrams until told to stop, or until the box has been silent for too long."""
+        """Take datagrams until asked to stop, or until the box has been silent for too long."""
         receive, keep, now_ns = link.receive, self._pending.append, self.clock.now_ns
         link.send(self._request)
         # Silence is counted in waits that brought nothing, so that a computer too busy to look is not taken for it.

@@ -16,7 +16,7 @@ _HEADING = re.compile(r"(t|time|[FTM][xyz])(?:$|[\s_]*[\[(]\s*(.+?)\s*[\])]$|[\s
 
 
 class ColumnsUnknown(ValueError):
-    """The columns cannot be told; the message says what is missing and what to give."""
+    """The columns cannot be identified; the message says what is missing and what to give."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """The trials of one descriptor in one phase, with what the subject is told."""
+    """The trials of one descriptor in one phase, with the subject's instruction."""
 
     name: str
     instruction: str

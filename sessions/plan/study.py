@@ -29,7 +29,7 @@ class Key:
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
     def sealed(self) -> str:
-        """Return the key as a text that tells nothing to whoever opens its file by chance (Base64 of JSON)."""
+        """Return the key as a text that reveals nothing to whoever opens its file by chance (Base64 of JSON)."""
         return base64.b64encode(json.dumps(self.to_dict()).encode()).decode()
 
     @staticmethod

@@ -109,7 +109,7 @@ def withdraw(folder: Path, subject: str, reason: str) -> Member:
 
 
 def note(folder: Path, kind: str, data: Mapping[str, Any]) -> Study:
-    """Write down that the labels were told, or that a key was opened, and return the study."""
+    """Record that the labels were shown, or that a key was opened, and return the study."""
     return _changed(folder, "", lambda _: (kind, data))
 
 
@@ -173,7 +173,7 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
                 for *row, data in events
             ),
         )
-        _ = study.members, study.unblinded  # whatever their events lack is told here, and not where they are used
+        _ = study.members, study.unblinded  # whatever their events lack is found here, and not where they are used
     except (ValueError, KeyError, TypeError, msgspec.ValidationError) as error:
         raise StudyError(f"{path} is damaged ({error}); restore it from a copy") from error
     return study

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 STEP = 1e-3  # [s]
 ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the rate of an SA-II afferent is known"
-SHOWN = 10  # every so many steps the rate is told
+SHOWN = 10  # every so many steps the rate is kept
 
 
 _EDIN = "that units fire from below 1 %: Edin 2004, J. Neurophysiol. 92:3233"
@@ -210,7 +210,7 @@ def firing_document(prediction: SessionPrediction, settings: AfferentSettings) -
 def parameters(settings: AfferentSettings, reference: float | None = None) -> list[dict[str, Any]]:
     """Return every parameter with its value, unit, standing ("assumed", or "set" by somebody) and what it rests on.
 
-    `reference` is told with them where it is given, in the unit of the quantity.
+    `reference` is kept with them where it is given, in the unit of the quantity.
     """
     rows: list[dict[str, Any]] = []
     quantity, usual = _named(settings), usual_settings(settings.quantity)

@@ -1,4 +1,4 @@
-"""What a user may ask of the model: quantity, finger, strain, readings; and the scene file that tells a finger."""
+"""What a user may ask of the model: quantity, finger, strain, readings; and the scene file that describes a finger."""
 
 import tomllib
 from collections.abc import Mapping
@@ -79,7 +79,7 @@ _OF_OPTIONS = ("kinematics", "course", "evidence")
 
 
 def finger_in(path: Path) -> tuple[Scene, str]:
-    """Return the scene whose finger, materials, receptor and tolerance a file tells, and what of it is not taken.
+    """Return the scene whose finger, materials, receptor and tolerance a file gives, and what of it is not taken.
 
     The file may lack friction and loading. "" where all that it holds is taken. Raises FileNotFoundError, and
     SettingsError for anything wrong in what is taken.

@@ -31,7 +31,7 @@ def with_alternatives(
 
     Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
     for `variant_intervals`; `analysis` is what the friction came from.
-    Raises Cancelled where `progress`, told the part done, returns False.
+    Raises Cancelled where `progress`, called with the part done, returns False.
     """
     kinds, options = tuple(variants(prediction.options.variants)), prediction.options
     drawn = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None

@@ -1,4 +1,4 @@
-"""What the model says of each trial, in each variant and of a session, and how that is told as plain data."""
+"""What the model predicts for each trial, in each variant and for a session, and its form as plain data."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -206,7 +206,7 @@ class SessionPrediction:
     width_origin: str  # "set" or "assumed"
     options: PredictionOptions
     decisions: tuple[Decision, ...] = ()  # of people about the strokes, in force
-    area: AreaLaw = FIXED  # by which tau_max was told
+    area: AreaLaw = FIXED  # by which tau_max was computed
     gain_error: float | None = None  # of each axis, which the intervals hold [-]; None: the assumed one
     bootstrap_seed: int = 0  # of the intervals
 

@@ -43,7 +43,7 @@ def with_intervals(
     """Return a prediction with an interval of each SED it holds, where its options ask for them.
 
     They are of each trial, and of the same slid the other way (where asked for by `both_ways`). Raises Cancelled where
-    `progress`, told the part done, returns False.
+    `progress`, called with the part done, returns False.
     """
     if not prediction.options.intervals:
         return prediction

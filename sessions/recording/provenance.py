@@ -21,7 +21,7 @@ from sessions.json_document import json_object
 from sessions.plan.plan import Origin
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
-OPTIONAL = ("nidaqmx", "distributed")  # told where they are installed
+OPTIONAL = ("nidaqmx", "distributed")  # named where they are installed
 
 
 @dataclass(frozen=True, slots=True)

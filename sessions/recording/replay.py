@@ -90,7 +90,7 @@ class ReplayTransducer:
 
     @property
     def health(self) -> Health:
-        """Totals so far: what the recording tells of lost and distrusted readings, when it told it."""
+        """Totals so far: what the recording says of lost and distrusted readings, when it said it."""
         return replace(
             health_of(event for event in self._losses if event.readings <= self._readings.position),
             received=self._readings.position,

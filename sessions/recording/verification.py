@@ -7,7 +7,7 @@ MADE_BY = "made_by"  # versions of what made a stored document
 TIMINGS = frozenset(
     {"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"}
 )  # not numbers of the session
-_MOST = 20  # differences told one by one
+_MOST = 20  # differences named one by one
 
 
 def differences(stored: object, fresh: object, where: str) -> Iterator[str]:

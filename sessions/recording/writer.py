@@ -55,7 +55,7 @@ class SessionWriter:
         self._acknowledged = Acknowledged(time_ns=clock.now_ns())
         self._failure: str | None = None
         self._reserve: Reserve | None = None
-        self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # told of events once they are safe
+        self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # called with events once they are safe
         self.must_end: str | None = None  # why only the end should still be written
 
     @classmethod

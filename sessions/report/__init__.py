@@ -26,7 +26,7 @@ class Further:
     """What a report can hold beside the prediction itself."""
 
     firing: Sequence[Firing] = ()  # of each trial with a course
-    afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was told with
+    afferent: tuple[Fact, ...] = ()  # the parameters that `firing` was computed with
     firing_settings: AfferentSettings | None = None  # the same as they are asked for; None: no firing was asked for
     response: str = SED.name  # the quantity at the ending that is held against scores
     paths: Mapping[int, Values] | None = None  # trial -> that quantity along many paths of the analysis

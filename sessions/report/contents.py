@@ -243,5 +243,5 @@ class Report:
     interval_kind: str = ""  # what the intervals in `StrokeFinding.bootstrap` are
     interval_kinds: dict[str, str] = field(default_factory=dict[str, str])  # what else they hold, by a number's name
     scene: TextFile | None = None  # that the commands name, where another finger than the session's was asked for
-    afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are told
+    afferent: tuple[Fact, ...] = ()  # every parameter of the afferent, where its rates are shown
     afferent_quantity: str = "sed"  # what it answers to, one of `solver.quantities`

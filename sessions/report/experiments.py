@@ -76,7 +76,7 @@ def experiments(
 
     `response` names the quantity of the model that is held against scores and rivals. `paths` holds that of each
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
-    number was told.
+    number was given.
     """
     main = [block for block in plan.blocks if block.phase == "main"]
     return tuple(_experiment(block, plan.subject, tables, numbers, paths or {}, law, response) for block in main)

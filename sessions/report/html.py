@@ -147,7 +147,7 @@ def text_address(text: str, kind: str = "text/csv") -> str:
 
 
 def panel_csv(panel: Panel, head: str) -> str:
-    """Return the numbers of a picture, empty where there is none; `head` is told first where something is simulated."""
+    """Return the numbers of a picture, empty where there is none; `head` comes first where something is simulated."""
     out = io.StringIO()
     if head:
         out.write(f"# {head}\n")
@@ -166,7 +166,7 @@ def _is_page(path: Path) -> bool:
 
 
 def swap_in(path: Path, text: str) -> None:
-    """Write a file beside its place, then put it there in one step. Raises ReportError."""
+    """Replace the file at `path` in one step. Raises ReportError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text.encode())

@@ -184,9 +184,9 @@ def _meshes(study: StudyFindings) -> list[str]:
         return []
     meshes = "; ".join(f"{value}: {_listed(sessions)}" for value, sessions in solved.items())
     sentence = (
-        f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as telling its own "
-        "trials apart asks for. Within a subject all trials share one mesh; between subjects an SED may differ for its "
-        f"mesh alone by as much as its estimated error, {_range_of(errors)} of it."
+        f"The sessions were solved on meshes of {len(solved)} finenesses ({meshes}), each as fine as the differences "
+        "between its own trials ask for. Within a subject all trials share one mesh; between subjects an SED may "
+        f"differ for its mesh alone by as much as its estimated error, {_range_of(errors)} of it."
     )
     spreads = [
         s.response.sd / s.response.mean

@@ -200,7 +200,7 @@ class ShownResponse:
 
 
 def shown_response(name: str) -> ShownResponse:
-    """Return how the quantity of that name is told; the names are those of `solver.quantities`."""
+    """Return how texts describe the quantity of that name; the names are those of `solver.quantities`."""
     one = BY_NAME[name]
     unit, factor = shown_unit(one)
     places, step = (3, "Pa") if unit == "kPa" else (4, "10⁻⁶")

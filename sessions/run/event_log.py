@@ -133,7 +133,7 @@ class Step:
     instant_ns: int  # session clock [ns]
     act: Event | None = None  # what somebody did then
     losses: LoggedEvent | None = None  # what was reported of lost and distrusted readings
-    zero_missing: bool = False  # somebody was told that the zero cannot be measured
+    zero_missing: bool = False  # a message has said that the zero cannot be measured
     end: Mapping[str, Any] | None = None  # how the session ended; empty for one that was cut short
 
 

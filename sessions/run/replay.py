@@ -181,7 +181,7 @@ class _Player:
         self._next = 0
         self._step: Step | None = None  # None while waiting for the next
         self._reported: list[LoggedEvent] = []
-        self._said_ns: dict[str, int] = {}  # when losses, and a zero that cannot be measured, were last told of
+        self._said_ns: dict[str, int] = {}  # when losses, and a zero that cannot be measured, were last reported
         self._health: Health | None = None  # at the end
         self._stopped = False
 

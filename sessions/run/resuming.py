@@ -121,7 +121,7 @@ class ContinuedClock:
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """The time between the last thing recorded and the resumption, told by the wall clock."""
+    """The time between the last thing recorded and the resumption, by the wall clock."""
 
     last_ns: int  # session clock of the last thing recorded [ns]
     duration: float | None  # [s]; None where the wall clock ran backwards meanwhile

@@ -42,7 +42,7 @@ class RunnerSettings:
 
     tick: float = 0.02  # between two looks at transducer and operator [s, session clock]
     zero_duration: float = 0.5  # unloaded stretch before each take [s, device time]
-    zero_patience: float = 5.0  # waiting for it, until somebody is told [s, session clock]
+    zero_patience: float = 5.0  # waiting for it, until a message says so [s, session clock]
     after_lift: float = 0.5  # the finger stays off, before a take ends [s, device time]
     losses_every: float = 1.0  # least time between two reports of lost readings [s, session clock]
     status_every: float = 0.1  # between two calls of `progress` [s, session clock]

@@ -225,7 +225,7 @@ class MixedModel:
     """A linear mixed model by restricted maximum likelihood: each subject has a level, perhaps a slope, of its own."""
 
     terms: tuple[Term, ...]
-    middle: float  # mean of the first covariate, at which the intercept and the subjects' levels are told
+    middle: float  # mean of the first covariate, at which the intercept and the subjects' levels are given
     between_sd: float  # of the subjects' levels
     within_sd: float  # of what is left
     n: int

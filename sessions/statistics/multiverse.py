@@ -70,7 +70,7 @@ class Path:
     kinematics: Kinematics
 
     def usual(self, rule: str, kinematics: str, law: AreaLaw = FIXED) -> bool:
-        """Say whether it is the way that every other number went, mu being told by `rule` and tau_max by `law`."""
+        """Say whether it is the way that every other number went, mu computed by `rule` and tau_max by `law`."""
         first = (next(iter(FILTERS)), next(iter(WINDOWS)), RECEPTORS[0], (law, 1.0))
         own = (self.filter, self.window, self.receptor, AREAS[self.area])
         return own == first and self.mu == rule and self.kinematics == kinematics

@@ -35,7 +35,7 @@ class RepeatedCorrelation:
     high: float
     p: float  # two-sided, of the same
     dof: int  # N - k - 1 for N pairs from k subjects
-    subjects: int  # with two pairs or more: one alone tells nothing of what goes on within its subject
+    subjects: int  # with two pairs or more: one alone has no variation within its subject
     people: tuple[float, float] | None  # 95 % interval for other such subjects who meet the same stimuli; None of two
     people_p: float | None  # two-sided, of the same
 

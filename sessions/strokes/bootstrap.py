@@ -81,8 +81,8 @@ class StrokeIntervals:
     tangential_force: Interval | None  # mean over the steady window [N]
     peak_normal: Interval | None  # [N]
     peak_tangential: Interval | None  # [N]
-    heading: Interval | None  # about the angle told: an end may lie beyond 180 [degrees]
-    direction_agrees: float | None  # share of repeats in which the direction is the one told [-]
+    heading: Interval | None  # about the reported angle: an end may lie beyond 180 [degrees]
+    direction_agrees: float | None  # share of repeats in which the direction is the reported one [-]
     onset: Interval | None  # [s, device time]
     break_away: Interval | None  # [s, device time]
     slide_onset: Interval | None  # [s, device time]
@@ -105,8 +105,8 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         if name not in repeats or value is None:
             return None
         low, high = np.quantile(repeats[name], ends).tolist()
-        # An instant told at the end of the stretch in which it may lie, as by the first reading after it, is one too.
-        # A lean that is known and was not levelled moves the truth away from the number told: it lies within as well.
+        # An instant found at the end of the stretch in which it may lie, as by the first reading after it, is one too.
+        # A lean that is known and was not levelled moves the truth off the reported number: it lies within as well.
         within = name in _RANGES or settings.tilt != (0.0, 0.0)
         return (min(low, value), max(high, value)) if within else (low, high)
 
@@ -224,14 +224,14 @@ class _Repeats:
         return numbers | self._instants(numbers.get("speed")) | self._onset()
 
     def _crest(self, force: Array) -> Array:
-        """Return how far the true greatest unfiltered force may lie from the one told (repeats,) [N]."""
+        """Return how far the true greatest unfiltered force may lie from the reported one (repeats,) [N]."""
         missed = self._curve.crest_missed * self._draw.uniform(size=self._settings.repeats)
         return self._top(force, self._curve.crest_noise, filtered=False) + missed
 
     def _top(self, force: Array, noise: float, *, filtered: bool = True) -> Array:
-        """Return how far the true greatest force may lie from the one told (repeats,) [N].
+        """Return how far the true greatest force may lie from the reported one (repeats,) [N].
 
-        Noise has raised the one told about as far as noise drawn once more raises that on average.
+        Noise has raised the reported one about as far as noise drawn once more raises that on average.
         """
         high = force[force >= self._settings.top_share * np.nanmax(force)]
         alike = self._settings.top_alike * self._settings.block if filtered else 0.0
@@ -298,13 +298,13 @@ class _Repeats:
         return numbers
 
     def _headings(self, way: Array, heading: float) -> Array:
-        """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near the angle told as whole turns allow."""
+        """Return the angles (repeats,) [degrees] of ways (repeats, 2), as near that reported as whole turns allow."""
         uneven = 1.0 + self._settings.gain_error * np.sqrt(2.0) * self._draw.standard_normal(len(way))  # of two gains
         angle = np.degrees(np.arctan2(way[:, 1] * uneven, way[:, 0]))
         return heading + (angle - heading + 180.0) % 360.0 - 180.0
 
     def _instants(self, speed: Array | None) -> dict[str, Array]:
-        """Return the instants (repeats,) that the analysis told and nobody decided."""
+        """Return the instants (repeats,) that the analysis found and nobody decided."""
         stroke, curve, instants = self._stroke, self._curve, dict[str, Array]()
         if stroke.steady is None:
             return instants
@@ -335,7 +335,7 @@ class _Repeats:
         if len(quiet) < self._settings.fewest_quiet:
             return {}
         noise = float(quiet.std())
-        # How large the noise is, and with it the threshold, is told from these readings too.
+        # How large the noise is, and with it the threshold, is estimated from these readings too.
         band = self._settings.detector.leave_noise * noise / np.sqrt(2.0 * len(quiet))
         wrong = self._zero_n + band * self._draw.standard_normal(self._settings.repeats)
         draws = onset_draws((curve.time, curve.unfiltered), onset, noise, wrong, self._settings, self._draw)

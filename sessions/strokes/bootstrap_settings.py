@@ -30,7 +30,7 @@ class BootstrapSettings:
     quiet_before: float = 0.02  # ... which end so long before it: later ones may be the touch's already [s]
     top_share: float = 0.97  # readings above this share of the peak may be the peak [-]
     top_alike: float = 0.25  # ... and filtered ones nearer than this share of a block are alike [-]
-    most_alike: float = 0.8  # neighbouring blocks: more cannot be told from so few [-]
+    most_alike: float = 0.8  # neighbouring blocks: more cannot be estimated from so few [-]
     least_free: float = 2.0  # degrees of freedom of a mean, likewise
     onset_fewest: int = 3  # readings that tell how steeply the force climbs
     onset_most: int = 400  # readings about the crossing in which noise is drawn

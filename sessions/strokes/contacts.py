@@ -44,7 +44,7 @@ def find_contacts(time: Array, normal: Array, baseline: Baseline, settings: Anal
 
 
 def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: AnalysisSettings) -> tuple[Contact, ...]:
-    """Return the strokes of a contact: two are told apart where the zeroed N between them falls far below both peaks.
+    """Return the strokes of a contact: two are separated where the zeroed N between them falls far below both peaks.
 
     `normal` (n,) [N] is zeroed and filtered, of all readings. nan is
     no force beside a gap that may hide a lift, and no valley elsewhere, as in stretches too short for the filter.
@@ -151,7 +151,7 @@ def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSett
     counts = np.diff(np.append(firsts, len(at)))
     force, pressed = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
-    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # nothing of the drag will be told
+    if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
         return []
     strong = np.flatnonzero(
         (drag >= settings.contact.turn_share * float(np.median(drag / pressed)) * pressed)

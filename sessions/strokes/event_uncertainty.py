@@ -1,10 +1,10 @@
 """How uncertain the instants of a stroke are: what its onset, its break-away and its slide's onset may have been.
 
 Of the onset the detector's own rule is repeated: a force that climbs as steeply crosses its threshold somewhere between
-two readings, and noise drawn anew moves the reading at which that is told. Of the break-away the readings' deviations
+two readings, and noise drawn anew moves the reading that detects it. Of the break-away the readings' deviations
 from the fit are kept in place and turned by a random factor a block (a wild bootstrap: Wu 1986, Ann. Statist. 14:1261),
 since noise of T/N is greatest where N is least, and N climbs too. Of the slide's onset it is the share of the steady
-speed, at which it is told, that decides.
+speed, at which it is detected, that decides.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ def onset_draws(
         return None
     reach = min(settings.onset_reach * noise / slope, settings.onset_most * step / 2.0)
     places = np.arange(-reach, reach + step, step)
-    # Readings of each repeat, told from the crossing: the first lies anywhere within a step.
+    # Readings of each repeat, counted from the crossing: the first lies anywhere within a step.
     since = places + step * draw.uniform(size=(len(zero), 1))  # (repeats, k)
     within = slope * since + noise * draw.standard_normal(since.shape) <= 0.0
     last = np.where(within.any(axis=1), since.shape[1] - 1 - np.argmax(within[:, ::-1], axis=1), -1)

@@ -61,7 +61,7 @@ class FrictionParameters:
     mu: Annotated[float | None, Meaning("", "coefficient of friction the model is given")]
     mu_interval: tuple[float, float] | None  # the bootstrap's, of that very number; None before it is drawn
     tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model is given")]
-    contact_area: Annotated[float, Meaning("mm2", "that tau_max was told for")]
+    contact_area: Annotated[float, Meaning("mm2", "for which tau_max was computed")]
     speed: Annotated[float | None, Meaning("mm/s", "of the stroke")]
     direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back, as measured")]
     rule: Annotated[Rule, Meaning("", "which T/N mu is")]

@@ -191,7 +191,7 @@ def onset_threshold(noise: float, settings: DetectorSettings) -> float:
 def is_quiet(stretch: list[float], settings: DetectorSettings) -> bool:
     """Say whether a stretch of forces [N] spreads no more than noise does.
 
-    Noise is told from the median step between neighbours, which a slow movement hardly changes.
+    Noise is estimated from the median step between neighbours, which a slow movement hardly changes.
     """
     if len(stretch) < settings.baseline_readings:
         return False

@@ -51,7 +51,7 @@ class FilterSettings:
     shortest_segment: int = 12  # readings; fewer have no filtered value, for the filter's ends reach across them
     smoothing: float = 0.1  # the maximum of T/N is that of the force means over so long [s]
     block: float = 0.1  # intervals and standard errors are those of the means over so long [s]
-    fewest_blocks: int = 4  # of which a standard error is told
+    fewest_blocks: int = 4  # of which a standard error is given
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class ZeroSettings:
 class ContactSettings:
     """Which contacts are strokes, and where they are cut."""
 
-    valley: float = 0.2  # two strokes are told apart where N falls below this share of the lower peak [-]
+    valley: float = 0.2  # two strokes are separated where N falls below this share of the lower peak [-]
     turn_share: float = 0.5  # to and fro: the drag counts beyond this share of the median T/N each way [-] ...
     turn_unsure: float = 2.0  # ... and beyond so many times what the zero leaves open [-] ...
     turn_shortest: float = 0.1  # ... and each way lasts so long beside the longest [-]
@@ -176,7 +176,7 @@ class PressSettings:
     press_shortest: float = 0.5  # ... for so long [s] ...
     press_moves: float = 1.0  # ... while its centre of pressure moves no further [mm] ...
     press_ratio: float = 0.2  # ... and T/N stays below this [-]
-    press_fewest: int = 3  # presses, or blocks of one press, of which an interval is told
+    press_fewest: int = 3  # presses, or blocks of one press, of which an interval is given
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ class AnalysisSettings:
     climb: ClimbSettings = field(default_factory=ClimbSettings)
     press: PressSettings = field(default_factory=PressSettings)
     systematic: SystematicSettings = field(default_factory=SystematicSettings)
-    area: AreaLaw = FIXED  # by which tau_max is told
+    area: AreaLaw = FIXED  # by which tau_max is computed
     confidence: float = 0.95
     gain_error: float | None = None  # standard uncertainty of each axis' gain that somebody set [-]; None: assumed
     bootstrap_seed: int = 0  # of the intervals drawn

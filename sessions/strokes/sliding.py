@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 Places = NDArray[np.int64]
 
 _QUARTERS = 4
-_ROUNDING = 1e-9  # instants are told to the last bit, or rounded by people [s]
+_ROUNDING = 1e-9  # instants are known to the last bit, or rounded by people [s]
 
 
 def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSettings) -> slice | None:

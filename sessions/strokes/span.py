@@ -82,7 +82,7 @@ class StrokeZero:
     level: Array  # (6,) face frame [N, N mm]
     noise: Array  # (6,) [N, N mm]
     filtered: Array  # (3,) noise of the filtered forces [N]
-    lasts: float  # what the noise was told from [s]
+    lasts: float  # of what the noise was estimated from [s]
     error: Array  # (6,) standard uncertainty of the level during the stroke [N, N mm]
     origin: str  # where it came from, for people
     drift: Array | None  # (6,) after minus before; None where one of the two was not seen

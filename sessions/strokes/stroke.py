@@ -82,7 +82,7 @@ class Stroke:
     zero: Annotated[str, Meaning("", "where the zero of the forces came from")]
     zero_drift: Annotated[float | None, Meaning("N", "how far the zero moved from before the stroke to after it")]
     flaws: Annotated[tuple[str, ...], Meaning("", "names of what is wrong with it")]
-    contact_area: Annotated[float | None, Meaning("mm2", "by which tau_max was told")] = None
+    contact_area: Annotated[float | None, Meaning("mm2", "by which tau_max was computed")] = None
     area_exponent: Annotated[float, Meaning("", "with which that area follows the normal force")] = 0.0
     number: Annotated[int, Meaning("", "of the stroke within its trial, from 1")] = 1
     kept: Annotated[bool, Meaning("", "false: a person left it out, and the model is not given it")] = True

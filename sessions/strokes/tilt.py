@@ -1,4 +1,4 @@
-"""How the stimulus's face leans against the transducer, told from presses that do not slide.
+"""How the stimulus's face leans against the transducer, estimated from presses that do not slide.
 
 Whoever presses along the face's normal n with the force N exerts -N n: what stands sideways over N is how far n leans.
 A press that pushes sideways by itself looks the same. Presses of one hand lean alike, so only several presses, or a
@@ -72,7 +72,7 @@ def press_of(
     error = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean())))
     lean = np.degrees(np.arctan(ratio.mean(axis=0)))
     start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
-    # What was levelled before is told too: the lean is that against the transducer.
+    # What was levelled before counts too: the lean is that against the transducer.
     return Press(
         trial,
         start,

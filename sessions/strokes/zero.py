@@ -93,7 +93,7 @@ def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: Analy
 def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
     """Return the standard deviations (k, m) of axes (n, m) in windows from `starts` (k,), and their noise (k, m).
 
-    Noise is told from the median step, which slow movement hardly changes.
+    Noise is estimated from the median step, which slow movement hardly changes.
     """
     windows = np.lib.stride_tricks.sliding_window_view(axes, length, axis=0)[starts]  # (k, m, length)
     noise = NORMAL_STEP * np.median(np.abs(np.diff(windows, axis=2)), axis=2)

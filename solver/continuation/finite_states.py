@@ -262,7 +262,7 @@ def steady_body(
 
     That is sought from undeformed, or from `start`. `skin` is the law of what may fold. Raises NoSteadyState where the
     branch ends before, at a limit point or where the skin folds, with the largest friction as this mesh has it;
-    NotConverged where it is lost before, which tells nothing of the body, or cannot be begun.
+    NotConverged where it is lost before, which says nothing about the body, or cannot be begun.
     """
     newton = Newton(whole.condensed)
     body = _OwnBody(whole, newton)

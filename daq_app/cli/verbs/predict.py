@@ -223,7 +223,7 @@ def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
 
 
 def _print_missing(intervals: Iterable[tuple[str, SedInterval | None]], console: Console) -> None:
-    """Print why SEDs have no interval: those without an SED have told their reason elsewhere."""
+    """Print why SEDs have no interval: those without an SED have their reason elsewhere."""
     _print_once(
         console,
         ((name, f"no interval: {one.reason}") for name, one in intervals if one is not None and one.low is None),

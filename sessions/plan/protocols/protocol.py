@@ -212,7 +212,7 @@ class Protocol:
     translations: tuple[Translation, ...] = ()  # of them, a table for each block and language
 
     def __post_init__(self) -> None:
-        """Check ranges, that blocks and stimuli can be told apart, and that answers and orders can be had."""
+        """Check ranges, that blocks and stimuli are distinct, and that answers and orders can be had."""
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
             raise NotAllowed("name", self.name, "it must be of small letters, digits and single hyphens")
         check_seed("label_seed", self.label_seed)
@@ -241,7 +241,7 @@ class Protocol:
 
     @property
     def planted_friction(self) -> tuple[tuple[str, int, float], ...]:
-        """Return descriptor, index and μ of every stimulus whose friction the simulated bench is told."""
+        """Return descriptor, index and μ of every stimulus whose friction the simulated bench uses."""
         return tuple(
             (block.descriptor, index, mu)
             for block in self.blocks

@@ -78,7 +78,7 @@ def _numbered(strokes: tuple[StrokeFinding, ...], first: float, last: float) -> 
     return kept
 
 
-MOST_LABELLED = 12  # more curves in one picture cannot be told apart by labels
+MOST_LABELLED = 12  # more curves in one picture cannot be distinguished by labels
 
 
 class StrokeQuantity(NamedTuple):

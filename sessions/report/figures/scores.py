@@ -153,7 +153,7 @@ def _experiment(one: DescriptorFindings) -> Experiment:
 def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool) -> Panel:
     drawn = sheet(328, 280)
     (axes,) = drawn.axes
-    each = len(one.points) <= MOST  # of more points hovering tells the subject alone
+    each = len(one.points) <= MOST  # of more points only hovering names the subject
     for subject in dict.fromkeys(point[0] for point in one.points):
         own = sorted((shown.factor * value, score, index) for of, index, value, score in one.points if of == subject)
         axes.plot([x for x, _, _ in own], [y for _, y, _ in own], "-", color=GREY, alpha=0.35, linewidth=0.7)

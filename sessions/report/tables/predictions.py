@@ -117,7 +117,7 @@ def afferent_table(report: Report) -> Table | None:
     below = "Under each number: the 95 % interval that friction's uncertainty makes of it, parameters as given; "
     caption = (
         f"Firing of an SA-II afferent: an illustration. No fitted map from {shown.label} to the rate of a human SA-II "
-        "afferent is known; every parameter is told below, assumed unless it says that somebody set it. The order of "
+        "afferent is known; every parameter is listed below, assumed unless it says that somebody set it. The order of "
         f"the settled rates is that of the size of the {shown.label} as long as no rate lies at a bound, every size "
         "is beyond the threshold and the adaptation gain stays below the static gain. "
         f"{below if published else ''}±: the error from the mesh. Model: {report.model}."

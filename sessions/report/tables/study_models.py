@@ -1,4 +1,4 @@
-"""Tables of a study's page: mixed models, what was planted beside what was found, and every trial."""
+"""Tables of a study's page: mixed models, planted and estimated values, and every trial."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable

@@ -43,7 +43,7 @@ UNITS = {
 
 @dataclass(frozen=True, slots=True)
 class Normalised:
-    """What is told of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
+    """Statistics of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
 
     means: Mapping[int, Average]  # by index
     mean_relation: Relation | None

@@ -73,7 +73,7 @@ class VisitOptions:
     """What is asked of each session of a study."""
 
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
-    area: AreaLaw = FIXED  # by which tau_max is told; the paths have areas of their own
+    area: AreaLaw = FIXED  # by which tau_max is computed; the paths have areas of their own
     paths: Literal["none", "small", "finite"] = (
         "none"  # many paths too, and at which strain; see `sessions.statistics.multiverse`
     )

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 QUARTILE = float(special.ndtri(0.75))  # from the PSE to the JND, where three of four answers name the comparison [z]
 LEAST_LEVELS = 3  # of x: two fit any PSE and JND, and tell nothing of lapses
-MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and a lapse is not to be told from a flat slope
+MOST_LAPSES = 0.5  # beyond it an observer mostly guesses, and a lapse cannot be distinguished from a flat slope
 MOST_SCATTER = 1.0  # of the beta law's theta; its correlation is then 1/2, and most cells are answered all one way
 STEEPEST = 100.0  # slope by the spread of levels, beyond which any function is a step for all levels that there are
 _PSE, _SLOPE, _ORDER, _LAPSE, _SCATTER = range(5)
