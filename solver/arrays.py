@@ -184,8 +184,6 @@ class CondensedArrays(NamedTuple):
 
     stiffness: Array  # (2 k, 2 k) [N/mm per mm]
     force: Array  # (2 k,) of the skin on the surface, were there no surface [N/mm]
-    compliance: Array  # (2 k, 2 k) inverse of the stiffness where that is known, else (0, 0) [mm per N/mm]
-    motions: Array  # (2 k, m) of the body as a whole that cost no energy, along which forces balance
 
 
 class Skin(NamedTuple):
@@ -196,13 +194,14 @@ class Skin(NamedTuple):
     fixed_length: Array  # (k,) skin that each node stands for whatever the state [mm]
 
 
-class ForceControl(NamedTuple):
-    """Which of depth and travel follow from forces, in one linear system."""
+class ContactControl(NamedTuple):
+    """Which of depth and travel follow from forces, in one linear system, and how often states may change."""
 
     kind: int  # DEPTH_GIVEN, PUSH_GIVEN or DRAG_GIVEN
     drag: float  # of the surface along +x [N/mm]
     push: float  # and along +y
     stride: float  # largest change of depth or travel [mm]
+    rounds: int  # of changes of the contact states, at most
 
 
 class LoadArguments(NamedTuple):

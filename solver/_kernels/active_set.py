@@ -18,9 +18,9 @@ from solver._kernels.contact_system import (
 from solver.arrays import (
     Array,
     CondensedArrays,
+    ContactControl,
     ContactStates,
     ContactSystem,
-    ForceControl,
     LoadArguments,
     Narrow,
     Skin,
@@ -106,124 +106,103 @@ def friction_state(
 
 
 @compiled
-def update_contact_states(states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments) -> int:
-    """Change `states` in place where the solution contradicts them; return how many were changed."""
-    size = above.shape[0]
-    changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
-    changed = contradictions(states, above, slip, length, load, changes)
-    for i in range(size):
-        states.state[i], states.sense[i] = changes.state[i], changes.sense[i]
-    return changed
-
-
-@compiled
 def solve_active_set(
     body: CondensedArrays,
+    compliance: Array,
     skin: Skin,
     states: ContactStates,
     load: LoadArguments,
     position: SkinPosition,
-    control: ForceControl,
-    rounds: int,
+    control: ContactControl,
     system: ContactSystem,
 ) -> int:
     """Solve the skin's system of contact, changing `states` up to `rounds` times until none contradicts the solution.
 
-    That is the contact of the linearised body, exact where the rounds suffice. Where the compliance is known, what is
-    unknown are forces, fewer than steps. Filled: the reactions of `states`, and `system` with its `steps`, the first
-    that to equilibrium, the others where steps are unknown. Returns the number of systems solved, UNSETTLED or
-    SINGULAR.
+    That is the contact of the linearised body, exact where the rounds suffice. Where there is a `compliance`, as of
+    `CondensedBody`, what is unknown are forces, fewer than steps. Filled: the reactions of `states`, and `system` with
+    its `steps`, the first that to equilibrium, the others where steps are unknown. Returns the number of systems
+    solved, UNSETTLED or SINGULAR.
     """
-    size, by_forces = states.state.shape[0], body.compliance.shape[0] > 0
-    sums = np.zeros((2, 2 * size))  # how the force of the surface along x and y follows steps, or forces
-    loads, untouched = np.zeros(2), np.zeros(2 * size)
-    answer = system.steps
+    size, steps, motion = states.state.shape[0], system.steps, system.motion
+    sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # how the force of the surface follows steps, or forces
+    answer, untouched = steps, loads
+    by_forces = compliance.shape[0] > 0
     if by_forces:
-        answer = np.zeros((2 * size + body.motions.shape[1], COLUMNS))
-    sum_forces(body, by_forces, control.kind, sums, loads, untouched)
+        answer, untouched = np.zeros((compliance.shape[0], COLUMNS)), np.zeros(compliance.shape[0])
+        release(body.force, compliance, sums, untouched)
+    else:
+        sum_stiffness(body, control.kind, sums, loads)
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
     entered = np.zeros(size, np.int32)  # how often each node came to touch
-    seen, known = np.empty((rounds + 1, 2, size), np.int32), 0
+    seen, known = np.empty((control.rounds + 1, 2, size), np.int32), 0
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
-    motion = system.motion
     one_by_one, may_hold = False, load.mu > 0.0 and load.tau > 0.0
-    for turn in range(rounds + 1):
-        if not solve_states(body, skin, states, load, position, untouched, system, answer):
+    for turn in range(control.rounds + 1):
+        bounded_length(position.x, skin, states.state, load.mu, system.length)
+        if by_forces:
+            count = assemble_force_system(compliance, skin, states, load, position, untouched, system, answer)
+        else:
+            count = assemble_contact_system(body, skin, states, load, position, system)
+        if not solve(system.matrix, system.right, count):
             return SINGULAR
-        motion[0] = motion[1] = 0.0
+        take_answer(system, count, by_forces, states, load.mu, answer)
         stuck, dragged = count_in(states.state, STICK) > 0, control.kind == DRAG_GIVEN
-        if dragged and not stuck and may_hold and turn < rounds:
+        if dragged and not stuck and may_hold and turn < control.rounds:
             # a body that is free along x needs a node that holds it: all are asked again, one by one
             hold(states.state)
             may_hold, one_by_one = False, True
             continue
-        by_drag = dragged and stuck
-        if control.kind != DEPTH_GIVEN and not balance(states.state, sums, loads, answer, control, by_drag, motion):
+        regular = balance(states.state, sums, loads, answer, control, stuck, motion)
+        if by_forces:
+            regular &= follow(compliance, answer, untouched, steps, states.reaction)
+        else:
+            regular &= resist(body, steps, states.reaction)
+        if not regular:
             return SINGULAR
-        if not fill_reactions(body, by_forces, answer, untouched, system.steps, states.reaction):
-            return SINGULAR
-        if turn == rounds:
+        if turn == control.rounds:
             break
         loose = dragged and not stuck  # nothing holds the body along x: then it may have gone anywhere
-        look_ahead(position, system.steps, motion, loose, ahead, above, slip)
+        look_ahead(position, steps, motion, loose, ahead, above, slip)
         bounded_length(ahead, skin, states.state, load.mu, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1
         change_states(states, changes, slip, entered, one_by_one)
-        if met_before(states, seen, known):
-            one_by_one, known = True, 0
-        known += 1
+        met = met_before(states, seen, known)
+        one_by_one, known = one_by_one or met, 1 if met else known + 1
     return UNSETTLED
 
 
 @compiled
-def sum_forces(body: CondensedArrays, by_forces: bool, kind: int, sums: Array, loads: Array, untouched: Array) -> None:
-    """Fill how the surface's force follows the answer, `sums` (2, 2 k) beside `loads` (2,), and the `untouched` step.
-
-    The latter (2 k,) is that without contact, where forces are unknown.
-    """
-    force = body.force
-    for i in range(force.shape[0]):
-        if by_forces:
-            sums[i % 2, i] = 1.0
-            for c in range(force.shape[0]):
-                untouched[c] -= force[i] * body.compliance[i, c]
-        elif kind != DEPTH_GIVEN:
-            loads[i % 2] += force[i]
-            for c in range(force.shape[0]):
+def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -> None:
+    """Fill how the surface's force along x and y follows steps, `sums` (2, 2 k) beside `loads` (2,), where asked."""
+    if kind != DEPTH_GIVEN:
+        for i in range(body.force.shape[0]):
+            loads[i % 2] += body.force[i]
+            for c in range(body.force.shape[0]):
                 sums[i % 2, c] += body.stiffness[i, c]
 
 
 @compiled
-def solve_states(
-    body: CondensedArrays,
-    skin: Skin,
-    states: ContactStates,
-    load: LoadArguments,
-    position: SkinPosition,
-    untouched: Array,
-    system: ContactSystem,
-    answer: Array,
-) -> bool:
-    """Fill the `answer`, steps (2 k, 4) or forces (2 k + m, 4), for contact in these states; False where it fails."""
-    state, sense = states.state, states.sense
-    bounded_length(position.x, skin, state, load.mu, system.length)
-    by_forces = body.compliance.shape[0] > 0
-    if by_forces:
-        count = assemble_force_system(body, skin, states, load, position, untouched, system, answer)
-    else:
-        count = assemble_contact_system(body, skin, states, load, position, system)
-    if not solve(system.matrix, system.right, count):
-        return False
+def release(force: Array, compliance: Array, sums: Array, untouched: Array) -> None:
+    """Fill how the surface's force follows forces, `sums` (2, 2 k), and the step `untouched` (2 k + m,) without it."""
+    for i in range(force.shape[0]):
+        sums[i % 2, i] = 1.0
+        for c in range(untouched.shape[0]):
+            untouched[c] -= force[i] * compliance[i, c]
+
+
+@compiled
+def take_answer(
+    system: ContactSystem, count: int, by_forces: bool, states: ContactStates, mu: float, answer: Array
+) -> None:
+    """Fill the `answer` with what was unknown, and with the drag of what slips where those are forces."""
     for r in range(count):
         for c in range(COLUMNS):
             answer[system.free[r], c] = system.right[r, c]
-    if by_forces:
-        for i in range(state.shape[0]):
-            if state[i] == SLIP:
-                for c in range(COLUMNS):
-                    answer[2 * i, c] = sense[i] * load.mu * answer[2 * i + 1, c]
-    return True
+    for i in range(states.state.shape[0]):
+        if by_forces and states.state[i] == SLIP:
+            for c in range(COLUMNS):
+                answer[2 * i, c] = states.sense[i] * mu * answer[2 * i + 1, c]
 
 
 @compiled
@@ -258,33 +237,30 @@ def hold(state: Narrow) -> None:
 
 
 @compiled
-def fill_reactions(
-    body: CondensedArrays, by_forces: bool, answer: Array, untouched: Array, steps: Array, reaction: Array
-) -> bool:
-    """Fill the `reaction` (k, 2) of the surface, and the step to equilibrium where forces were unknown.
+def resist(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
+    """Fill the `reaction` (k, 2) of the surface to `steps` (2 k, 4); False where a number is not finite."""
+    whole = 0.0
+    for i in range(steps.shape[0]):
+        total = body.force[i]
+        for c in range(steps.shape[0]):
+            total += body.stiffness[i, c] * steps[c, 0]
+        reaction[i // 2, i % 2] = total
+        whole += total
+    return np.isfinite(whole)
 
-    False where a number is not finite.
-    """
-    stiffness, force, compliance, motions = body
+
+@compiled
+def follow(compliance: Array, answer: Array, untouched: Array, steps: Array, reaction: Array) -> bool:
+    """Fill the `reaction` (k, 2) of the surface and the step to equilibrium; False where a number is not finite."""
     size, whole = steps.shape[0], 0.0
-    if by_forces:
-        for i in range(size):
-            reaction[i // 2, i % 2] = answer[i, 0]
-            steps[i, 0] = untouched[i]
-            for m in range(motions.shape[1]):
-                steps[i, 0] += motions[i, m] * answer[size + m, 0]
-        for i in range(size):
-            if answer[i, 0] != 0.0:
-                for c in range(size):
-                    steps[c, 0] += answer[i, 0] * compliance[i, c]
-    else:
-        for i in range(size):
-            total = force[i]
-            for c in range(size):
-                total += stiffness[i, c] * steps[c, 0]
-            reaction[i // 2, i % 2] = total
     for i in range(size):
-        whole += reaction[i // 2, i % 2]
+        reaction[i // 2, i % 2] = answer[i, 0]
+        steps[i, 0] = untouched[i]
+        whole += answer[i, 0]
+    for i in range(answer.shape[0]):
+        if answer[i, 0] != 0.0:
+            for c in range(size):
+                steps[c, 0] += answer[i, 0] * compliance[i, c]
     return np.isfinite(whole)
 
 
@@ -333,15 +309,16 @@ def met_before(states: ContactStates, seen: Narrow, known: int) -> bool:
 
 @compiled
 def balance(
-    state: Narrow, sums: Array, loads: Array, answer: Array, control: ForceControl, by_drag: bool, motion: Array
+    state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, stuck: bool, motion: Array
 ) -> bool:
-    """Add to the first of `answer` (2 k, 4) the change of depth, `by_drag` of travel too, that meets given forces.
+    """Add to the first of `answer` (2 k, 4) the change of depth, and of travel where `stuck`, that meets given forces.
 
     `sums` (2, 2 k) is how the surface's force along x and y follows the answer, beside `loads` (2,). Fills `motion`
     (2,) with both changes, at most its stride. False where nothing touches, or nothing meets them.
     """
-    if count_in(state, OPEN) == state.shape[0]:
-        return False
+    motion[0] = motion[1] = 0.0
+    if control.kind == DEPTH_GIVEN or count_in(state, OPEN) == state.shape[0]:
+        return control.kind == DEPTH_GIVEN
     drag, push = np.zeros(COLUMNS), np.zeros(COLUMNS)
     for c in range(sums.shape[1]):
         for s in range(COLUMNS):
@@ -349,7 +326,7 @@ def balance(
             push[s] += sums[1, c] * answer[c, s]
     less, lack = control.drag - loads[0] - drag[0], control.push - loads[1] - push[0]
     deeper = along = 0.0
-    if by_drag:
+    if stuck and control.kind == DRAG_GIVEN:
         det = push[1] * drag[3] - push[3] * drag[1]
         if det == 0.0:
             return False
@@ -375,7 +352,11 @@ def meet(states: ContactStates, position: SkinPosition, load: LoadArguments, ski
     The anchors are positions that nodes have slid from. Filled: `length` (k,), of skin on which a bound acts.
     """
     bounded_length(position.x, skin, states.state, load.mu, length)
-    slip = np.empty(length.shape[0])
-    for i in range(length.shape[0]):
+    size, slip = length.shape[0], np.empty(length.shape[0])
+    for i in range(size):
         slip[i] = position.x[i] - position.anchor[i]
-    return update_contact_states(states, position.above, slip, length, load)
+    changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
+    changed = contradictions(states, position.above, slip, length, load, changes)
+    for i in range(size):
+        states.state[i], states.sense[i] = changes.state[i], changes.sense[i]
+    return changed

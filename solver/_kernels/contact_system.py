@@ -42,26 +42,16 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
 
 
 @compiled
-def rubbed(x: Array, at: Narrow, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which a bound acts that each node stands for.
-
-    That is its `tributary` length, less what `rubs` not.
-    """
-    out[:] = 0.0
-    for i in range(at.shape[0]):
-        if at[i] == 1:
+def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
+    """Fill `out` (k,) with the length of skin on which a bound acts: what is fixed, and the `tributary` that `rubs`."""
+    for i in range(out.shape[0]):
+        out[i] = skin.fixed_length[i]
+    for i in range(out.shape[0]):
+        if skin.middle[i] == 1:
             for n in range(3):
                 if rubs(state, i, i - 1 + n, mu):
                     row = LENGTHS[n]
                     out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
-
-
-@compiled
-def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which a bound acts: that of `rubbed`, and what is fixed."""
-    rubbed(x, skin.middle, state, mu, out)
-    for i in range(out.shape[0]):
-        out[i] += skin.fixed_length[i]
 
 
 @compiled
@@ -91,23 +81,30 @@ def assemble_contact_system(
     with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
     conditions prescribe displacements; what is unknown is listed in `free` (f,).
     """
-    f = prescribe(skin, states.state, position, system)
-    spot = np.empty(system.steps.shape[0], np.int64)
-    spot[:] = -1
+    state, sense, _ = states
+    free, steps, force = system.free, system.steps, body.force
+    f = prescribe(skin, state, position, system)
+    spot = np.full(steps.shape[0], -1)
     for r in range(f):
-        spot[system.free[r]] = r
+        spot[free[r]] = r
     square = system.matrix[: f * f].reshape(f, f)
     for r in range(f):
-        i: int = system.free[r] // 2
-        if states.state[i] == SLIP:
-            slide_row(r, states.sense[i], load.mu, body, system.free, square[r], system.right[r])
-            drag = states.sense[i] * load.mu
-        else:
-            free_row(r, body, system.free, square[r], system.right[r])
-            drag = 0.0
-        add_prescribed(system.free[r], drag, body.stiffness, skin.held, states.state, system.steps, system.right[r])
-        if states.state[i] == SHEAR_LIMITED:
-            add_bound(i, states.sense[i] * load.tau, load.mu, skin.middle, states.state, spot, system, square[r])
+        i: int = free[r] // 2
+        right, share, drag = system.right[r], 0.0, 0.0
+        if state[i] == SLIP:  # the drag is so many times the push, which is the force in the row below
+            share, drag = sense[i], sense[i] * load.mu
+        mine, push = body.stiffness[free[r]], body.stiffness[2 * i + 1]
+        right[0], right[1] = drag * force[2 * i + 1] - force[free[r]], 0.0
+        right[2], right[3] = share * force[2 * i + 1], 0.0
+        for j in range(spot.shape[0]):
+            value = mine[j] - drag * push[j]
+            if spot[j] >= 0:
+                square[r, spot[j]] = value
+            else:
+                for s in range(COLUMNS):
+                    right[s] -= value * steps[j, s]
+        if state[i] == SHEAR_LIMITED:
+            add_bound(i, sense[i] * load.tau, load.mu, skin.middle, state, spot, system, square[r])
     return f
 
 
@@ -132,46 +129,6 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
             else:
                 steps[y, 0], steps[y, 1] = -position.above[i], 1.0
     return f
-
-
-@compiled
-def free_row(r: int, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
-    """Write down row r: the force on an unknown of the skin is none."""
-    row = free[r]
-    mine = body.stiffness[row]
-    for c in range(square.shape[0]):
-        square[c] = mine[free[c]]
-    right[0], right[1], right[2], right[3] = -body.force[row], 0.0, 0.0, 0.0
-
-
-@compiled
-def slide_row(r: int, sense: int, mu: float, body: CondensedArrays, free: Narrow, square: Array, right: Array) -> None:
-    """Write down row r: the drag on a node that slips, its sense that of friction, is mu times the push on it."""
-    row, force = free[r], body.force
-    drag = sense * mu
-    mine, other = body.stiffness[row], body.stiffness[row + 1]
-    for c in range(square.shape[0]):
-        square[c] = mine[free[c]] - drag * other[free[c]]
-    right[0], right[1], right[2], right[3] = drag * force[row + 1] - force[row], 0.0, sense * force[row + 1], 0.0
-
-
-@compiled
-def add_prescribed(
-    row: int, drag: float, stiffness: Array, held: Narrow, state: Narrow, steps: Array, right: Array
-) -> None:
-    """Take from the `right` (4,) of a row, less `drag` times the next one, what prescribed steps contribute."""
-    mine, other = stiffness[row], stiffness[min(row + 1, stiffness.shape[0] - 1)]
-    for j in range(state.shape[0]):
-        if state[j] == OPEN or held[j] & HELD_Y != 0:
-            continue
-        y = 2 * j + 1
-        value = mine[y] - drag * other[y]
-        right[0] -= value * steps[y, 0]
-        right[1] -= value
-        if state[j] == STICK and held[j] & HELD_X == 0:
-            value = mine[y - 1] - drag * other[y - 1]
-            right[0] -= value * steps[y - 1, 0]
-            right[3] -= value
 
 
 @compiled
@@ -252,7 +209,7 @@ def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
 
 @compiled
 def assemble_force_system(
-    body: CondensedArrays,
+    compliance: Array,
     skin: Skin,
     states: ContactStates,
     load: LoadArguments,
@@ -265,29 +222,43 @@ def assemble_force_system(
 
     That is what `assemble_contact_system` writes down for steps, where the compliance is known. Unknown are the push on
     what touches, the drag on what sticks, and the parts of the body's m motions, listed in `free` (f,). `untouched`
-    (2 k,) is the step without contact. `forces` (2 k + m, 4) is filled where they are known; no column is by mu.
+    (2 k + m,) is the step without contact. `forces` (2 k + m, 4) is filled where they are known; no column is by mu.
     """
-    known = list_forces(skin.held, states, load.tau, system, forces)
-    f = known + body.motions.shape[1]
-    square, right = system.matrix[: f * f].reshape(f, f), system.right
+    state, sense, _ = states
+    pushes, f = list_forces(skin.held, states, load.tau, system, forces)
+    free, right = system.free, system.right
+    square = system.matrix[: f * f].reshape(f, f)
     right[:f] = 0.0
-    for r in range(known):
-        row = system.free[r]
-        i = row // 2
-        mine = body.compliance[row]
-        with_drag(mine, system.free[:known], states.state, states.sense, load.mu, square[r])
-        right[r, 0] = -untouched[row] - (position.above[i] if row % 2 == 1 else position.x[i] - position.anchor[i])
-        right[r, 1 if row % 2 == 1 else 3] = 1.0
-        for j in range(states.state.shape[0]):
-            if states.state[j] == SHEAR_LIMITED:
+    for r in range(f):
+        row = free[r]
+        i, mine = row // 2, compliance[row]
+        for c in range(f):
+            square[r, c] = mine[free[c]]
+        for c in range(pushes):
+            j = free[c] // 2
+            if state[j] == SLIP:
+                square[r, c] += sense[j] * load.mu * mine[2 * j]
+        right[r, 0] = -untouched[row]
+        for j in range(state.shape[0]):
+            if state[j] == SHEAR_LIMITED:
                 right[r, 0] -= mine[2 * j] * forces[2 * j, 0]
-    balance_motions(known, body, states, load.mu, system, square, forces)
+        if r < pushes:
+            right[r, 0] -= position.above[i]
+            right[r, 1] = 1.0
+        elif i < state.shape[0]:
+            right[r, 0] -= position.x[i] - position.anchor[i]
+            right[r, 3] = 1.0
     return f
 
 
 @compiled
-def list_forces(held: Narrow, states: ContactStates, tau: float, system: ContactSystem, forces: Array) -> int:
-    """List the unknown forces in `free`, fill those `forces` that are known; return how many are unknown."""
+def list_forces(
+    held: Narrow, states: ContactStates, tau: float, system: ContactSystem, forces: Array
+) -> tuple[int, int]:
+    """List what is unknown in `free`, pushes first, fill those `forces` that are known; return how many are pushes.
+
+    Then how many are unknown.
+    """
     state, sense, _ = states
     forces[:, :] = 0.0
     f = 0
@@ -297,37 +268,12 @@ def list_forces(held: Narrow, states: ContactStates, tau: float, system: Contact
             f += 1
         if state[i] == SHEAR_LIMITED:
             forces[2 * i, 0] = sense[i] * tau * system.length[i]
+    pushes = f
     for i in range(state.shape[0]):
         if state[i] == STICK and held[i] & HELD_X == 0:
             system.free[f] = 2 * i
             f += 1
-    return f
-
-
-@compiled
-def with_drag(numbers: Array, free: Narrow, state: Narrow, sense: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` with those of `numbers` (2 k,) that are `free`, plus what drag adds to the push of what slips."""
-    for c in range(free.shape[0]):
-        unknown = free[c]
-        value = numbers[unknown]
-        if unknown % 2 == 1 and state[unknown // 2] == SLIP:
-            value += sense[unknown // 2] * mu * numbers[unknown - 1]
-        out[c] = value
-
-
-@compiled
-def balance_motions(
-    known: int, body: CondensedArrays, states: ContactStates, mu: float, system: ContactSystem, square: Array,
-    forces: Array,
-) -> None:  # fmt: skip
-    """Write down the last rows and columns: along motions of the whole body forces balance, and steps are free."""
-    motions = body.motions
-    for m in range(motions.shape[1]):
-        along = motions[:, m].copy()
-        system.free[known + m] = motions.shape[0] + m
-        for i in range(motions.shape[0]):
-            system.right[known + m, 0] += along[i] * (body.force[i] - forces[i, 0])
-        for c in range(known):
-            square[c, known + m] = along[system.free[c]]
-        with_drag(along, system.free[:known], states.state, states.sense, mu, square[known + m])
-        square[known + m, known:] = 0.0
+    for m in range(2 * state.shape[0], forces.shape[0]):
+        system.free[f] = m
+        f += 1
+    return pushes, f

@@ -29,7 +29,7 @@ class CondensedBody(Protocol):
 
     @property
     def compliance(self) -> Array:
-        """The inverse of the stiffness (2 k, 2 k) where that is known, else (0, 0) [mm per N/mm]."""
+        """The inverse of the stiffness, bordered by `motions` (2 k + m, 2 k + m) [mm per N/mm]; (0, 0) if not known."""
         ...
 
     @property
@@ -133,13 +133,13 @@ class CondensedLinear:
 
     @property
     def compliance(self) -> Array:
-        """The inverse of the stiffness (2 k, 2 k), 0 for what is held. Raises LinAlgError where that is none."""
+        """Do as `CondensedBody` says, 0 for what is held. Raises LinAlgError where there is no inverse."""
         if self._compliance is None:
             self._compliance = self._inverse()
         return self._compliance
 
     def _inverse(self) -> Array:
-        free = np.flatnonzero(self.stiffness.diagonal() > 0.0)
+        free, count = np.flatnonzero(self.stiffness.diagonal() > 0.0), self.motions.shape[1]
         # Rigid motions cost no energy: a spring on each makes the matrix invertible, and stays unloaded, since the
         # surface's forces balance the loads along every motion.
         spring = self.stiffness.trace() / max(len(free), 1)
@@ -147,9 +147,14 @@ class CondensedLinear:
         inverse = np.asarray(np.linalg.inv(inside), np.float64)
         if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
             raise LinAlgError("the body is neither held nor balanced")
-        out = np.zeros(self.stiffness.shape)
+        out = np.block([[np.zeros(self.stiffness.shape), self.motions], [self.motions.T, np.zeros((count, count))]])
         out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
         return out
+
+    def _follow(self, forces: Array) -> Array:
+        """Return the displacements (k, 2) that `forces` (2 k,) on the skin hold."""
+        size = len(forces)
+        return (self.compliance[:size, :size] @ forces).reshape(-1, 2)
 
     def loaded(self, load: Array) -> "CondensedLinear":
         """Return the same body under another dead `load` (2 k,) [N/mm]."""
@@ -163,11 +168,11 @@ class CondensedLinear:
 
     def untouched(self) -> Array:
         """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
-        return (self.compliance @ self.load).reshape(-1, 2)
+        return self._follow(self.load)
 
     def held_by(self, reaction: Array) -> Array:
         """Return the displacements (k, 2) that forces `reaction` (k, 2) of the surface hold."""
-        return (self.compliance @ (self.load + reaction.ravel())).reshape(-1, 2)
+        return self._follow(self.load + reaction.ravel())
 
     def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
         """Return the energy stored once forces `reaction` (k, 2) alone hold the body [N mm per mm]."""

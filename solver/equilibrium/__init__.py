@@ -18,9 +18,9 @@ from solver._kernels.compiling import OPEN, SLIP, STICK, bind_arguments
 from solver.arrays import (
     Array,
     CondensedArrays,
+    ContactControl,
     ContactStates,
     ContactSystem,
-    ForceControl,
     LoadArguments,
     Skin,
     SkinPosition,
@@ -236,14 +236,15 @@ class Newton:
             kind = PUSH_GIVEN if forces.tangential is None else DRAG_GIVEN
             drag, push = forces.tangential or 0.0, forces.normal
         return self._active_set(
-            self.arrays(), self.skin, self._states, load_arguments(load), self._position(state.u, load, anchor),
-            ForceControl(kind, float(drag), float(push), np.inf if body.constant else CONTROL.stride), rounds,
+            self.arrays(), body.compliance, self.skin, self._states, load_arguments(load),
+            self._position(state.u, load, anchor),
+            ContactControl(kind, float(drag), float(push), np.inf if body.constant else CONTROL.stride, rounds),
         )  # fmt: skip
 
     def arrays(self) -> CondensedArrays:
         """Return the linearised body as loops take it."""
         body = self.condensed
-        return CondensedArrays(body.stiffness, body.force, body.compliance, body.motions)
+        return CondensedArrays(body.stiffness, body.force)
 
     def _position(self, u: Array, load: LoadState, anchor: Array) -> SkinPosition:
         """Return where the skin lies for displacements `u`, relative to the surface."""

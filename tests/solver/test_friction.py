@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver._kernels import active_set
-from solver.arrays import ContactStates, LoadArguments
+from solver.arrays import ContactStates, LoadArguments, StateChanges
 from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
@@ -235,8 +235,10 @@ def test_the_loop_of_finite_strain_changes_the_states_that_its_plain_twin_change
         reaction, slip, direction = np.stack([drag, push], axis=1), draw.normal(size=9), number % 3 - 1
         expected = oracle.restated(state, sense, reaction, above, slip, length, law, direction)
         found, turned = state.copy(), sense.copy()
-        states, load = ContactStates(found, turned, reaction), LoadArguments(0.0, law.mu, law.tau_max, direction)
-        changed = active_set.update_contact_states(states, above, slip, length, load)
+        states, load = ContactStates(state, sense, reaction), LoadArguments(0.0, law.mu, law.tau_max, direction)
+        changed = active_set.contradictions(
+            states, above, slip, length, load, StateChanges(found, turned, above.copy())
+        )
         np.testing.assert_array_equal(found, expected[0])
         np.testing.assert_array_equal(turned, expected[1])
         assert changed == np.sum((found != state) | ((found >= SLIP) & (turned != sense)))

@@ -173,7 +173,7 @@ def restated(
 ) -> tuple[Indices, Indices]:
     """Return states and senses (k,) as `solver.contact` asks for them, for the forces and places of a solution.
 
-    Arguments as those of the loop `update_contact_states`, which changes its own.
+    Arguments as those of the loop `contradictions`.
     """
     slack, small = 1e-12 * np.abs(reaction[:, 1]).max(initial=0.0), 1e-13 * np.abs(above).max(initial=0.0)
     drag, push = reaction.T
