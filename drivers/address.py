@@ -1,10 +1,13 @@
-"""Device addresses as people type them: scheme://host?option=value&option=value."""
+"""Device addresses as people type them, scheme://host?option=value&option=value, and what a driver does with one."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl, urlsplit
 
-from drivers.transducer import SetupError
+from drivers.clock import Clock
+from drivers.deadline import Deadline
+from drivers.transducer import SetupError, Transducer, TransducerInfo
 
 
 class AddressError(SetupError):
@@ -59,5 +62,59 @@ def check_options(address: Address, allowed: frozenset[str]) -> None:
     """Raise SetupError when the address has an option that is not `allowed`."""
     for option in address.options:
         if option not in allowed:
-            known = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `drivers.tool`
+            known = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `without_tool`
             raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {known}")
+
+
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """One way to reach a transducer."""
+
+    name: str  # the scheme of its addresses
+    open: Callable[[Address, Clock, Deadline], Transducer]
+    identify: Callable[[Address, Deadline], TransducerInfo]  # who answers; changes nothing
+    usual: tuple[str, ...] = ()  # addresses where such a device stands unless somebody moved it
+
+
+FARTHEST = 1000.0  # displacement that is believed [mm]
+MOST = 360.0  # turn that is believed [degrees]
+
+Tool = tuple[float, ...]  # (6,), or empty for none
+
+
+def without_tool(address: Address) -> tuple[Address, Tool]:
+    """Return the address without its tool option, and the tool transform. Raises AddressError where that is none.
+
+    `tool=dx,dy,dz,rx,ry,rz` says where the new origin lies in the transducer's own frame [mm], then the turns about x,
+    y and z [degrees], in the maker's order (`drivers.calibration.wrench_transform`). It comes after whatever transform
+    the calibration, or the box, holds itself.
+    """
+    text = address.options.get("tool")
+    if text is None:
+        return address, ()
+    numbers = tuple(_number(part) for part in text.split(","))
+    limits = (FARTHEST,) * 3 + (MOST,) * 3
+    if len(numbers) != 6 or not all(abs(value) <= most for value, most in zip(numbers, limits, strict=True)):
+        raise AddressError(
+            f"{address.uri}: tool={text[:60]} must be six numbers, dx,dy,dz in mm (at most {FARTHEST:g}) and "
+            f"rx,ry,rz in degrees (at most {MOST:g}), for example tool=0,0,-5,0,0,0"
+        )
+    options = {name: value for name, value in address.options.items() if name != "tool"}
+    return replace(address, options=options), numbers if any(numbers) else ()
+
+
+def with_tool(info: TransducerInfo, tool: Tool) -> TransducerInfo:
+    """Return who the transducer is, its wrench as the tool transform says."""
+    if not tool:
+        return info
+    words = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)
+    settings = {**info.settings, "user's tool transform": words}
+    return replace(info, calibration=info.calibration.with_tool(tool), settings=settings)
+
+
+def _number(text: str) -> float:
+    """Return a number as people write it, or nan."""
+    try:
+        return float(text) if text.isascii() and "_" not in text else math.nan
+    except ValueError:
+        return math.nan

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from importlib import import_module
 
 import drivers
-from drivers.address import Address, AddressError, parse_address
+from drivers.address import Address, AddressError, Driver, parse_address, with_tool, without_tool
 from drivers.clock import Clock
 from drivers.deadline import Deadline
-from drivers.driver import Driver
-from drivers.tool import TransducerWithTool, with_tool, without_tool
-from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
+from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo, WrappedTransducer
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +34,7 @@ def open_transducer(uri: str, clock: Clock) -> Transducer:
     """
     address, tool = without_tool(parse_address(uri))
     transducer = _driver(address).open(address, clock, Deadline.for_opening())
-    return TransducerWithTool(transducer, tool) if tool else transducer
+    return WrappedTransducer(transducer, with_tool(transducer.info, tool)) if tool else transducer
 
 
 def reachable(named: Iterable[str] = (), patience: float = 0.5) -> tuple[Probe, ...]:

@@ -1,19 +1,131 @@
-"""Numbers and times for records that carry neither: from the order they came in, their rate, and when they arrived.
+"""Numbers, times and the rate of records that carry none of them: from their order and when they arrived."""
 
-Records follow each other at a steady rate that is known within a few per cent. Their times advance at that rate, and
-are led by the session's clock: slowly, so that the system's handing over of bytes in lumps does not shake them. A
-loss that left broken bytes behind is counted from those. A loss that left nothing behind shows as a pause that no
-lump of records makes up for; one shorter than GAP looks like a lump and stays unnoticed in the numbers,
-while the times recover within seconds. A device that changes its rate by more than a few per cent is found out within
-seconds too (`drivers.rate`), and followed; what was taken for lost until then stays named as lost.
-"""
-
+import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.rate import RateWatch
+WINDOW = 1.0  # of the records that arrive within, the one that waited least is taken [real s]
+COARSE, FINE = (1, 0.1), (3, 0.02)  # over so many windows, twice running, the rate is off by more than this [-]
+
+
+class RateWatch:
+    """Watches one stream. Records reach the computer late, and never early: so of each window one is looked at."""
+
+    def __init__(self, rate: float, factor: float, silence: float, vague: float = 0.0) -> None:
+        """Expect `rate` counts a second [Hz] of a session clock that runs `factor` times real time.
+
+        Across more than `silence` [s] without a record nothing is compared: something may have been lost in it.
+        `rate` was only measured for a moment where it is `vague`, by up to that share [-]: what is found first is it.
+        """
+        self.rate = rate  # as found last [Hz]
+        self.changes = 0  # of the rate, so far
+        self.nominal = rate  # as set [Hz]
+        self._vague = vague
+        self._window = WINDOW * factor
+        self._silence = silence
+        self._points: deque[tuple[int, float]] = deque(maxlen=2 * FINE[0] + 1)  # count and arrival, one a window
+        self._best: tuple[float, int, float] | None = None  # in this window: lateness, count, arrival
+        self._ends = 0.0  # of this window
+        self._last = 0.0  # arrival
+
+    def take(self, count: int, received_ns: int) -> bool:
+        """Take how far the device has counted by something that arrived; tell whether its rate is found to be another.
+
+        `count` rises with what was lost on the way, where that is known.
+        """
+        now = received_ns * 1e-9
+        if self._best is None or now - self._last > self._silence:
+            self._begin(count, now)
+            return False
+        self._last = now
+        late = now - count / self.rate
+        if now < self._ends:
+            if late < self._best[0]:
+                self._best = late, count, now
+            return False
+        self._points.append(self._best[1:])
+        self._best, self._ends = (late, count, now), now + self._window
+        return self._judged()
+
+    def begin_anew(self) -> None:
+        """Forget what has come: what comes next does not go on from it."""
+        self._best = None
+
+    def _begin(self, count: int, now: float) -> None:
+        self._points.clear()
+        self._best, self._ends, self._last = (now - count / self.rate, count, now), now + self._window, now
+
+    def _judged(self) -> bool:
+        """Compare two stretches, one after the other, with the rate believed."""
+        for windows, most in (COARSE, FINE):
+            if len(self._points) <= 2 * windows:
+                continue
+            first, middle, last = (self._points[i] for i in (-1 - 2 * windows, -1 - windows, -1))
+            before, after = (_rate(*pair) / self.rate - 1.0 for pair in ((first, middle), (middle, last)))
+            if min(abs(before), abs(after)) > most and before * after > 0.0 and abs(after - before) < 0.5 * abs(after):
+                self._points.clear()
+                self._find(_rate(first, last), most)
+                return True
+            if windows == FINE[0]:
+                self._vague = 0.0  # it is as it was measured
+        return False
+
+    def _find(self, rate: float, most: float) -> None:
+        """Take another rate for true."""
+        if abs(rate / self.nominal - 1.0) < self._vague:
+            self.rate = self.nominal = rate
+        else:
+            self.rate = self.nominal if abs(rate / self.nominal - 1.0) < most else rate
+            self.changes += 1
+        self._vague = 0.0
+
+
+def rate_of_least_late(came: Sequence[tuple[int, int]]) -> float:
+    """Return the steady rate [Hz] at which these counts can have come [ns], each late but never early; nan of one.
+
+    That of the line below all arrivals that is highest in their middle (Moon, Skelly and Towsley 1999, Proc. INFOCOM,
+    227): as long as two of them came in time, one on either side, it is exact. At 100 Hz, the first 7 ms late and
+    the last 30:
+
+    >>> rate_of_least_late([(0, 7_000_000), (1, 10_000_000), (2, 20_000_000), (3, 30_000_000), (4, 70_000_000)])
+    100.0
+    """
+    if len(came) < 2:
+        return math.nan
+    below: list[tuple[int, int]] = []  # corners of the lower hull
+    for count, at in came:
+        while len(below) > 1 and _turns_down(below[-2], below[-1], (count, at)):
+            below.pop()
+        below.append((count, at))
+    middle = (came[0][0] + came[-1][0]) / 2.0
+    first, last = next(side for side in pairwise(below) if side[1][0] >= middle)
+    return (last[0] - first[0]) / (last[1] - first[1]) * 1e9 if last[1] > first[1] else math.nan
+
+
+def _turns_down(first: tuple[int, int], middle: tuple[int, int], last: tuple[int, int]) -> bool:
+    """Tell whether the middle point lies on or above the line between the others."""
+    return (middle[1] - first[1]) * (last[0] - first[0]) >= (last[1] - first[1]) * (middle[0] - first[0])
+
+
+def rate_words(what: str, rate: float, nominal: float) -> str:
+    """Return what is the matter with a rate, or that it no longer is.
+
+    >>> rate_words("readings come", 147.5, 295.0), rate_words("readings come", 295.0, 295.0)
+    ('readings come at 147.5 Hz, not at 295 Hz', 'readings come at 295 Hz again')
+    """
+    return (
+        f"{what} at {nominal:.6g} Hz again" if rate == nominal else f"{what} at {rate:.4g} Hz, not at {nominal:.6g} Hz"
+    )
+
+
+def _rate(first: tuple[int, float], last: tuple[int, float]) -> float:
+    return (last[0] - first[0]) / (last[1] - first[1])
+
 
 GAP = 0.1  # shortest loss without a trace that is noticed [real s]
 _SETTLE = 0.05  # how long after a pause its lump may still be arriving [real s]
@@ -32,7 +144,14 @@ class Paced:
 
 
 class ClockRecovery:
-    """Paces one stream. Records after a pause are kept back until it is clear whether any were lost."""
+    """Numbers and times for records that carry neither. After a pause they are kept back until losses are clear.
+
+    Records follow each other at a steady rate that is known within a few per cent. Their times advance at that rate,
+    and are led by the session's clock: slowly, so that bytes handed over in lumps do not shake them. A loss that left
+    broken bytes behind is counted from those. A loss that left nothing behind shows as a pause that no lump of records
+    makes up for; one shorter than GAP stays unnoticed in the numbers, while the times recover within seconds.
+    A changed rate is followed (`RateWatch`); what was taken for lost until then stays named as lost.
+    """
 
     def __init__(self, rate: float, factor: float = 1.0) -> None:
         """Expect `rate` records in a second [Hz] of a session clock that runs `factor` times real time."""
@@ -132,3 +251,55 @@ class ClockRecovery:
 
 
 _NONE = Paced(np.empty(0, np.int64), np.empty(0))
+
+
+class ScanCount:
+    """Numbers and times of scans by the converter's own clock: scan k is at k / rate.
+
+    The host's clock only tells how long the converter was away, and whether a counter that tells of losses went round
+    unseen.
+    """
+
+    def __init__(self, rate: float, factor: float = 1.0, *, wrap: int = 0) -> None:
+        """Expect `rate` scans in a second [Hz] of the session's clock; losses are known up to multiples of `wrap`.
+
+        The session's clock runs `factor` times real time.
+        """
+        self.lost = 0
+        self.watch = RateWatch(rate, factor, GAP * factor + 10.0 / rate)
+        self._rate = rate
+        self._wrap = wrap
+        self._sequence = 0
+        self._behind: float | None = None  # arrival minus time of the last scan before [s]
+
+    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+        """Place n scans that arrived together, with those lost before each (n,)."""
+        if not len(damaged):
+            return _NONE
+        sequence = self._sequence + np.cumsum(damaged + 1)
+        behind = self._arrival_minus_time(int(sequence[-1]), received_ns)
+        if self._wrap and self._behind is not None and damaged.any():
+            rounds = max(round((behind - self._behind) * self._rate / self._wrap), 0)
+            sequence += np.where(np.arange(len(damaged)) >= int(np.argmax(damaged > 0)), rounds * self._wrap, 0)
+            behind -= rounds * self._wrap / self._rate
+        self._behind = behind
+        self.lost += int(sequence[-1]) - self._sequence - len(damaged)
+        self._sequence = int(sequence[-1])
+        self.watch.take(self._sequence, received_ns)
+        return Paced(sequence, (sequence - 1) / self._rate)
+
+    def release(self) -> Paced:
+        """Place what was kept back: nothing ever is."""
+        return _NONE
+
+    def bridge(self, received_ns: int) -> None:
+        """Let the stream, begun anew, go on at `received_ns` behind a gap of at least one scan."""
+        self.watch.begin_anew()
+        if self._behind is not None:
+            away = self._arrival_minus_time(self._sequence, received_ns) - self._behind
+            missing = max(round(away * self._rate) - 1, 1)
+            self._sequence += missing
+            self.lost += missing
+
+    def _arrival_minus_time(self, sequence: int, received_ns: int) -> float:
+        return received_ns * 1e-9 - (sequence - 1) / self._rate

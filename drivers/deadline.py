@@ -1,10 +1,27 @@
-"""The one limit on connecting: however a device behaves, every wait for it ends by a deadline or at a stop."""
+"""A link to a device, and the one limit on connecting: every wait ends by a deadline or at a stop."""
 
 import threading
 import time
+from typing import Protocol
 
-from drivers.link import Link
 from drivers.transducer import LinkLost
+
+
+class Link(Protocol):
+    """A way to one device."""
+
+    def send(self, data: bytes) -> None:
+        """Send `data`. Raises LinkLost when the link is gone for good."""
+        ...
+
+    def receive(self, timeout: float) -> bytes | None:
+        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
+        ...
+
+    def close(self) -> None:
+        """Give the port back. Harmless when repeated."""
+        ...
+
 
 # All in real seconds.
 CONNECTING = 4.5  # from asking for a device to its first reading, so that with closing all ends within 5 s

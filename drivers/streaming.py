@@ -11,12 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.clock_recovery import Paced
-from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Stopped
-from drivers.link import Link
-from drivers.rate import RateWatch, rate_of_least_late, rate_words
-from drivers.readings import ReadingBlock
-from drivers.records import RecordDecoder, Records
+from drivers.clock_recovery import Paced, RateWatch, rate_of_least_late, rate_words
+from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link, Stopped
+from drivers.readings import ReadingBlock, RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
 from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, TransducerInfo
 

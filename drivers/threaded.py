@@ -9,8 +9,7 @@ from drivers import deadline
 from drivers.clock import Clock
 from drivers.deadline import Deadline
 from drivers.readings import ReadingBlock
-from drivers.status import StatusCount
-from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
+from drivers.transducer import Health, LinkLost, SetupError, StatusCount, TransducerInfo
 
 _LEAVING = 0.9  # for the thread to end, until it is left alone with a device that holds it [real s]
 

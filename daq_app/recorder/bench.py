@@ -13,7 +13,7 @@ from daq_app.recorder.messages import Device, Failed, LinkBack, LinkDown, NoDevi
 from daq_app.simulation.wiring import Connected, connected
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transducer, TransducerInfo
+from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transducer, TransducerInfo, WrappedTransducer
 from sessions.recording import RecordingError
 from sessions.run.interruptions import interruptions
 from sessions.run.resuming import check_same_transducer
@@ -37,42 +37,24 @@ def _breakable(uri: str) -> Generator[None]:
         raise NotNow(f"{uri} was not connected: stopped by the user") from None
 
 
-class Tap:
+class Tap(WrappedTransducer):
     """A transducer whose readings are shown on their way into a session."""
 
     def __init__(self, inner: Transducer, display: Display) -> None:
         """Show what `inner` gives on `display`."""
-        self._inner = inner
+        super().__init__(inner)
         self._display = display
-
-    @property
-    def info(self) -> TransducerInfo:
-        """Return who the transducer is."""
-        return self._inner.info
-
-    @property
-    def health(self) -> Health:
-        """Return its totals so far."""
-        return self._inner.health
 
     def start(self) -> None:
         """Begin to stream."""
         self._display.stream_began()
-        self._inner.start()
+        super().start()
 
     def read(self, timeout: float) -> ReadingBlock:
         """Return the next readings, and show them."""
-        block = self._inner.read(timeout)
+        block = super().read(timeout)
         self._display.take(block)
         return block
-
-    def stop(self) -> None:
-        """End streaming."""
-        self._inner.stop()
-
-    def close(self) -> None:
-        """Stop, and give everything back."""
-        self._inner.close()
 
 
 class Bench:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from daq_app.recorder.device_history import remember_overload
 from daq_app.recorder.messages import HealthReport, Live, Report, Six
-from drivers.loads import level, loads
+from drivers.calibration import level, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, TransducerInfo
 

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct, field
 from numpy.typing import NDArray
 
-from drivers.loads import Level
+from drivers.calibration import Level
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.recording import LoggedEvent, Setting
@@ -113,7 +113,7 @@ class HealthReport(Struct, frozen=True):
     load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
     peak: Six  # the same since somebody acknowledged overloads
     saturated: int  # readings the device called invalid since somebody acknowledged
-    combined: float = math.nan  # load of the axes together (`drivers.loads`) since the last report [-]
+    combined: float = math.nan  # load of the axes together (`drivers.calibration`) since the last report [-]
     combined_peak: float = math.nan  # the same since somebody acknowledged
     level: Level = "fine"  # of the peaks: latched until acknowledged
 

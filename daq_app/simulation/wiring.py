@@ -5,10 +5,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from drivers.address import check_options, parse_address
+from drivers.address import check_options, parse_address, without_tool
 from drivers.catalog import open_transducer
 from drivers.clock import Clock
-from drivers.tool import without_tool
 from drivers.transducer import SetupError, Transducer
 from sessions.plan.plan import Frame, Trial
 from sessions.recording import Recording

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.wording import tr_noop
-from drivers.loads import ALARM, ALARM_COMBINED, WARNING, loads
+from drivers.calibration import ALARM, ALARM_COMBINED, WARNING, loads
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ class Load:
     """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
 
     axes: tuple[float, ...] = (0.0,) * 6
-    combined: float = 0.0  # see `drivers.loads`
+    combined: float = 0.0  # see `drivers.calibration`
 
     def latched(self, other: "Load") -> "Load":
         """Return the greater of each share.

@@ -7,14 +7,12 @@ import time
 from dataclasses import dataclass
 from functools import partial
 
-from drivers.address import Address, check_options
+from drivers.address import Address, Driver, check_options
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
-from drivers.deadline import Deadline
+from drivers.deadline import Deadline, Link
 from drivers.digital_ft import wire
-from drivers.driver import Driver
-from drivers.link import Link
-from drivers.records import RecordDecoder
+from drivers.readings import RecordDecoder
 from drivers.serial_link import Parity, SerialLink, port_of
 from drivers.streaming import StreamingTransducer, measured_rate
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo

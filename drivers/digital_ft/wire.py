@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
-from drivers.records import Records
-from drivers.status import StatusTable, bit
-from drivers.transducer import SetupError
+from drivers.readings import Records
+from drivers.transducer import SetupError, StatusTable, bit
 
 ADDRESS = 10
 READ, WRITE, START_STREAM, UNLOCK = 0x03, 0x10, 0x46, 0x6A  # function codes

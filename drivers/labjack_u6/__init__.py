@@ -6,15 +6,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drivers.address import Address, AddressError, check_options
+from drivers.address import Address, AddressError, Driver, check_options
 from drivers.calibration_file import CalibrationFile, read_calibration_file
 from drivers.clock import Clock
-from drivers.deadline import Deadline
-from drivers.driver import Driver
+from drivers.clock_recovery import ScanCount
+from drivers.deadline import Deadline, Link
 from drivers.labjack_u6 import wire
-from drivers.link import Link
-from drivers.records import RecordDecoder
-from drivers.scan_count import ScanCount
+from drivers.readings import RecordDecoder
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import DeviceFault, LinkLost, SetupError, TransducerInfo
 from drivers.usb_link import Endpoints, UsbLink, devices

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.records import Records
-from drivers.status import StatusBit, StatusTable, bit
-from drivers.transducer import DeviceFault
+from drivers.readings import Records
+from drivers.transducer import DeviceFault, StatusBit, StatusTable, bit
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.address import Address, AddressError, check_options
+from drivers.address import Address, AddressError, Driver, check_options
 from drivers.clock import Clock
 from drivers.deadline import Deadline
-from drivers.driver import Driver
 from drivers.links import UdpLink, http_get, tcp_answer
 from drivers.net_ft import wire
 from drivers.net_ft.configuration import Configuration, parse_configuration, true_rate

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.status import StatusTable, bit
+from drivers.transducer import StatusTable, bit
 
 _REQUEST = struct.Struct(">HHI")  # header, command, number of records (0: until stopped)
 _HEADER = 0x1234

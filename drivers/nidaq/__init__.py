@@ -12,17 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from drivers.address import Address, AddressError, check_options
+from drivers.address import Address, AddressError, Driver, check_options
 from drivers.calibration_file import read_calibration_file
 from drivers.clock import Clock
-from drivers.deadline import Deadline
-from drivers.driver import Driver
-from drivers.link import Link
-from drivers.records import RecordDecoder, Records
-from drivers.scan_count import ScanCount
-from drivers.status import StatusTable, bit
+from drivers.clock_recovery import ScanCount
+from drivers.deadline import Deadline, Link
+from drivers.readings import RecordDecoder, Records
 from drivers.streaming import StreamingTransducer
-from drivers.transducer import LinkLost, SetupError, TransducerInfo
+from drivers.transducer import LinkLost, SetupError, StatusTable, TransducerInfo, bit
 
 GAUGES = 6
 RANGE = 10.0  # [V]

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.address import Address, check_options
+from drivers.address import Address, Driver, check_options
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
-from drivers.deadline import Deadline
-from drivers.driver import Driver
-from drivers.link import Link
-from drivers.records import RecordDecoder
+from drivers.deadline import Deadline, Link
+from drivers.readings import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.serial_link import SerialLink, port_of
 from drivers.streaming import StreamingTransducer, measured_rate

@@ -9,8 +9,8 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.records import Records
-from drivers.status import StatusBit, StatusTable
+from drivers.readings import Records
+from drivers.transducer import StatusBit, StatusTable
 
 WARM_START = b"\x17"  # ^W
 ASCII_OUTPUT = b"CD A"

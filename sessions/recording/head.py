@@ -12,8 +12,7 @@ import msgspec
 import numpy as np
 
 from drivers.calibration import Calibration
-from drivers.status import StatusBit, StatusTable, bit
-from drivers.transducer import TransducerInfo
+from drivers.transducer import StatusBit, StatusTable, TransducerInfo, bit
 from sessions.json_document import converted
 from sessions.plan.plan import SessionPlan
 

@@ -15,8 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from drivers.readings import ReadingBlock
-from drivers.status import flagged_words
-from drivers.transducer import TransducerInfo
+from drivers.transducer import TransducerInfo, flagged_words
 from sessions.file_access import DATABASE_FAILURES, bounded, remedy
 from sessions.json_document import converted, json_value
 from sessions.plan.adaptive import with_mounted

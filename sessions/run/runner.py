@@ -6,8 +6,7 @@ from typing import Any, Literal, Protocol
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.status import flagged_words
-from drivers.transducer import COUNTS, DeviceFault, Health, LinkLost, Transducer
+from drivers.transducer import COUNTS, DeviceFault, Health, LinkLost, Transducer, flagged_words
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.run.event_log import data_of, kind_of, line_of

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
-from drivers.status import StatusCount, StatusTable, flagged_words
-from drivers.transducer import TransducerInfo
+from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
 from sessions.strokes.flaws import FlawName, Grade
 from sessions.strokes.invalid_readings import (
     ConstantRun,

@@ -11,7 +11,7 @@ import pytest
 
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connected
-from drivers import deadline, digital_ft, rate, serial_ft, streaming
+from drivers import clock_recovery, deadline, digital_ft, serial_ft, streaming
 from drivers.address import parse_address
 from drivers.catalog import DRIVERS
 from drivers.clock import PacedClock
@@ -95,7 +95,7 @@ def quickened(monkeypatch):
     monkeypatch.setattr(digital_ft, "_MEASURED", 0.15)
     monkeypatch.setattr(streaming, "_SILENCE", 0.8)
     monkeypatch.setattr(net_ft, "_SILENCE", 0.9)
-    monkeypatch.setattr(rate, "WINDOW", 0.25)
+    monkeypatch.setattr(clock_recovery, "WINDOW", 0.25)
 
 
 @dataclass

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from drivers.clock_recovery import ClockRecovery
-from drivers.rate import RateWatch, rate_of_least_late, rate_words
+from drivers.clock_recovery import ClockRecovery, RateWatch, rate_of_least_late, rate_words
 
 START = 7.0  # [s]
 

@@ -7,7 +7,7 @@ import numpy as np
 from drivers.calibration import Calibration
 from drivers.clock import RealClock
 from drivers.clock_recovery import ClockRecovery
-from drivers.records import Records
+from drivers.readings import Records
 from drivers.streaming import StreamingTransducer
 from drivers.transducer import TransducerInfo
 

@@ -8,11 +8,10 @@ import pytest
 from calibration_files import GAMMA, NANO43, parsed
 
 from daq_app.simulation.wiring import connected
-from drivers.address import parse_address
+from drivers.address import parse_address, with_tool, without_tool
+from drivers.calibration import loads
 from drivers.clock import PacedClock
-from drivers.loads import loads
 from drivers.readings import ReadingBlock
-from drivers.tool import with_tool, without_tool
 from drivers.transducer import SetupError, TransducerInfo
 from sessions.recording.head import info_from_dict, info_to_dict
 

@@ -25,7 +25,7 @@ from made_strokes import (
 from made_strokes import wrench as made
 
 from drivers.readings import ReadingBlock
-from drivers.status import StatusTable, bit
+from drivers.transducer import StatusTable, bit
 from sessions.plan.plan import Frame
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.decisions import Decision, Decisions

@@ -17,8 +17,7 @@ from drivers.catalog import Probe, reachable
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.serial_link import serial_ports
-from drivers.status import flagged_words
-from drivers.transducer import Transducer
+from drivers.transducer import Transducer, flagged_words
 from sessions.recording.head import identity
 
 EXAMPLE = "daq-app devices probe sim:"

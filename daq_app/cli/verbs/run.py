@@ -15,7 +15,7 @@ from daq_app.cli.session_options import add_body_arguments, body_of, own_sentenc
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, StartSession
-from drivers.status import flagged_words
+from drivers.transducer import flagged_words
 from sessions.plan.plan import Frame, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.study_file import open_study, study_key

@@ -11,10 +11,10 @@ from drivers import usb_link
 from drivers.address import parse_address
 from drivers.catalog import open_transducer
 from drivers.clock import PacedClock, RealClock
+from drivers.clock_recovery import ScanCount
 from drivers.deadline import Deadline
 from drivers.labjack_u6 import identify_labjack_u6, wire
 from drivers.readings import ReadingBlock
-from drivers.scan_count import ScanCount
 from drivers.transducer import DeviceFault, LinkLost, SetupError
 from simulators.bench import RATED, Bench
 from simulators.faults import Fault, Faults
