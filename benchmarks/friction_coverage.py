@@ -25,8 +25,8 @@ from sessions.strokes.bootstrap import SystematicDraws, drag_direction
 from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.settings import AnalysisSettings
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
+from simulators.stroke import CONTACT_AREA, paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import CONTACT_AREA, paper_surfaces
 
 Array = NDArray[np.float64]
 Truth = dict[str, float]

@@ -11,8 +11,7 @@ from sessions.recording import Acknowledged, LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
 from simulators.bench import RATED, Bench
-from simulators.stroke import Stroke
-from simulators.surface import paper_surfaces
+from simulators.stroke import Stroke, paper_surfaces
 
 RATE = 7000.0
 FRAME = Frame("-z", "set", 20.0, "set")

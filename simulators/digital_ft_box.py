@@ -10,12 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from simulators.bench import Bench
+from simulators.bench import FT32831, Bench
 from simulators.faults import Faults
-from simulators.gauges import FT32831
-from simulators.pseudo_terminal import ROOM, PseudoTerminal
-from simulators.served_box import LineBox
-from simulators.simulator import Simulator, served
+from simulators.simulator import ROOM, LineBox, PseudoTerminal, Simulator, served
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,8 @@ from drivers.clock import Clock
 from drivers.transducer import SetupError
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.net_ft_electronics import Electronics
-from simulators.net_ft_pages import AXIA, NET_FT, Product
-from simulators.served_box import ServedBox
-from simulators.simulator import LINE_FAULTS, Simulator, served
+from simulators.net_ft_electronics import AXIA, NET_FT, Electronics, Product
+from simulators.simulator import LINE_FAULTS, ServedBox, Simulator, served
 
 HOST = "127.0.0.1"
 _BURST = 200  # records sent at one go after the computer was busy, so as not to drown the reader

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from drivers.clock import Clock
-from simulators.bench import Bench
+from simulators.bench import FT32831, Bench, calibration_file
 from simulators.faults import Faults
-from simulators.gauges import FT32831, calibration_file
 from simulators.simulator import Simulated, Simulator, unplug
 
 ACTUAL = 1.0005  # rate of the device's clock over the one asked for [-]

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from drivers.clock import Clock
 from simulators.bench import Bench
 from simulators.faults import Faults
-from simulators.pseudo_terminal import PseudoTerminal
-from simulators.served_box import LineBox
-from simulators.simulator import Simulator, served
+from simulators.simulator import LineBox, PseudoTerminal, Simulator, served
 
 Array = NDArray[np.float64]
 

@@ -1,14 +1,27 @@
-"""A simulated box served to anybody's client: on the device's own ports where they are free, or on a serial port."""
+"""The other end of every driver: the list of simulated devices, and each of them served to any client.
 
+The list reads itself from the modules of this package. A test that is run on every driver takes it from here.
+"""
+
+import pkgutil
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
+import simulators
 from drivers.clock import clock_at
 from drivers.transducer import SetupError
 from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Faults
 from simulators.net_ft_box import NetFtBox
 from simulators.serial_ft_box import SerialFtBox
+from simulators.simulator import Simulator
 from simulators.timetable import ScriptedBench, load_timetable, usual_timetable
+
+_MODULES = [import_module(f"simulators.{module.name}") for module in pkgutil.iter_modules(simulators.__path__)]
+SIMULATORS: Mapping[str, Simulator] = {
+    module.SIMULATOR.name: module.SIMULATOR for module in _MODULES if hasattr(module, "SIMULATOR")
+}
 
 
 def serve_net_ft(

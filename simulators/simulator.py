@@ -1,13 +1,185 @@
-"""What a module of a simulated device gives: one `SIMULATOR`, how it is started and what can go wrong on its wire."""
+"""A simulated device: how it starts, the thread and serial line it is served on, and what can go wrong on its wire."""
 
+import contextlib
+import os
+import select
+import shutil
+import tempfile
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from drivers.clock import Clock
+from drivers.transducer import SetupError
 from simulators.bench import Bench
 from simulators.faults import Fault, Faults, Kind
+
+ROOM = 65536  # bytes kept for a reader that is late, as much as a computer's serial driver keeps
+
+
+class PseudoTerminal:
+    """A pair of ends that can be pulled apart and plugged in again under the same path. Linux and macOS only."""
+
+    def __init__(self, name: str) -> None:
+        """Make the port, plugged in, at a path that ends with `name`. Raises SetupError where there are none."""
+        if os.name != "posix":
+            raise SetupError("a simulated serial port needs Linux or macOS; use the sim: address on this computer")
+        self._folder = Path(tempfile.mkdtemp(prefix="daq-app-"))
+        self.path = str(self._folder / name)
+        self._ours = self._theirs = -1
+        self._waiting = bytearray()
+        self.plug_in()
+
+    @property
+    def is_plugged(self) -> bool:
+        """Whether the port is there."""
+        return self._ours >= 0
+
+    @property
+    def baud(self) -> int:
+        """The rate at which the other side has set its end [bits a second]; 0 where it is none of the usual ones."""
+        import termios  # exists where pseudo-terminals do
+
+        code: int = termios.tcgetattr(self._theirs)[5]
+        usual = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200, 230400)
+        return next((baud for baud in usual if getattr(termios, f"B{baud}", None) == code), 0)
+
+    def plug_in(self) -> None:
+        """Let the port be there (again), raw."""
+        import tty  # exists where pseudo-terminals do
+
+        if self.is_plugged:
+            return
+        self._ours, self._theirs = os.openpty()  # theirs stays open too, or the port would hang up between two readers
+        tty.setraw(self._theirs)
+        os.set_blocking(self._ours, False)
+        Path(self.path).unlink(missing_ok=True)
+        Path(self.path).symlink_to(os.ttyname(self._theirs))
+
+    def unplug(self) -> None:
+        """Let the port vanish under whoever holds it."""
+        if not self.is_plugged:
+            return
+        Path(self.path).unlink(missing_ok=True)
+        os.close(self._theirs)
+        os.close(self._ours)
+        self._ours = self._theirs = -1
+        self._waiting.clear()
+
+    def heard(self, timeout: float) -> bytes:
+        """Return what the other side has sent, waiting up to `timeout` real seconds for it."""
+        self._flush()
+        ready, _, _ = select.select([self._ours], [], [], timeout)
+        if not ready:
+            return b""
+        try:
+            return os.read(self._ours, 4096)
+        except OSError:
+            return b""
+
+    def say(self, data: bytes) -> None:
+        """Send `data`. What the other side has not read beyond ROOM bytes is lost, as on a line."""
+        self._waiting += data[: max(ROOM - len(self._waiting), 0)]
+        self._flush()
+
+    def _flush(self) -> None:
+        """Pass on what the system's own few kilobytes have room for."""
+        with contextlib.suppress(OSError):
+            del self._waiting[: os.write(self._ours, self._waiting)]
+
+    def close(self) -> None:
+        """Remove the port. Harmless when repeated."""
+        self.unplug()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class ServedBox:
+    """One box. Its time, and the bench's, begins when it is started."""
+
+    def __init__(self, clock: Clock, faults: Faults | None) -> None:
+        """Set up a box without any fault by default."""
+        self.clock = clock
+        self.faults = faults or Faults()
+        self.closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._origin_ns = 0
+
+    def now(self) -> float:
+        """Return the box's and the bench's time [s]: 0 when it was started."""
+        return (self.clock.now_ns() - self._origin_ns) * 1e-9
+
+    def serve(self, work: Callable[[], None], name: str) -> None:
+        """Let time begin, and a thread work until `closing` is set."""
+        self._origin_ns = self.clock.now_ns()
+        self._thread = threading.Thread(target=work, name=f"simulated {name}")
+        self._thread.start()
+
+    def close(self) -> None:
+        """Switch the box off. Harmless when repeated."""
+        self.closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+
+_NAP = 0.01  # of a box without its line or its power [real s]
+
+
+class LineBox(ServedBox):
+    """One box on a line."""
+
+    is_on: bool  # by `power_up`; False: without power
+
+    def __init__(self, name: str, clock: Clock, faults: Faults | None) -> None:
+        """Set up a box whose port's path ends with `name`."""
+        super().__init__(clock, faults)
+        self._name = name
+        self._port: PseudoTerminal | None = None
+
+    @property
+    def path(self) -> str:
+        """Path of the port; known once the box is started."""
+        assert self._port is not None
+        return self._port.path
+
+    def start(self) -> None:
+        """Make the port and begin to serve. Raises SetupError where there are no pseudo-terminals."""
+        port = self._port = PseudoTerminal(self._name)
+        self.serve(lambda: self._serve(port), self._name)
+
+    def close(self) -> None:
+        """Switch the box off and remove its port. Harmless when repeated."""
+        super().close()
+        if self._port is not None:
+            self._port.close()
+
+    def _serve(self, port: PseudoTerminal) -> None:
+        """Be the box until closed: unplugged, without power, powered up again, or at work."""
+        while not self.closing.is_set():
+            now = self.now()
+            if self.faults.active("unplug", now):
+                port.unplug()
+                self.closing.wait(_NAP)
+                continue
+            port.plug_in()
+            if self.faults.active("reboot", now):
+                self.is_on = False
+                port.heard(_NAP)
+                continue
+            if not self.is_on:
+                self.power_up(now)
+            self.work(port, now)
+
+    def power_up(self, now: float) -> None:
+        """Forget what is not kept over power-off; the box is on."""
+        raise NotImplementedError
+
+    def work(self, port: PseudoTerminal, now: float) -> None:
+        """Send what is due, then listen for a short while and answer."""
+        raise NotImplementedError
+
 
 LINE_FAULTS: tuple[Kind, ...] = ("lose", "corrupt", "shorten", "saturate", "unplug", "reboot", "slow")
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simulators.stroke import Stroke
-from simulators.surface import Surface
+from simulators.stroke import Stroke, Surface
 
 SLIPPERIEST, STICKIEST = 0.24, 0.67  # coefficients of friction, the paper's extremes [-]
 

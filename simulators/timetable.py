@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from drivers.transducer import SetupError
 from simulators.bench import Bench, BenchSettings
 from simulators.faults import Fault, Kind
+from simulators.stroke import CONTACT_AREA, Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import CONTACT_AREA, Surface, paper_surfaces
 
 APART = 5.0  # least time from one stroke's beginning to the next; none lasts longer [s]
 

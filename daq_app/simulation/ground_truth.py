@@ -18,8 +18,8 @@ from sessions.plan.protocols import plan, protocol
 from sessions.prediction import PredictionOptions
 from sessions.prediction.solving import seds_at
 from sessions.strokes.friction import FIXED, AreaLaw
+from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
-from simulators.surface import Surface
 
 Load = tuple[float, float, float, int, float]  # mu [-], tau_max [MPa], depth [mm], direction, speed [mm/s]
 SedsAt = Callable[[Sequence[Load]], Sequence[float | None]]

@@ -27,8 +27,8 @@ from sessions.statistics.pooling.ground_truth import Spoilt
 from sessions.statistics.pooling.visit import EXCLUSIONS
 from simulators.bench import Bench, BenchSettings, PlantedStroke
 from simulators.direct import DirectTransducer, Hurt
+from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
-from simulators.surface import Surface
 
 PROTOCOL = "sensotact-friction"
 SUBJECTS = 10

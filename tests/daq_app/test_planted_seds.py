@@ -7,8 +7,8 @@ import pytest
 
 from daq_app.simulation import ground_truth as planted_seds
 from daq_app.simulation.ground_truth import relations
+from simulators.stroke import paper_surfaces
 from simulators.subject import SLIPPERIEST, STICKIEST, SubjectSettings
-from simulators.surface import paper_surfaces
 
 GAIN, NOISE, RISE = 0.75, 4.0, 2.0  # of a score per index, points, kPa per unit of µ
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from drivers.calibration_file import parse_calibration_file
-from simulators.gauges import FT32831
+from simulators.bench import FT32831
 
 HERE = Path(__file__).parent
 NANO43 = (HERE / "FT32831.cal").read_text(encoding="utf-8")  # Nano43 SI-36-0.5, calibrated 12/14/2020

@@ -20,12 +20,11 @@ from drivers.net_ft import device as net_ft
 from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, SetupError
 from simulators.bench import Bench
-from simulators.boxes import SIMULATORS
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
+from simulators.serving import SIMULATORS
 from simulators.simulator import Simulated
-from simulators.stroke import Stroke
-from simulators.surface import paper_surfaces
+from simulators.stroke import Stroke, paper_surfaces
 
 SEED = 3
 RECORDED = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"

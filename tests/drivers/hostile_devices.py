@@ -9,13 +9,11 @@ import time
 
 from drivers import usb_link
 from drivers.clock import RealClock
-from simulators.bench import Bench
-from simulators.boxes import SIMULATORS
+from simulators.bench import Bench, calibration_file
 from simulators.faults import Faults
-from simulators.gauges import calibration_file
-from simulators.labjack_u6_box import LabJackU6Box
-from simulators.pseudo_terminal import PseudoTerminal
-from simulators.usb_backend import SimulatedBus
+from simulators.labjack_u6_box import LabJackU6Box, SimulatedBus
+from simulators.serving import SIMULATORS
+from simulators.simulator import PseudoTerminal
 
 PAGE = (
     b"HTTP/1.0 200 OK\r\n\r\n<netft><prodname>Net F/T</prodname><cfgcpf>1000000</cfgcpf><cfgcpt>1000000</cfgcpt>"

@@ -28,7 +28,7 @@ from drivers.catalog import DRIVERS, reachable
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
 from sessions.recording.head import info_from_dict, info_to_dict
-from simulators.boxes import SIMULATORS
+from simulators.serving import SIMULATORS
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
 

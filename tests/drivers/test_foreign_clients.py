@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from drivers.clock import RealClock
-from simulators.bench import Bench, BenchSettings
+from simulators.bench import FT32831, Bench, BenchSettings
 from simulators.digital_ft_box import DigitalFtBox
-from simulators.gauges import FT32831
 from simulators.net_ft_box import NetFtBox
 
 OFFSET = (1.0, -2.0, 3.5, 40.0, -50.0, 60.0)  # N, N mm

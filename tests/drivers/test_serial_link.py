@@ -14,7 +14,7 @@ from drivers.digital_ft import open_digital_ft, wire
 from drivers.serial_ft import open_serial_ft
 from drivers.serial_link import SerialLink, port_of
 from drivers.transducer import LinkLost, SetupError
-from simulators.pseudo_terminal import PseudoTerminal
+from simulators.simulator import PseudoTerminal
 
 needs_terminals = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
 

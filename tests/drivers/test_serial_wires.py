@@ -24,7 +24,7 @@ from simulators.bench import Bench
 from simulators.digital_ft_box import DigitalFtBox
 from simulators.faults import Fault, Faults
 from simulators.serial_ft_box import SerialFtBox
-from simulators.surface import paper_surfaces
+from simulators.stroke import paper_surfaces
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="there are no pseudo-terminals on this system")
 

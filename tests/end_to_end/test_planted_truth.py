@@ -17,8 +17,8 @@ from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.forces import normal_force
 from sessions.strokes.onset import ContactDetector, Lift, Onset
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
+from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import paper_surfaces
 
 RATE = 200.0
 CALIBRATION = Calibration("FT0001", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.array(RATED), "the bench's own")

@@ -17,8 +17,8 @@ from drivers.catalog import open_transducer
 from drivers.clock import Clock, PacedClock, RealClock
 from drivers.transducer import LinkLost, SetupError, Transducer
 from simulators.bench import Bench
-from simulators.boxes import SIMULATORS
 from simulators.faults import Fault, Faults
+from simulators.serving import SIMULATORS
 from simulators.simulator import Simulated, Simulator
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")]

@@ -11,8 +11,8 @@ from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import SessionWriter
 from sessions.recording.provenance import software_versions
 from simulators.bench import Bench
+from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import paper_surfaces
 
 RATE = 200.0
 TRIAL_SECONDS = 6.0

@@ -21,8 +21,8 @@ from sessions.plan.protocols import plan, protocol
 from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, SED_TERM
 from sessions.statistics.pooling.pooled import pooled
 from sessions.statistics.pooling.visit import TrialRow, Visit
+from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import Surface, paper_surfaces
 
 REPEATS = 400
 LEVEL, SLOPE, SCATTER, NOISE = 5.0, 6.0, 1.5, 4.0  # of the second set: points, points/kPa, kPa, points

@@ -6,9 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simulators.bench import Bench, BenchSettings
-from simulators.stroke import Stroke
+from simulators.stroke import Stroke, Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.surface import Surface, paper_surfaces
 
 EXACT = BenchSettings(noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0)
 SURFACES = paper_surfaces()

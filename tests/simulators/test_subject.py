@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simulators.stroke import Course
+from simulators.stroke import Course, paper_surfaces
 from simulators.subject import SimulatedSubject, SubjectSettings
-from simulators.surface import paper_surfaces
 
 SURFACES = paper_surfaces()
 

@@ -11,7 +11,7 @@ from drivers.clock import PacedClock
 from drivers.transducer import SetupError
 from simulators.faults import Fault
 from simulators.serving import serve_net_ft
-from simulators.surface import Surface, paper_surfaces
+from simulators.stroke import Surface, paper_surfaces
 from simulators.timetable import ScriptedBench, Timetable, TimetableError, load_timetable, usual_timetable
 
 SCRIPT = """

@@ -16,13 +16,10 @@ from drivers.deadline import Deadline
 from drivers.labjack_u6 import identify_labjack_u6, wire
 from drivers.readings import ReadingBlock
 from drivers.transducer import DeviceFault, LinkLost, SetupError
-from simulators.bench import RATED, Bench
+from simulators.bench import RATED, Bench, calibration_file
 from simulators.faults import Fault, Faults
-from simulators.gauges import calibration_file
-from simulators.labjack_u6_box import LabJackU6Box
-from simulators.stroke import Stroke
-from simulators.surface import paper_surfaces
-from simulators.usb_backend import SimulatedBus
+from simulators.labjack_u6_box import LabJackU6Box, SimulatedBus
+from simulators.stroke import Stroke, paper_surfaces
 
 NOMINAL = wire.Constants(3.1580578e-4, -3.158058e-4, 33523.0)
 GOLDEN_PACKET = bytes.fromhex("F1 F9 1C C0 F8 22 00 00 00 00 00 00" + "F3 82" * 24 + "00 00")  # 0 V everywhere

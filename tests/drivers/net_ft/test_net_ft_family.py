@@ -10,7 +10,7 @@ from drivers.clock import PacedClock
 from drivers.net_ft.wire import AXIA, START_BUFFERED
 from drivers.readings import ReadingBlock
 from drivers.transducer import LinkLost, SetupError
-from simulators import net_ft_pages
+from simulators import net_ft_electronics
 from simulators.bench import Bench, BenchSettings
 from simulators.faults import Fault, Faults
 from simulators.net_ft_box import NetFtBox
@@ -42,7 +42,7 @@ def streamed(transducer, seconds):
 
 
 def test_an_axia_streams_whole_fractions_of_its_own_converter_rate(served):
-    box = served(product=net_ft_pages.AXIA, rate=900)
+    box = served(product=net_ft_electronics.AXIA, rate=900)
     transducer = open_transducer(box.uri, CLOCK)
     block = streamed(transducer, 1.0)
     transducer.close()
@@ -54,7 +54,7 @@ def test_an_axia_streams_whole_fractions_of_its_own_converter_rate(served):
 
 
 def test_an_axia_says_in_its_own_bits_that_a_reading_is_invalid(served):
-    box = served(Fault("saturate", 0.5, 1.0), product=net_ft_pages.AXIA)
+    box = served(Fault("saturate", 0.5, 1.0), product=net_ft_electronics.AXIA)
     transducer = open_transducer(box.uri, CLOCK)
     block = streamed(transducer, 1.5)
     transducer.close()

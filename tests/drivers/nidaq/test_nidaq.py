@@ -12,9 +12,8 @@ from drivers.deadline import Deadline
 from drivers.nidaq import identify_nidaq, open_nidaq
 from drivers.readings import ReadingBlock
 from drivers.transducer import SetupError
-from simulators.bench import Bench
+from simulators.bench import Bench, calibration_file
 from simulators.faults import Fault
-from simulators.gauges import calibration_file
 from simulators.nidaq_library import SimulatedNidaqmx
 
 
