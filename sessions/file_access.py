@@ -1,13 +1,19 @@
-"""Read files of a bounded size, make new ones that follow no link, and say what mends a file that failed."""
+"""Files of a bounded size read, files and folders written whole or not at all, and what mends one that failed."""
 
 import errno
 import gzip
+import json
+import math
 import os
 import re
+import shutil
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO, NoReturn, TypeVar, cast
+
+import msgspec
 
 LARGEST_TEXT = 4 * 2**20  # of a file that people write [bytes]: the longest built-in protocol is a thousandth of it
 LARGEST_TABLE = 512 * 2**20  # of a CSV file [bytes]: an hour of readings at 2 kHz with seven columns
@@ -99,3 +105,126 @@ def remedy(error: Exception) -> str:
     if number is None and (match := re.search(r"errno = (\d+)", str(error))):  # as HDF5 tells it
         number = int(match.group(1))
     return _BY_ERRNO.get(number or 0, _OTHER)
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a JSON text of people's size: indented, UTF-8. Raises ValueError for nan and infinities: JSON has none."""
+    path.write_text(json_text(document), encoding="utf-8")
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """Return a JSON text of people's size: indented. Raises ValueError for nan and infinities: JSON has none."""
+    return json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Put `content` into the file at `path` in place of what it held: a reader sees the old or the new."""
+    new = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with open_new(new) as file:
+            file.write(content)
+        put_in_place(new, path)
+    except OSError:  # a full disk, on which a part of the file would only take room
+        new.unlink(missing_ok=True)
+        raise
+
+
+def holds_something(folder: Path) -> bool:
+    """Say whether there is anything at `folder` that a new folder would replace."""
+    return folder.exists() and (not folder.is_dir() or any(folder.iterdir()))
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Generator[Path]:
+    """Lend a folder that gets the name of `folder`, new or empty, once it is whole; else nothing of it is left."""
+    part = folder.with_name(f".{folder.name}.part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)  # fails where a link stands there, which would lead elsewhere
+        yield part
+        if folder.exists():
+            folder.rmdir()
+        part.replace(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def put_in_place(new: Path, path: Path) -> None:
+    """Give a finished file its name, after it is safe on the disk."""
+    with new.open("rb+") as file:
+        os.fsync(file.fileno())
+    new.replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names in `folder` survive a power cut, where the system lets a folder be synced."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+T = TypeVar("T")
+
+
+def json_object(text: str | bytes) -> dict[str, Any]:
+    """Return the object in a JSON text. Raises ValueError for anything else, nan and nesting without end included."""
+    value = json_value(text)
+    if not isinstance(value, dict):
+        raise ValueError("it holds no names")
+    return cast("dict[str, Any]", value)
+
+
+def json_value(text: str | bytes) -> object:
+    """Return the value in a JSON text. Raises ValueError for what is no JSON, nan and nesting without end included."""
+    try:
+        return json.loads(text, parse_constant=_no_number, parse_float=_finite)
+    except RecursionError as error:
+        raise ValueError("lists or objects are nested too deep") from error
+
+
+def _no_number(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number that this program stores")
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    return number if math.isfinite(number) else _no_number(text)
+
+
+def converted(value: object, form: type[T]) -> T:
+    """Return plain data as the type `form`. Raises ValueError that says where it is of another kind, and which."""
+    try:
+        return msgspec.convert(value, form)
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error).replace("`$.", "`")) from error
+
+
+def complete(document: Mapping[str, Any], form: type[T]) -> T:
+    """Return a document that the program wrote itself, as the type `form`.
+
+    A name may be missing only where nothing is known under it. Raises ValueError as `converted` does.
+    """
+    typed = converted(document, form)
+    for name in _missing(document, msgspec.to_builtins(typed)):
+        raise ValueError(f"Object missing required field `{name}`")
+    return typed
+
+
+def _missing(document: object, complete: object, where: str = "") -> Iterator[str]:
+    """Yield the path of each name that `document` lacks and for which `complete` has a default other than None."""
+    if isinstance(complete, list | tuple):
+        for at, (part, item) in enumerate(zip(cast("list[Any]", document), cast("list[Any]", complete), strict=True)):
+            yield from _missing(part, item, f"{where}[{at}]")
+    elif isinstance(complete, dict):
+        part = cast("Mapping[str, Any]", document)
+        for name, item in cast("dict[str, Any]", complete).items():
+            path = f"{where}.{name}" if where else name
+            if name in part:
+                yield from _missing(part[name], item, path)
+            elif item is not None:
+                yield path

@@ -22,8 +22,8 @@ from sessions.prediction import PredictionOptions, TrialPrediction, predict
 from sessions.prediction.predicting import Way
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
-from sessions.recording.provenance import software_versions
-from sessions.recording.visits import revealed
+from sessions.recording.derived import revealed
+from sessions.recording.head import software_versions
 from sessions.report import findings
 from sessions.report.contents import Field, Report
 from sessions.report.predictions import field_of, finding_of
@@ -317,7 +317,7 @@ class Work:
         return str(export(source, request.what, path, shown))
 
     def _write_picture(self, name: str, path: Path) -> str:
-        from sessions.atomic_file import write_whole
+        from sessions.file_access import write_whole
         from sessions.report.html import panel_csv, swap_in
 
         self._say(m.Step(0.0, tr("writing {name}", name=path.name)))

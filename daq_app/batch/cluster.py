@@ -13,10 +13,9 @@ from typing import Any, cast
 
 from sessions.prediction.sealed_predictions import SEAL
 from sessions.recording import Recording
-from sessions.recording.derived import GAIN_ERROR
-from sessions.recording.provenance import software_versions
+from sessions.recording.derived import GAIN_ERROR, UNBLINDING
+from sessions.recording.head import software_versions
 from sessions.recording.schema import LIVE_FILE
-from sessions.recording.visits import UNBLINDING
 from sessions.statistics.pooling.visit import VisitOptions, visit_of
 from sessions.strokes.decisions import DECISIONS
 

@@ -8,17 +8,26 @@ from typing import Any
 
 from daq_app.console import Console, WrongValue
 from sessions.plan.plan import SessionPlan
-from sessions.plan.study_file import is_study
+from sessions.plan.study import is_study
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, part_of, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
 from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.stored import check_prediction, with_present_names
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording, RecordingError
-from sessions.recording.derived import checked_gain_error, gain_error_set, load_derived, set_gain_error, store_derived
-from sessions.recording.provenance import software_versions
-from sessions.recording.verification import differences, first_sentences, why
-from sessions.recording.visits import force_visit, revealed
+from sessions.recording.derived import (
+    checked_gain_error,
+    differences,
+    first_sentences,
+    force_visit,
+    gain_error_set,
+    load_derived,
+    revealed,
+    set_gain_error,
+    store_derived,
+    why,
+)
+from sessions.recording.head import software_versions
 from sessions.strokes import Analysis, AnalysisSettings, analyse
 from sessions.strokes.bootstrap import intervals_document, stroke_intervals
 from sessions.strokes.bootstrap_settings import BootstrapSettings

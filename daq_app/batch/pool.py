@@ -16,10 +16,9 @@ from typing import Any
 from daq_app.batch.cluster import Answer, by_cluster, computed, content_of
 from daq_app.child_process import process_pool
 from daq_app.console import Console
-from sessions.atomic_file import write_whole
-from sessions.json_document import converted
+from sessions.file_access import converted, write_whole
 from sessions.recording import RecordingError
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions
 
 LOOK = 0.1  # between two looks whether something is done [s]

@@ -22,7 +22,7 @@ from daq_app.batch.cluster import cluster_client, refuse_other_workers
 from daq_app.batch.pool import local_pool
 from daq_app.batch.sensitivity import Index, sobol_indices
 from sessions.prediction.series_slopes import SERIES, Press, series_slopes
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
 
 Kinematics = Literal["small", "finite"]

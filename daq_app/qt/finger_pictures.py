@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QProgressDialog, QPushButton
 
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.wording import tr, tr_noop
-from sessions.atomic_file import write_whole
+from sessions.file_access import write_whole
 
 DENSITY = 2.0  # pixels of a saved picture for one of the window's [-]
 SHOWN = 100  # each state of a film [ms]: as long as the window shows it at its usual speed

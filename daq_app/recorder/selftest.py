@@ -19,10 +19,9 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
-from sessions.recording.disk_space import RESERVE
-from sessions.recording.provenance import FORMAT, machine, software_versions
+from sessions.recording.head import FORMAT, machine, software_versions
 from sessions.recording.schema import LIVE_FILE, event_row
-from sessions.recording.storage_safety import file_system
+from sessions.recording.storage import RESERVE, file_system
 from sessions.run.runner import Status
 
 KILLS = 6

@@ -18,15 +18,12 @@ from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.plan.study import StudyError
-from sessions.plan.study_file import study_key
+from sessions.plan.study import StudyError, study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
-from sessions.recording.disk_space import RESERVE, check_room, need
-from sessions.recording.head import simulated_sentence
-from sessions.recording.manifest import is_sealed
-from sessions.recording.provenance import certificate_for, software_versions, without_home
+from sessions.recording.archive import is_sealed
+from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
 from sessions.recording.rescue import fold_log
-from sessions.recording.storage_safety import unsafe
+from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming
 from sessions.run.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
 from sessions.run.steps import Command, Event

@@ -16,7 +16,7 @@ from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.wiring import DueEvents, planted_surface
 from drivers.clock import Clock, SimulatedClock
-from sessions.atomic_file import write_json
+from sessions.file_access import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.recording import RecordingError, Setting

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from daq_app.window.new_session import Bench, SessionForm, enrolment, is_code, place_of, refusals
 from daq_app.wording import tr, tr_noop
-from sessions.plan.study_file import is_study
+from sessions.plan.study import is_study
 
 FIELDS: Mapping[str, tuple[str, ...]] = {
     tr_noop("Study and protocol"): ("study", "protocol", "seed"),

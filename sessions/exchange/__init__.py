@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sessions.atomic_file import holds_something, whole_folder
-from sessions.file_access import remedy
+from sessions.file_access import holds_something, remedy, whole_folder
 from sessions.recording import Recording
 
 Progress = Callable[[float], None]  # part done, 0 to 1

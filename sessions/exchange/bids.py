@@ -17,16 +17,13 @@ from typing import Any
 import numpy as np
 
 from drivers.readings import ReadingBlock
-from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
-from sessions.exchange.csv_text import write_rows
+from sessions.exchange.csv_text import MISSING, columns, read_rows, rows, write_rows
 from sessions.exchange.exported import ExportedSession, head_of, side_files
-from sessions.exchange.readings_text import MISSING, columns, read_rows, rows
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
-from sessions.file_access import packed_lines, read_limited
-from sessions.json_document import json_object
+from sessions.file_access import json_object, packed_lines, read_limited, write_json
 from sessions.recording import Recording
-from sessions.recording.description import description
+from sessions.recording.archive import description
 
 VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]

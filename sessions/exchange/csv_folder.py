@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from drivers.readings import ReadingBlock
-from sessions.atomic_file import write_json
 from sessions.exchange import ExportSource, Progress
-from sessions.exchange.csv_text import plain, write_rows
+from sessions.exchange.csv_text import columns, plain, read_rows, rows, write_rows
 from sessions.exchange.exported import ExportedSession, head_of, side_files
-from sessions.exchange.readings_text import columns, read_rows, rows
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
-from sessions.file_access import read_limited
-from sessions.json_document import json_object
+from sessions.file_access import json_object, read_limited, write_json
 from sessions.recording import Recording
-from sessions.recording.description import description
+from sessions.recording.archive import description
 from sessions.recording.schema import DESCRIPTION_FILE, SEALED_FILE
 
 READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"

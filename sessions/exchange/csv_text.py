@@ -1,4 +1,4 @@
-"""CSV written so that a spreadsheet takes text for text, and rows of files that somebody else wrote.
+"""CSV that a spreadsheet takes text for text, rows of foreign files, readings as rows, and the log of a stage.
 
 A spreadsheet runs a cell that begins with `=`, `+`, `-`, `@`, a tab or a carriage return (OWASP, "CSV injection").
 Text that begins like a formula has an apostrophe before it; numbers stay as they are. `plain` gives back the text that
@@ -7,10 +7,18 @@ Text that begins like a formula has an apostrophe before it; numbers stay as the
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any, TextIO
 
+import numpy as np
+
+from drivers.calibration import Calibration
+from drivers.readings import ReadingBlock
+from sessions.exchange.column_meanings import AXES
+from sessions.exchange.session_tables import Column
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
+from sessions.prediction.press_curves import DisplacementLog
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
@@ -104,3 +112,101 @@ def number_in(cell: str) -> float | None:
         return float(cell)
     except ValueError:
         return None
+
+
+PART = 16_384  # rows at once
+MISSING = "n/a"
+RAW = tuple(f"raw_{axis}" for axis in range(1, 7))
+_EXACT = np.dtype(
+    [("sequence", "i8"), ("counter", "i8"), ("status", "i8"), ("time", "f8"), ("received", "i8")]
+    + [(name, "f8") for name in RAW]
+)
+STORED = _EXACT.names or ()  # what a reading is; the wrench is made from it
+
+
+def columns(calibration: Calibration) -> tuple[Column, ...]:
+    """Return what the columns of a row are, without values."""
+    raw_units = [unit for _, unit in AXES] if calibration.raw_unit == "N, N mm" else [calibration.raw_unit] * 6
+    meanings = [
+        ("sequence", "", "record number given by the device; missing numbers are readings that never arrived"),
+        ("counter", "", "ticks of the device's clock"),
+        ("status", "", "status word as the device sent it; 0 is healthy"),
+        ("time", "s", "device clock, 0 at the first reading"),
+        ("received", "ns", "session clock when the reading arrived"),
+        *((name, unit, "as the device sent it") for name, unit in zip(RAW, raw_units, strict=True)),
+        *((axis, unit, "the finger's wrench on the stimulus: matrix · raw, nothing subtracted") for axis, unit in AXES),
+    ]
+    return tuple(Column(name, unit, meaning, ()) for name, unit, meaning in meanings)
+
+
+def rows(block: ReadingBlock, calibration: Calibration) -> Iterator[tuple[Any, ...]]:
+    """Yield the row of each reading, in the order of `columns`."""
+    with np.errstate(invalid="ignore", over="ignore"):  # what the device sent is written, whatever it is
+        wrench = calibration.wrench(block.raw, np.zeros(6))
+    singles = (block.sequence, block.counter, block.status, block.time, block.received_ns)
+    return zip(*(single.tolist() for single in singles), *block.raw.T.tolist(), *wrench.T.tolist(), strict=True)
+
+
+def read_rows(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Iterator[ReadingBlock]:
+    """Yield the readings in rows whose columns are called `names` (units at their end are no part of them).
+
+    Rows without a sequence number are places of readings that never arrived, and left out; n/a elsewhere is a NaN.
+    Raises ValueError.
+    """
+    places = [_place(name, names) for name in STORED]
+    arrived = (line.replace(MISSING, "nan") for line in lines if not line.startswith(MISSING))
+    while part := list(islice(arrived, PART)):
+        # usecols picks the columns in the order given, whatever their order in the file.
+        table: Any = np.atleast_1d(np.loadtxt(part, _EXACT, delimiter=delimiter, usecols=places, comments=None))
+        raw = np.column_stack([table[name] for name in RAW])
+        sequence, counter, status, time, received = (np.ascontiguousarray(table[name]) for name in STORED[:5])
+        yield ReadingBlock(sequence, counter, status, time, received, raw)
+
+
+def _place(name: str, names: Sequence[str]) -> int:
+    for place, heading in enumerate(names):
+        if heading == name or heading.startswith(f"{name}_"):
+            return place
+    raise ValueError(f"there is no column {name}")
+
+
+DISPLACEMENT = "displacement_mm"
+WIDTH = "contact_width_mm"
+CLOCKS = ("time_s", "received_ns", "sequence")  # as `readings.csv` of an export calls them
+
+
+def displacement_log(path: Path) -> DisplacementLog:
+    """Return a stage's log from a CSV file with a header; columns that it does not need are left alone.
+
+    Raises ImportRefused.
+    """
+    rows = records(path, content_of(path))
+    _, header = next(rows, (0, [""]))
+    names = [cell.strip() for cell in header]
+    clock = next((name for name in CLOCKS if name in names), None)
+    if clock is None or DISPLACEMENT not in names:
+        raise ImportRefused(
+            f"{path} needs a header with {DISPLACEMENT} and one of {', '.join(CLOCKS)}, as readings.csv of an export "
+            f"calls them; it has {', '.join(map(cell_text, names)) or 'none'}"
+        )
+    places = [names.index(name) for name in (clock, DISPLACEMENT)]
+    of_width = names.index(WIDTH) if WIDTH in names else None
+    values: list[tuple[float, float, float]] = []
+    for line, cells in rows:
+        at, displacement = (_number(cells, place) for place in places)
+        if not np.isfinite([at, displacement]).all():
+            raise ImportRefused(f"{path}, line {line}: {clock} or {DISPLACEMENT} is no number; mend or remove the row")
+        if values and at <= values[-1][0]:
+            raise ImportRefused(f"{path}, line {line}: {clock} does not grow; mend or remove the row")
+        width = np.nan if of_width is None else _number(cells, of_width)
+        if width <= 0.0:
+            raise ImportRefused(f"{path}, line {line}: {WIDTH} is not above 0; leave the cell empty without a contact")
+        values.append((at, displacement, width))
+    if len(values) < 2:
+        raise ImportRefused(f"{path} holds {len(values)} rows: give a log with at least 2")
+    return DisplacementLog(clock, *np.array(values).T)
+
+
+def _number(cells: Sequence[str], place: int) -> float:
+    value = number_in(cells[place]) if place < len(cells) else None
+    return np.nan if value is None else value

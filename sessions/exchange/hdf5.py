@@ -17,8 +17,7 @@ from drivers.readings import ReadingBlock
 from sessions.exchange import ExportSource, Progress
 from sessions.exchange.exported import ExportedSession, Head, side_files
 from sessions.exchange.session_tables import Column, tables
-from sessions.file_access import LARGEST_DOCUMENT
-from sessions.json_document import json_value
+from sessions.file_access import LARGEST_DOCUMENT, json_value
 from sessions.recording import LoggedEvent
 from sessions.recording.derived import GAIN_ERROR
 from sessions.recording.log import event_data

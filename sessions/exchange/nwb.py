@@ -22,7 +22,7 @@ import numpy as np
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, tables
 from sessions.recording import Recording
-from sessions.recording.description import description
+from sessions.recording.archive import description
 from sessions.recording.head import json_text
 
 if TYPE_CHECKING:

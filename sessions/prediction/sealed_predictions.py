@@ -12,8 +12,7 @@ from datetime import UTC, datetime
 from typing import Any, cast
 
 from sessions.recording import Recording, RecordingError
-from sessions.recording.derived import load_derived, store_derived
-from sessions.recording.visits import UNBLINDING
+from sessions.recording.derived import UNBLINDING, load_derived, store_derived
 
 SEAL = "sealed-prediction.json"
 NUMBERS = ("trial", "mu", "tau_max", "indentation", "direction", "sed")

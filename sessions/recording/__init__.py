@@ -1,7 +1,7 @@
 """What a session leaves on the disk: written as it happens, sealed when it ends, readable ever after."""
 
+from sessions.recording.head import Setting, provenance
 from sessions.recording.log import LoggedEvent, Take, TrialRecord
-from sessions.recording.provenance import Setting, provenance
 from sessions.recording.reader import Recording
 from sessions.recording.schema import RecordingError
 from sessions.recording.writer import Acknowledged, FleetingWriter, SessionWriter

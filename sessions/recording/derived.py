@@ -1,16 +1,17 @@
-"""What is kept beside a recording: numbers made from it, and the calibration's uncertainty that somebody set."""
+"""What is kept beside a recording: numbers made from it, whether they come out again, and the opened key."""
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from sessions.atomic_file import write_whole
-from sessions.file_access import read_limited, remedy
-from sessions.json_document import json_object
-from sessions.recording.manifest import is_sealed, list_in_manifest
-from sessions.recording.provenance import software_versions
+from sessions.file_access import json_object, read_limited, remedy, write_whole
+from sessions.plan.study import Key, StudyError
+from sessions.recording.archive import is_sealed, list_in_manifest
+from sessions.recording.head import software_versions
+from sessions.recording.log import trial_records
 from sessions.recording.reader import Recording
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
 from sessions.toml_file import SettingsError
@@ -100,3 +101,126 @@ def checked_gain_error(stored: object) -> float | None:
     if not isinstance(stored, int | float) or not 0.0 <= stored <= LARGEST:
         raise SettingsError(f"gain_error = {stored!r} is not allowed: a number from 0 to {LARGEST:g}")
     return float(stored)
+
+
+MADE_BY = "made_by"  # versions of what made a stored document
+TIMINGS = frozenset(
+    {"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"}
+)  # not numbers of the session
+_MOST = 20  # differences named one by one
+
+
+def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
+    """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
+
+    >>> list(differences({"a": [1.0, 2.0], "wall_s": 3}, {"a": [1.0, 2.5], "wall_s": 4}, "x"))
+    ['x.a[1] was stored as 2.0 and comes out as 2.5 (+25 %)']
+    """
+    if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
+        then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
+        for key in sorted({*then, *now} - TIMINGS, key=_rank):
+            if key not in then or key not in now:
+                yield f"{where}.{key} is {'new' if key in now else 'no longer made'}"
+            else:
+                yield from differences(then[key], now[key], f"{where}.{key}")
+    elif isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
+        before, after = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
+        if len(before) != len(after):
+            yield f"{where} was stored with {len(before)} entries and comes out with {len(after)}"
+        else:
+            for i, (a, b) in enumerate(zip(before, after, strict=True)):
+                yield from differences(a, b, f"{where}[{i}]")
+    elif stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
+        yield f"{where} was stored as {stored!r} and comes out as {fresh!r}{_by(cast('object', stored), fresh)}"
+
+
+def _rank(key: str) -> tuple[int, str]:
+    """Return where a name stands among the differences: what others come from first, what comes of others last."""
+    return (0 if key in ("settings", "options", "decisions") else 2 if key == "bootstrap" else 1), key
+
+
+def _by(stored: object, fresh: object) -> str:
+    """Say how much a number changed, where that can be said."""
+    if not isinstance(stored, float) or not isinstance(fresh, float) or stored == 0.0:
+        return ""
+    return f" ({100.0 * (fresh / stored - 1.0):+.3g} %)"
+
+
+def why(name: str, stored: Mapping[str, Any], now: Mapping[str, str]) -> str:
+    """Say of a document whose numbers come out otherwise what changed since it was made.
+
+    >>> why("a.json", {"made_by": {"numpy": "1", "scipy": "2"}}, {"numpy": "1", "scipy": "3"})
+    'a.json was made by other versions: scipy 2 then and 3 now'
+    """
+    software: Any = stored.get(MADE_BY)
+    then: Mapping[str, Any] = cast("Mapping[str, Any]", software) if isinstance(software, Mapping) else {}
+    if not then:
+        return f"{name} does not say what made it"
+    changed = [
+        f"{library} {then.get(library, 'absent')} then and {now.get(library, 'absent')} now"
+        for library in {**then, **now}
+        if then.get(library) != now.get(library)
+    ]
+    if not changed:
+        return (
+            f"{name} was made by the same versions as now: the document, the recording or the program was changed since"
+        )
+    return f"{name} was made by other versions: {', '.join(changed)}"
+
+
+def first_sentences(sentences: Sequence[str]) -> tuple[str, ...]:
+    """Return the first of many sentences, and how many more there are."""
+    more = len(sentences) - _MOST
+    return tuple(sentences) if more <= 0 else (*sentences[:_MOST], f"and {more} more numbers differ")
+
+
+UNBLINDING = "unblinding.json"  # in a session's folder, once its key was opened
+
+
+def revealed(recording: Recording) -> Recording:
+    """Return a session with all that is known of its stimuli by now: a blinded one as it is, until its key was opened.
+
+    Raises RecordingError where the opened key is not the one that was sealed.
+    """
+    if not recording.plan.blinded:
+        return recording
+    stored = load_derived(recording.folder, UNBLINDING)
+    if stored is None:
+        return recording
+    path = recording.folder / UNBLINDING
+    try:
+        key = Key.from_dict(stored["key"])
+        if key.sha256 != recording.plan.key_sha256:
+            raise ValueError("its SHA-256 is not that in the plan")
+        plan = key.plan(recording.plan)
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordingError(f"{path} is not the key that was sealed ({error}); unblind the session anew") from error
+    return replace(recording, plan=plan, trials=trial_records(plan, recording.events))
+
+
+def sessions_of(folder: Path, subject: str | None = None) -> tuple[Recording, ...]:
+    """Return the sessions in a study's folder, by name, those of one subject where a code is given."""
+    paths = sorted(path.parent for path in folder.glob(f"*/{LIVE_FILE}"))
+    recordings = (revealed(Recording.open(path)) for path in paths)
+    return tuple(recording for recording in recordings if subject in (None, recording.plan.subject))
+
+
+def force_visit(folder: Path, subject: str) -> Recording:
+    """Return the visit in which a subject stroked on the transducer: the latest that came to its end.
+
+    Raises StudyError where there is none.
+    """
+    visits = [recording for recording in sessions_of(folder, subject) if recording.plan.forces]
+    if not visits:
+        raise StudyError(f"{subject} has no visit with forces in {folder}: run one with --device, or give another code")
+    return max(visits, key=lambda v: (bool((v.end or {}).get("complete")), str(v.provenance.get("created_utc", ""))))
+
+
+def score_visits(folder: Path, besides: Recording | None = None) -> tuple[Recording, ...]:
+    """Return every visit of every subject in which scores were given on the line, but for the one named."""
+    return tuple(
+        recording
+        for recording in sessions_of(folder)
+        if any(record.score is not None for record in recording.trials)
+        and (besides is None or recording.folder.resolve() != besides.folder.resolve())
+    )

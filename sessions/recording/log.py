@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 import msgspec
 
 from drivers.transducer import COUNTS
-from sessions.json_document import converted, json_object
+from sessions.file_access import converted, json_object
 from sessions.plan.plan import Answer, Choice, SessionPlan, Trial
 
 Outcome = Literal["scored", "numbered", "chosen", "presented", "not answered", "skipped", "open"]

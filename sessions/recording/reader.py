@@ -16,9 +16,8 @@ import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo, flagged_words
-from sessions.file_access import DATABASE_FAILURES, bounded, remedy
-from sessions.json_document import converted, json_value
-from sessions.plan.adaptive import with_mounted
+from sessions.file_access import DATABASE_FAILURES, bounded, converted, json_value, remedy
+from sessions.plan.orders import with_mounted
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
 from sessions.recording.head import check_provenance, info_from_dict, plan_from_dict

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import closing, suppress
 from pathlib import Path
 
-from sessions.atomic_file import sync_folder
+from sessions.file_access import sync_folder
 from sessions.recording.log import LoggedEvent
 from sessions.recording.reader import Recording, torn_log
 from sessions.recording.schema import LIVE_FILE, RecordingError, event_row

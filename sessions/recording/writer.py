@@ -10,18 +10,16 @@ from typing import Any, NoReturn, Self
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.atomic_file import sync_folder
-from sessions.file_access import remedy
+from sessions.file_access import remedy, sync_folder
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.disk_space import Reserve, release_reserve
-from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence
+from sessions.recording.archive import is_sealed
+from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence, without_home
 from sessions.recording.log import LoggedEvent
-from sessions.recording.manifest import is_sealed
-from sessions.recording.provenance import without_home
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import fold_log, identities, rescued
 from sessions.recording.schema import RecordingError
+from sessions.recording.storage import Reserve, release_reserve
 
 COMMIT_EVERY_NS = 1_000_000_000
 LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold

@@ -8,7 +8,7 @@ from sessions.prediction import SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.series_slopes import other_signs
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
 from sessions.report.contents import Fact, Planted, PredictionFinding, Report

@@ -11,9 +11,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select_autoescape
 from markupsafe import Markup
 
-from sessions.atomic_file import write_whole
 from sessions.exchange.csv_text import write_rows
-from sessions.file_access import remedy
+from sessions.file_access import remedy, write_whole
 from sessions.report import study_prose
 from sessions.report import tables as report_tables
 from sessions.report.contents import Report

@@ -9,7 +9,7 @@ from itertools import chain
 
 from sessions.prediction import BY_NAME, SED
 from sessions.prediction.stored import UNKNOWNS
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from sessions.report.contents import Fact
 from sessions.report.facts import area_words, calibration_words, model_words
 from sessions.report.prose import OTHER_FINGERS

@@ -14,10 +14,10 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, FleetingWriter, LoggedEvent, Recording, RecordingError
-from sessions.recording.description import digest_of
+from sessions.recording.archive import digest_of
+from sessions.recording.derived import differences
 from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
-from sessions.recording.verification import differences
 from sessions.run.event_log import Step, parts, steps_of
 from sessions.run.resuming import Seam, resumption
 from sessions.run.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session

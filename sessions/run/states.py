@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from msgspec import Struct
 
-from sessions.plan.adaptive import with_comparison
+from sessions.plan.orders import with_comparison
 from sessions.plan.plan import Block, Choice, SessionPlan, Stimulus, Trial
 
 

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, cast
 import msgspec
 from msgspec import Meta
 
-from sessions.file_access import remedy
-from sessions.json_document import converted, json_object
+from sessions.file_access import converted, json_object, remedy
 from sessions.recording.derived import bytes_of
 from sessions.recording.head import json_text
 from sessions.recording.schema import RecordingError

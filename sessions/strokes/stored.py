@@ -5,7 +5,7 @@ from typing import Any
 
 import msgspec
 
-from sessions.json_document import complete
+from sessions.file_access import complete
 from sessions.strokes.bootstrap import StrokeIntervals
 from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.decisions import Decision

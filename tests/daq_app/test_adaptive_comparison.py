@@ -10,12 +10,11 @@ from daq_app.console import Console
 from daq_app.simulation.conduct import Participants, conduct
 from daq_app.simulation.wiring import SimulatedPeople
 from drivers.clock import SimulatedClock
-from sessions.plan.adaptive import next_comparison
+from sessions.plan.orders import next_comparison
 from sessions.plan.plan import Stimulus
 from sessions.plan.protocols import plan, protocol
 from sessions.plan.protocols.protocol import FOLDER
-from sessions.plan.study import StudyError
-from sessions.plan.study_file import create_study
+from sessions.plan.study import StudyError, create_study
 from sessions.recording import Recording
 from sessions.recording.archive import problems
 from sessions.report.experiments import experiments, with_psychometric

@@ -16,7 +16,7 @@ from sessions.exchange import ExportSource
 from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
-from sessions.recording.visits import revealed
+from sessions.recording.derived import revealed
 from sessions.statistics.pooling.ground_truth import checked_planted, found_flaws, found_friction, recovered
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}

@@ -12,7 +12,7 @@ from desk import PACE, Desk
 from daq_app.cli.main import run
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Sealed
-from sessions.recording.provenance import without_home
+from sessions.recording.head import without_home
 
 
 @pytest.fixture(scope="module")

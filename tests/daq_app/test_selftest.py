@@ -7,7 +7,7 @@ from recordings import ended
 from daq_app.cli.main import run
 from daq_app.recorder import selftest
 from sessions.recording import LoggedEvent, Recording
-from sessions.recording.provenance import certificate_for, write_certificate
+from sessions.recording.head import certificate_for, write_certificate
 
 
 def test_the_selftest_kills_cuts_fills_stops_and_later_sessions_carry_its_certificate(tmp_path, capsys, monkeypatch):

@@ -20,7 +20,7 @@ from pathlib import Path
 sys.path[:0] = ["tests/sessions"]
 from failing_session import PLAN, RESERVE
 from stand_ins import INFO, Hands, StandIn, SimulatedClock
-from sessions.recording import SessionWriter, provenance
+from sessions.recording import SessionWriter, head
 from sessions.run.runner import run_session
 clock = SimulatedClock()
 folder = Path(sys.argv[1]) / "s"

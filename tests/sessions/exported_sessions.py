@@ -13,7 +13,7 @@ from sessions.exchange.import_csv import import_csv
 from sessions.recording import Recording
 from sessions.recording.archive import seal
 from sessions.recording.derived import set_gain_error
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from sessions.strokes import analyse
 from sessions.strokes.decisions import Decision, append
 

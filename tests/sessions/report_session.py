@@ -9,7 +9,7 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import SessionWriter
-from sessions.recording.provenance import software_versions
+from sessions.recording.head import software_versions
 from simulators.bench import Bench
 from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject

@@ -49,7 +49,7 @@ def test_derived_numbers_made_anew_replace_the_old_ones_as_a_whole(sealed, monke
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sessions.atomic_file.os.fsync", full)
+    monkeypatch.setattr("sessions.file_access.os.fsync", full)
     with pytest.raises(RecordingError, match="No space left on device"):
         store_derived(sealed, "analysis.json", {"mu": 0.9})
     assert load_derived(sealed, "analysis.json")["mu"] == 0.7

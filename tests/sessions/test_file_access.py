@@ -8,12 +8,11 @@ import pytest
 from recordings import ended
 
 from daq_app.cli.main import run
-from sessions.atomic_file import write_whole
-from sessions.file_access import read_limited, remedy
+from sessions.file_access import read_limited, remedy, write_whole
 from sessions.recording import RecordingError, archive
 from sessions.recording.archive import seal
 from sessions.recording.derived import bytes_of, store_derived
-from sessions.recording.disk_space import Reserve
+from sessions.recording.storage import Reserve
 
 HUGE = 20 * 2**30  # [bytes]
 

@@ -8,8 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sessions.exchange.csv_columns import ColumnsUnknown, columns
-from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, ImportRefused, import_csv
+from sessions.exchange.import_csv import (
+    ORIGINAL_FILE,
+    ColumnsUnknown,
+    ImportOptions,
+    ImportRefused,
+    columns,
+    import_csv,
+)
 from sessions.recording.reader import Recording
 from sessions.recording.schema import RecordingError
 from sessions.strokes import ZERO_SETTING, ZERO_STATED

@@ -4,7 +4,7 @@ import pytest
 
 from sessions.plan.protocols import VisitSetting, plan, protocol, protocol_names
 from sessions.plan.protocols.protocol import FOLDER, Protocol
-from sessions.plan.study_file import create_study, open_study
+from sessions.plan.study import create_study, open_study
 from sessions.toml_file import SettingsError, from_toml, toml_text
 
 LANGUAGES = ("en", "de", "fr", "ja", "ar")

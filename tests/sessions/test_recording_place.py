@@ -2,8 +2,8 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
-from sessions.recording import storage_safety as place
-from sessions.recording.storage_safety import Mount, linux_mounts, mac_mounts, network_mount, sync_folder_above, unsafe
+from sessions.recording import storage as place
+from sessions.recording.storage import Mount, linux_mounts, mac_mounts, network_mount, sync_folder_above, unsafe
 
 LINUX = """\
 /dev/sda1 / ext4 rw,relatime 0 0

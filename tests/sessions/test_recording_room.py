@@ -6,7 +6,7 @@ import pytest
 from recordings import PLAN, begun, readings
 
 from sessions.recording import RecordingError
-from sessions.recording.disk_space import MARGIN, Reserve, check_room, need
+from sessions.recording.storage import MARGIN, Reserve, check_room, need
 
 Usage = namedtuple("Usage", "total used free")
 

@@ -8,7 +8,7 @@ from stand_ins import Hands, SimulatedClock
 from daq_app.cli.main import run
 from sessions.plan.protocols import Body, plan
 from sessions.plan.protocols.protocol import FOLDER
-from sessions.plan.study_file import create_study, enrol, open_study, study_key
+from sessions.plan.study import create_study, enrol, open_study, study_key
 from sessions.prediction.sealed_predictions import SEAL, digest, seal_prediction, sealed_sentence
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import seal

@@ -14,12 +14,22 @@ from stand_ins import Hands, SimulatedClock
 from sessions.plan.plan import Blinded, Finger
 from sessions.plan.protocols import Body, design_rows, plan
 from sessions.plan.protocols.protocol import FOLDER
-from sessions.plan.study import Key, Member, StudyError, free_slot
-from sessions.plan.study_file import KEY_FILE, create_study, enrol, note, open_study, study_key, withdraw
+from sessions.plan.study import (
+    KEY_FILE,
+    Key,
+    Member,
+    StudyError,
+    create_study,
+    enrol,
+    free_slot,
+    note,
+    open_study,
+    study_key,
+    withdraw,
+)
 from sessions.recording import Recording, RecordingError, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
-from sessions.recording.derived import store_derived
-from sessions.recording.visits import UNBLINDING, revealed, score_visits, sessions_of
+from sessions.recording.derived import UNBLINDING, revealed, score_visits, sessions_of, store_derived
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.run.runner import run_session
 from sessions.run.steps import AskScore, Scored

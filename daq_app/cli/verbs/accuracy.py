@@ -54,7 +54,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
 def _measured(options: argparse.Namespace, console: Console) -> "Measured":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
     from sessions.file_access import read_limited
-    from sessions.recording.provenance import software_versions
+    from sessions.recording.head import software_versions
     from solver.verification.measuring import measured, restored
     from solver.verification.request import Host
 

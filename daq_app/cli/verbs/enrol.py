@@ -12,10 +12,20 @@ from typing import Any
 from daq_app.cli.options import add_seed
 from daq_app.cli.session_options import add_body_arguments, body_of
 from daq_app.console import DONE, Console, WrongValue, table
-from sessions.atomic_file import write_whole
+from sessions.file_access import write_whole
 from sessions.plan.protocols import protocol_file
-from sessions.plan.study import Member, Study, StudyError
-from sessions.plan.study_file import create_study, enrol, is_study, note, open_study, study_key, withdraw
+from sessions.plan.study import (
+    Member,
+    Study,
+    StudyError,
+    create_study,
+    enrol,
+    is_study,
+    note,
+    open_study,
+    study_key,
+    withdraw,
+)
 from sessions.toml_file import text_of
 
 EXAMPLE = "daq-app enrol studies/friction --subject P07 --finger tip_radius=6.5 contact_angle=40"

@@ -20,9 +20,8 @@ from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.exchange import FORMATS, ExportSource, export
 from sessions.recording import Recording
-from sessions.recording.derived import gain_error_set
-from sessions.recording.provenance import software_versions
-from sessions.recording.visits import revealed
+from sessions.recording.derived import gain_error_set, revealed
+from sessions.recording.head import software_versions
 from sessions.strokes.decisions import read
 
 EXAMPLE = "daq-app export recordings/P07 --format csv --out P07-csv"

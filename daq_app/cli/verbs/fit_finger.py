@@ -17,8 +17,8 @@ from daq_app.batch.derived import open_visit, stored_settings
 from daq_app.cli.options import add_number, add_seed, add_visit
 from daq_app.cli.session_options import add_calibration, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
-from sessions.atomic_file import write_whole
-from sessions.exchange.displacement_log import displacement_log
+from sessions.exchange.csv_text import displacement_log
+from sessions.file_access import write_whole
 from sessions.plan.plan import SessionPlan
 from sessions.prediction import PredictionOptions, finger_in, with_own_finger
 from sessions.prediction.finger_fit import FingerFit, Interval, fit

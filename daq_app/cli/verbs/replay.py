@@ -16,7 +16,7 @@ from daq_app.batch.derived import ANALYSIS, PREDICTION, changes, repeat, stored_
 from daq_app.cli.options import add_session, within
 from daq_app.console import DONE, FLAWED, Console
 from sessions.recording import Recording
-from sessions.recording.verification import first_sentences
+from sessions.recording.derived import first_sentences
 from sessions.run.replay import Stopped, different_events, different_readings, replay
 from sessions.strokes.decisions import read
 

@@ -12,12 +12,11 @@ from daq_app.cli.options import add_paths, add_quantity, add_variants, add_visit
 from daq_app.cli.session_options import add_analysis, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.plan import Blinded
-from sessions.plan.study_file import is_study
+from sessions.plan.study import is_study
 from sessions.prediction import BY_NAME, PredictionOptions, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, session_firing, usual_settings
 from sessions.recording import Recording
-from sessions.recording.derived import store_page
-from sessions.recording.visits import revealed, score_visits
+from sessions.recording.derived import revealed, score_visits, store_page
 from sessions.report import Further
 from sessions.report.predictions import afferent_facts
 from sessions.statistics.multiverse import trial_paths

@@ -18,7 +18,7 @@ from daq_app.recorder.messages import People, StartSession
 from drivers.transducer import flagged_words
 from sessions.plan.plan import Frame, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
-from sessions.plan.study_file import open_study, study_key
+from sessions.plan.study import open_study, study_key
 from sessions.recording import Setting
 from sessions.run.resuming import RESUMABLE
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from daq_app.console import DONE, FLAWED, Console
 from daq_app.recorder.selftest import SelfTestFailed, selftest
-from sessions.recording.provenance import write_certificate
-from sessions.recording.storage_safety import unsafe
+from sessions.recording.head import write_certificate
+from sessions.recording.storage import unsafe
 
 EXAMPLE = "daq-app selftest --out recordings"
 

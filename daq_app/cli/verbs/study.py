@@ -26,8 +26,7 @@ from daq_app.cli.options import (
 from daq_app.cli.session_options import add_analysis, area_law, calibration_error
 from daq_app.cli.study_power import add_power, print_power
 from daq_app.console import DONE, FLAWED, Console, WrongValue
-from sessions.atomic_file import json_text
-from sessions.file_access import read_limited
+from sessions.file_access import json_text, read_limited
 from sessions.prediction import BY_NAME, SED, PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE

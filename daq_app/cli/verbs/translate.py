@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from daq_app.console import DONE, Console, WrongValue
 from daq_app.window.subject_texts import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
-from sessions.atomic_file import write_whole
+from sessions.file_access import write_whole
 from sessions.plan.protocols import protocol
 from sessions.plan.protocols.languages import ENGLISH, PRE_EVALUATION, Translation, check_language
 from sessions.plan.protocols.protocol import Protocol

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count, pairwise
 
-from sessions.plan.adaptive import next_comparison
-from sessions.plan.orders import Item, draw, pairs, pairs_with, shuffled, williams
+from sessions.plan.orders import Item, draw, next_comparison, pairs, pairs_with, shuffled, williams
 from sessions.plan.plan import (
     DISTAL_TO_PROXIMAL,
     PROXIMAL_TO_DISTAL,

@@ -10,7 +10,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from sessions.plan.protocols import protocol_file
-from sessions.plan.study_file import create_study
+from sessions.plan.study import create_study
 from sessions.recording import Recording
 from sessions.run import steps
 

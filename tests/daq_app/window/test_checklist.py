@@ -8,8 +8,8 @@ from daq_app.window.checklist import checklist, codes_in, headline, next_code
 from daq_app.window.new_session import Bench, SessionForm
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import Body, protocol_file
-from sessions.plan.study_file import create_study, enrol
-from sessions.recording import disk_space
+from sessions.plan.study import create_study, enrol
+from sessions.recording import storage
 
 REAL = Bench(connected=True, frame=Frame("-z", "set", 20.0, "set"), rate=1000.0)
 
@@ -62,7 +62,7 @@ def test_a_broken_protocol_is_named_with_its_file_before_start(form, tmp_path):
 
 
 def test_a_disk_without_room_for_the_session_is_told_before_start(form, monkeypatch):
-    monkeypatch.setattr(disk_space.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 10**6})())
+    monkeypatch.setattr(storage.shutil, "disk_usage", lambda _: type("Usage", (), {"free": 10**6})())
     full = card(form, "Disk")
     assert not full.ready
     assert "1 MB of room" in full.words

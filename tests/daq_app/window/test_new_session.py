@@ -8,7 +8,7 @@ from daq_app.recorder.messages import People, StartSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, checked, enrolled, enrolment, offered, pilot_form
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import Body, protocol_file, protocol_names
-from sessions.plan.study_file import create_study, enrol, study_key, withdraw
+from sessions.plan.study import create_study, enrol, study_key, withdraw
 
 NOW = datetime(2026, 3, 1, 14, 30, 5)
 SIMULATED = Bench(connected=True, simulated=True, frame=Frame("-z", "set", 20.0, "set"))
