@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.accuracy_page import tables
+from daq_app.accuracy_page.page import PAGES as TABLES
+from daq_app.accuracy_page.page import filled
 from daq_app.cli.main import VERBS
 
 ROOT = Path(__file__).parents[1]
@@ -47,7 +48,7 @@ def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
         mark for page in PAGES for mark in re.findall(r"<!-- ([\w-]+): begin -->", page.read_text(encoding="utf-8"))
     ]
     of_the_survey = ["judged"]  # which fills its own table
-    assert sorted(marks) == sorted([*of_the_survey, *(name for names in tables.PAGES.values() for name in names)])
-    for page, names in tables.PAGES.items():
+    assert sorted(marks) == sorted([*of_the_survey, *(name for names in TABLES.values() for name in names)])
+    for page, names in TABLES.items():
         text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-        assert all("new" in tables.filled(text, name, "new") for name in names), page
+        assert all("new" in filled(text, name, "new") for name in names), page

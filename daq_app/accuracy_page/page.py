@@ -1,17 +1,278 @@
-"""The accuracy page: one self-contained HTML file, its pictures as SVG, its data as JSON."""
+"""The accuracy page, one self-contained HTML file, and its tables, which the docs have too."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from statistics import median
+from typing import TypeVar
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, select_autoescape
 
 from daq_app.accuracy_page.figures import plates
-from daq_app.accuracy_page.tables import tables
+from daq_app.console import number
 from sessions.report.figures.style import Plate
 from sessions.report.html import drawn, swap_in
+from solver.prediction import percent
+from solver.verification.costs import Cost
+from solver.verification.estimates import Estimate
+from solver.verification.hard_cases import HardCase
+from solver.verification.histories import Marched
+from solver.verification.machine import Machine
+from solver.verification.marked_page import filled
 from solver.verification.measuring import Measured
+from solver.verification.orders import Order
+from solver.verification.processes import Cold
+from solver.verification.published.problems import Problem
 from solver.verification.request import PROCESSOR_TIME
+from solver.verification.speed import Speed
+from solver.verification.targets import Target
+from solver.verification.truth import NUMBERS, Truth
+from solver.verification.warm import Warm
+
+R = TypeVar("R")
+
+CELL_WORDS = 25  # the limit for a cell of the docs: tests/test_documents_prose.py
+PAGES: Mapping[str, tuple[str, ...]] = {
+    "benchmarks.md": ("targets", "estimates", "machine"),
+    "benchmarks/published-problems.md": ("problems",),
+    "benchmarks/convergence.md": ("orders",),
+    "benchmarks/hard-cases-small.md": ("hard-small",),
+    "benchmarks/hard-cases-finite.md": ("hard-finite",),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table."""
+
+    name: str  # its anchor on the page
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def markdown(self) -> str:
+        """Return the table as it stands in the docs, where a cell has at most `CELL_WORDS` words."""
+        lines = [self.header, tuple("---" for _ in self.header), *self.rows]
+        return "\n".join("| " + " | ".join(_cell(text) for text in line) + " |" for line in lines)
+
+
+def _cell(text: str) -> str:
+    words = text.replace("|", "\\|").split(" ")
+    return " ".join(words if len(words) <= CELL_WORDS else [*words[: CELL_WORDS - 1], "…"])
+
+
+def _of_rows(name: str, caption: str, rows: Sequence[R], columns: Mapping[str, Callable[[R], str]]) -> Table:
+    """Return a table with a line for each row, each cell made by its column."""
+    return Table(name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows))
+
+
+def tables(measured: Measured) -> dict[str, Table]:
+    """Return the tables that there are rows for, by name."""
+    builders: tuple[Callable[[Measured], Table], ...] = (
+        machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems,
+        *(partial(_hard, kinematics=kinematics) for kinematics in ("small", "finite")),
+    )  # fmt: skip
+    return {table.name: table for table in (make(measured) for make in builders) if table.rows}
+
+
+def machine(measured: Measured) -> Table:
+    """Return what the run was made on."""
+    rows: list[tuple[str, str]] = []
+    for row in measured.of(Machine):
+        assert isinstance(row, Machine)
+        rows += [
+            ("begun", f"{measured.begun} UTC"), ("system", row.system),
+            ("processor", f"{row.processor}, {row.cores} cores"),
+            ("threads of linear algebra", row.threads),
+            ("processes wanting a core before it began", "not told" if row.load is None else f"{row.load:.2f}"),
+            ("took", f"{sum(measured.took_s.values()):.0f} s" + (", stopped by hand" if measured.stopped else "")),
+            *row.versions.items(),
+        ]  # fmt: skip
+    return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
+
+
+def targets(measured: Measured) -> Table:
+    """Return what was asked of the speed."""
+    rows: list[Target] = measured.of(Target)
+    caption = (
+        "What is asked of the speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
+        "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said."
+    )
+    return _of_rows("targets", caption, rows, {
+        "work": lambda row: row.work, "at error": lambda row: row.at_error,
+        "reach": lambda row: _limit(row.reach, row.unit), "aim": lambda row: _limit(row.aim, row.unit),
+        "measured": lambda row: "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
+        "floors": lambda row: "–" if row.floors is None else number(row.floors, 2),
+        "verdict": lambda row: row.verdict, "how": lambda row: row.how,
+    })  # fmt: skip
+
+
+def truths(measured: Measured) -> Table:
+    """Return the reference cases."""
+    rows: list[Truth] = measured.of(Truth)
+    cells: list[tuple[str, ...]] = []
+    for row in rows:
+        if row.numbers:
+            numbers = (*(number(value, 5) for value in row.numbers), percent(max(row.doubt)))
+            cells.append((row.kinematics, row.case, *numbers, " / ".join(f"{n:,}" for n in row.dofs)))
+        else:
+            cells.append((row.kinematics, row.case, "–", "–", "–", "–", row.refused))
+    caption = (
+        "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
+        "in this run. Doubt: how far they lie from it at most."
+    )
+    header = ("strain", "case", "SED [MPa]", "N [N/mm]", "drag [N/mm]", "doubt", "unknowns, or why there is none")
+    return Table("truths", caption, header, tuple(cells))
+
+
+def speeds(measured: Measured) -> Table:
+    """Return time against error, mesh by mesh."""
+    rows: list[Speed] = sorted(measured.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
+    caption = (
+        "Time against true error, mesh by mesh of Q2/P-1 elements, eliminated by nested dissection. Floor: one "
+        "assembly, factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these "
+        "is in a picture of the decision on what the solver is made of, docs/decisions."
+    )
+    return _of_rows("speeds", caption, rows, {
+        "strain": lambda row: row.kinematics, "unknowns": lambda row: f"{row.dofs:,}",
+        "set-up [ms]": lambda row: _ms(row.setup_s), "floor [ms]": lambda row: _ms(row.floor_s),
+        "first [ms]": lambda row: _ms(row.first_s), "next [ms]": lambda row: _ms(row.next_s),
+        "largest error": lambda row: "–" if row.judged_error is None else percent(row.judged_error),
+        "no answer": lambda row: ", ".join(row.failed) or "–",
+    })  # fmt: skip
+
+
+def estimates(measured: Measured) -> Table:
+    """Return how often estimates are above and near, by kinematics and number."""
+    rows: list[Estimate] = measured.of(Estimate)
+    cells: list[tuple[str, ...]] = []
+    for kinematics in dict.fromkeys(row.kinematics for row in rows):
+        for name in NUMBERS:
+            mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
+            if mine:
+                met = _share([row.met for row in mine]) if name == NUMBERS[0] else "–"
+                ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
+                ratio = number(median(ratios), 2) if ratios else "–"
+                above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
+                cells.append((f"{kinematics} strain", name, str(len(mine)), above, near, met, ratio))
+    caption = (
+        "Estimates against true errors, of answers asked for with a tolerance. Above: the estimate is at least the "
+        "true error. Near: below ten times the larger of true error and 0.02 %. Counted only where the truth can tell."
+    )
+    header = ("", "number", "answers", "above", "near", "tolerance met", "estimate by error, median")
+    return Table("estimates", caption, header, tuple(cells))
+
+
+def _share(answers: Sequence[bool | None]) -> str:
+    verdicts = [answer for answer in answers if answer is not None]
+    return f"{sum(verdicts)} of {len(verdicts)}" if verdicts else "–"
+
+
+def warm(measured: Measured) -> Table:
+    """Return the warm stepper's rows."""
+    rows: list[Warm] = measured.of(Warm)
+    caption = "The warm stepper, fed reading by reading; p99 of each reading's median over five passes."
+    return _of_rows("warm", caption, rows, {
+        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+        "readings": lambda row: str(row.readings), "median [ms]": lambda row: _ms(row.median_s),
+        "p99 [ms]": lambda row: _ms(row.p99_s), "p99 of one pass [ms]": lambda row: _ms(row.once_p99_s),
+        "largest error, by peak": lambda row: percent(row.worst_error),
+    })  # fmt: skip
+
+
+def histories(measured: Measured) -> Table:
+    """Return courses against direct states."""
+    rows: list[Marched] = measured.of(Marched)
+    return _of_rows("histories", "A course of 200 substeps against the state found directly.", rows, {
+        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+        "unknowns": lambda row: str(row.dofs), "direct [ms]": lambda row: _ms(row.direct_s),
+        "200 substeps [ms]": lambda row: _ms(row.marched_s),
+        "times": lambda row: number(row.marched_s / row.direct_s, 2),
+        "difference of the SED": lambda row: f"{abs(row.difference):.0e}",
+    })  # fmt: skip
+
+
+def costs(measured: Measured) -> Table:
+    """Return where the time goes."""
+    rows: list[Cost] = measured.of(Cost)
+    caption = (
+        "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
+        "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a profiler."
+    )
+    return _of_rows("costs", caption, rows, {
+        "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),
+        "unknowns": lambda row: f"{row.dofs:,}", "in all [ms]": lambda row: _ms(row.took_s),
+        "set-up [ms]": lambda row: _ms(row.setup_s), "solve [ms]": lambda row: _ms(row.wall_s),
+        "estimate [ms]": lambda row: _ms(row.estimate_s),
+        "by part": lambda row: ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
+    })  # fmt: skip
+
+
+def starts(measured: Measured) -> Table:
+    """Return cold starts."""
+    rows: list[Cold] = measured.of(Cold)
+    caption = (
+        "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones."
+    )
+    return _of_rows("starts", caption, rows, {
+        "process": lambda row: row.what, "runs": lambda row: str(row.runs),
+        "processor time [ms]": lambda row: _ms(row.took_s), "time that passed [ms]": lambda row: _ms(row.passed_s),
+    })  # fmt: skip
+
+
+def orders(measured: Measured) -> Table:
+    """Return observed orders of convergence."""
+    rows: list[Order] = measured.of(Order)
+    caption = "Observed orders of convergence. Time: of a solve on each mesh, the mesh included."
+    return _of_rows("orders", caption, rows, {
+        "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
+        "strain": lambda row: row.kinematics,
+        "errors, coarse to fine": lambda row: " / ".join(f"{error:.1e}" for error in row.errors),
+        "time [ms]": lambda row: " / ".join(number(1e3 * took) for took in row.took_s),
+        "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
+    })  # fmt: skip
+
+
+def problems(measured: Measured) -> Table:
+    """Return the published problems."""
+    rows: list[Problem] = measured.of(Problem)
+    return _of_rows("problems", "Published problems, run through the same code as the finger.", rows, {
+        "problem": lambda row: row.problem, "source": lambda row: row.source, "quantity": lambda row: row.quantity,
+        "expected": lambda row: number(row.expected, 5), "obtained": lambda row: number(row.obtained, 5),
+        "off": lambda row: percent(row.off), "of": lambda row: row.of, "allowed": lambda row: percent(row.allowed),
+        "verdict": lambda row: "met" if row.met else "MISSED",
+    })  # fmt: skip
+
+
+def _hard(measured: Measured, kinematics: str) -> Table:
+    rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
+    passed = sum(not row.flaw for row in rows)
+    caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
+    return _of_rows(f"hard-{kinematics}", caption, rows, {
+        "case": lambda row: row.case, "must": lambda row: row.must,
+        "outcome": lambda row: f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary,
+    })  # fmt: skip
+
+
+def _ms(seconds: float | None) -> str:
+    return "–" if seconds is None else number(1e3 * seconds)
+
+
+def _limit(value: float | None, unit: str) -> str:
+    return "–" if value is None else f"{value:g} {unit}"
+
+
+def fill(docs: Path, tables: Mapping[str, Table]) -> None:
+    """Write the tables into the pages below `docs`. Raises OSError, and ValueError for a page without marks."""
+    for page, names in PAGES.items():
+        text = (docs / page).read_text(encoding="utf-8")
+        for name in names:
+            if name in tables:
+                text = filled(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
+        (docs / page).write_text(text, encoding="utf-8")
+
 
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
 # anchor, words, and the figures and tables under them, by name

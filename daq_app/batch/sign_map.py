@@ -18,8 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from daq_app.batch.cluster import cluster_client, refuse_other_workers
-from daq_app.batch.pool import local_pool
+from daq_app.batch.pool import cluster_client, local_pool, refuse_other_workers
 from daq_app.batch.sensitivity import Index, sobol_indices
 from sessions.prediction.series_slopes import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions

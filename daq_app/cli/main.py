@@ -47,7 +47,7 @@ _WRONG = (
     "solver.scene.tables.SceneError",
 )
 _FAILED = (
-    "daq_app.batch.cluster.SchedulerError",
+    "daq_app.batch.pool.SchedulerError",
     "daq_app.console.NotWritten",
     "daq_app.batch.sensitivity.TooFewAnswers",
     "drivers.transducer.DeviceFault",

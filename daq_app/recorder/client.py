@@ -37,8 +37,7 @@ from types import TracebackType
 from typing import Self
 
 from daq_app.child_process import interpreter
-from daq_app.recorder.messages import REPORTS, REQUESTS, Gone, Report, Request, Shutdown
-from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
+from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, Gone, Report, Request, Shutdown, Splitter
 
 PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
 CHUNK = 1 << 20

@@ -8,8 +8,20 @@ from collections import deque
 
 from msgspec import structs
 
-from daq_app.recorder.messages import REPORTS, REQUESTS, Failed, HealthReport, Live, Report, Request, Shutdown, Stop
-from daq_app.recorder.wire import BrokenMessage, Codec, Splitter
+from daq_app.recorder.messages import (
+    REPORTS,
+    REQUESTS,
+    BrokenMessage,
+    Codec,
+    Failed,
+    HealthReport,
+    Live,
+    Report,
+    Request,
+    Shutdown,
+    Splitter,
+    Stop,
+)
 
 POKE_EVERY = 0.05  # between two nudges of the main thread by a stop nobody has answered [s]
 MOST_LIVE = 120  # messages of readings waiting to be fetched; later ones are left out, and counted

@@ -8,8 +8,7 @@ from time import perf_counter
 import pytest
 
 from daq_app.accuracy_page.figures import plates
-from daq_app.accuracy_page.page import page, write
-from daq_app.accuracy_page.tables import Table, tables
+from daq_app.accuracy_page.page import Table, page, tables, write
 from daq_app.child_process import interpreter
 from solver import solve
 from solver.response.solution import DEFAULT

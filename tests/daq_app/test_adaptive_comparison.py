@@ -7,7 +7,7 @@ import pytest
 from test_constant_stimuli import felt
 
 from daq_app.console import Console
-from daq_app.simulation.conduct import Participants, conduct
+from daq_app.simulation.synthetic import Participants, conduct
 from daq_app.simulation.wiring import SimulatedPeople
 from drivers.clock import SimulatedClock
 from sessions.plan.orders import next_comparison

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from daq_app.recorder import awake as module
-from daq_app.recorder.awake import awake, holder
+from daq_app.recorder import session as module
+from daq_app.recorder.session import awake, holder
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Windows is asked by a call, not by a process")

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from daq_app.batch import cluster
+from daq_app.batch import pool
 
 distributed = pytest.importorskip("distributed")
 dask = pytest.importorskip("dask")
@@ -50,9 +50,9 @@ def test_a_scheduler_with_certificates_answers_who_has_them_and_refuses_others(c
     cert, key = map(str, certificate)
     tls = "distributed.comm.tls."
     with dask.config.set({f"{tls}ca-file": cert, f"{tls}client.cert": cert, f"{tls}client.key": key}):
-        kind = asyncio.run(cluster._identity(distributed, address, distributed.Security()))
+        kind = asyncio.run(pool._identity(distributed, address, distributed.Security()))
     assert address.startswith("tls://")
     assert kind == "Scheduler"
-    monkeypatch.setattr(cluster, "ANSWERS", 5.0)
-    with pytest.raises(cluster.SchedulerError, match="no Dask scheduler answers there"):
-        asyncio.run(cluster._identity(distributed, address, distributed.Security()))
+    monkeypatch.setattr(pool, "ANSWERS", 5.0)
+    with pytest.raises(pool.SchedulerError, match="no Dask scheduler answers there"):
+        asyncio.run(pool._identity(distributed, address, distributed.Security()))

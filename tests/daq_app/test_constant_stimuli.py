@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from daq_app.console import Console
-from daq_app.simulation.conduct import Participants, conduct
+from daq_app.simulation.synthetic import Participants, conduct
 from daq_app.simulation.wiring import SimulatedPeople, planted_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol

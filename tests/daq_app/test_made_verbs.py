@@ -18,9 +18,8 @@ from examples import SCENE
 from page_numbers import estimates
 from report_session import record
 
-from daq_app.batch.cluster import content_of
 from daq_app.batch.derived import stored_document
-from daq_app.batch.pool import Shelf
+from daq_app.batch.pool import Shelf, content_of
 from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, finger_in
 from sessions.recording import Recording

@@ -10,6 +10,6 @@ SLOW = "{'scipy', 'numba', 'matplotlib', 'pyqtgraph', 'h5py'}"  # each costs a t
 
 @pytest.mark.qt
 def test_the_window_and_its_recorder_open_without_the_libraries_that_load_slowly():
-    loads = f"import sys, daq_app.qt.main_window, daq_app.recorder.process; print({SLOW} & set(sys.modules))"
+    loads = f"import sys, daq_app.qt.main_window, daq_app.recorder.pipes; print({SLOW} & set(sys.modules))"
     run = subprocess.run([sys.executable, "-c", loads], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "set()"

@@ -18,6 +18,7 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import (
     REPORTS,
     REQUESTS,
+    Codec,
     Connect,
     Device,
     Failed,
@@ -30,12 +31,12 @@ from daq_app.recorder.messages import (
     Sealed,
     SessionBegun,
     SessionEnded,
+    Splitter,
     StartSession,
     Stop,
     Tare,
     Tared,
 )
-from daq_app.recorder.wire import Codec, Splitter
 from sessions.recording import LoggedEvent, Recording
 from sessions.run.runner import Status
 from sessions.run.steps import (

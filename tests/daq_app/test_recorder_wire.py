@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from stand_ins import INFO
 
 from daq_app.recorder.messages import (
+    LENGTH,
     REPORTS,
     REQUESTS,
+    BrokenMessage,
+    Codec,
     Connect,
     Device,
     Failed,
@@ -21,11 +24,11 @@ from daq_app.recorder.messages import (
     People,
     ResumeSession,
     SessionBegun,
+    Splitter,
     StartSession,
     Stop,
 )
 from daq_app.recorder.pipes import Outbox
-from daq_app.recorder.wire import LENGTH, BrokenMessage, Codec, Splitter
 from drivers.transducer import Health
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import plan, protocol

@@ -11,14 +11,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from daq_app.batch import cluster
 from daq_app.batch import pool as pooling
-from daq_app.batch.cluster import computed, computed_from, content_of
-from daq_app.batch.pool import Shelf, visits
+from daq_app.batch.pool import Shelf, computed, computed_from, content_of, visits
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
-from sessions import file_access
+from sessions import atomic_file
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.head import software_versions
@@ -110,7 +108,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
         return Path("/dev/full").open("wb")
 
     shelf = Shelf(tmp_path, STEADY)
-    monkeypatch.setattr(file_access, "open_new", full)
+    monkeypatch.setattr(atomic_file, "open_new", full)
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
         shelf.keep("key", {})
     assert list(tmp_path.iterdir()) == []
@@ -216,11 +214,11 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
 def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, monkeypatch):
     import distributed
 
-    monkeypatch.setattr(cluster, "WITHOUT_WORKERS", 0.5)
+    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 0.5)
     asked = ([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address=None) as workers,
-        pytest.raises(cluster.SchedulerError, match="no worker"),
+        pytest.raises(pooling.SchedulerError, match="no worker"),
     ):
         visits(*asked, scheduler=workers.scheduler_address)
 
@@ -228,7 +226,7 @@ def test_a_cluster_without_workers_is_given_up_in_a_sentence(study, tmp_path, mo
 @pytest.mark.slow
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{silent}", "tcp://127.0.0.1:9", "http://127.0.0.1:{silent}"])
 def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_path, monkeypatch, capsys, address):
-    monkeypatch.setattr(cluster, "ANSWERS", 0.5)
+    monkeypatch.setattr(pooling, "ANSWERS", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         given = address.format(silent=silent.getsockname()[1])
         assert run(["study", str(study), "--out", str(tmp_path), "--scheduler", given, "--json"]) == 1
@@ -239,9 +237,9 @@ def test_an_address_where_no_scheduler_answers_is_told_in_a_sentence(study, tmp_
 
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "ANSWERS", 5.0)
-    monkeypatch.setattr(cluster, "WITHOUT_WORKERS", 300.0)
-    whole = cluster._by_client
+    monkeypatch.setattr(pooling, "ANSWERS", 5.0)
+    monkeypatch.setattr(pooling, "WITHOUT_WORKERS", 300.0)
+    whole = pooling._by_client
 
     def killed(*words):
         scheduler.kill()
@@ -255,8 +253,8 @@ def test_a_scheduler_that_is_killed_ends_a_study_in_a_sentence(study, tmp_path, 
         try:
             _until(lambda: told.is_file() and told.read_text().endswith("}"))
             address = json.loads(told.read_text())["address"]
-            monkeypatch.setattr(cluster, "_by_client", killed)
-            with pytest.raises(cluster.SchedulerError, match="the scheduler is gone"):
+            monkeypatch.setattr(pooling, "_by_client", killed)
+            with pytest.raises(pooling.SchedulerError, match="the scheduler is gone"):
                 visits([study / "S01"], STEADY, Shelf(tmp_path, STEADY), Console(as_json=True), scheduler=address)
         finally:
             scheduler.kill()
@@ -277,19 +275,19 @@ def test_every_worker_is_asked_for_its_versions_before_it_computes():
     here = software_versions()
     older = here | {"numpy": "1.0"}
     client = Workers(one=here | {"blas": "that of another processor"}, two=here, old=older, gone=OSError("closed"))
-    cluster.refuse_other_workers(client, ["one", "two", "gone"], "tcp://host:1")
-    with pytest.raises(cluster.SchedulerError, match=r"the worker old computes with numpy 1\.0"):
-        cluster.refuse_other_workers(client, ["one", "old"], "tcp://host:1")
+    pooling.refuse_other_workers(client, ["one", "two", "gone"], "tcp://host:1")
+    with pytest.raises(pooling.SchedulerError, match=r"the worker old computes with numpy 1\.0"):
+        pooling.refuse_other_workers(client, ["one", "old"], "tcp://host:1")
     bare = Workers(bare=ModuleNotFoundError("No module named 'sessions'"))
-    with pytest.raises(cluster.SchedulerError, match="the worker bare has no daq-app"):
-        cluster.refuse_other_workers(bare, ["bare"], "tcp://host:1")
+    with pytest.raises(pooling.SchedulerError, match="the worker bare has no daq-app"):
+        pooling.refuse_other_workers(bare, ["bare"], "tcp://host:1")
 
 
 @pytest.mark.slow
 def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path, monkeypatch):
     import distributed
 
-    asked = cluster.refuse_other_workers
+    asked = pooling.refuse_other_workers
     seen = []
 
     def told(client, workers, address):
@@ -300,21 +298,21 @@ def test_a_worker_of_another_version_that_joins_later_is_refused(study, tmp_path
         if len(seen) == 1:
             cluster_of.scale(2)
 
-    monkeypatch.setattr(cluster, "refuse_other_workers", told)
+    monkeypatch.setattr(pooling, "refuse_other_workers", told)
     with distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster_of:
         folders = [study / "S01", study / "S02"]
         call = (folders, STEADY, Shelf(tmp_path, STEADY), Console(as_json=True))
-        with pytest.raises(cluster.SchedulerError, match=r"computes with .*numpy 1\.0"):
+        with pytest.raises(pooling.SchedulerError, match=r"computes with .*numpy 1\.0"):
             visits(*call, scheduler=cluster_of.scheduler_address)
     assert len(seen) == 2
 
 
 def test_what_another_version_computed_is_refused_in_a_sentence_and_not_mixed_in():
     here = software_versions()
-    cluster.refuse_other_versions(("S01", {"made_by": here | {"blas": "that of another processor"}}), "tcp://host:1")
-    cluster.refuse_other_versions(("S01", "it is damaged"), "tcp://host:1")
-    with pytest.raises(cluster.SchedulerError, match=r"daq-app 0\.0\.9 \(here .*versions that are here"):
-        cluster.refuse_other_versions(("S01", {"made_by": here | {"daq-app": "0.0.9"}}), "tcp://host:1")
+    pooling.refuse_other_versions(("S01", {"made_by": here | {"blas": "that of another processor"}}), "tcp://host:1")
+    pooling.refuse_other_versions(("S01", "it is damaged"), "tcp://host:1")
+    with pytest.raises(pooling.SchedulerError, match=r"daq-app 0\.0\.9 \(here .*versions that are here"):
+        pooling.refuse_other_versions(("S01", {"made_by": here | {"daq-app": "0.0.9"}}), "tcp://host:1")
 
 
 @pytest.mark.usefixtures("pool")

@@ -28,8 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    from daq_app.accuracy_page.page import PAGE, write
-    from daq_app.accuracy_page.tables import fill, tables
+    from daq_app.accuracy_page.page import PAGE, fill, tables, write
 
     console.progress(0.0, "loading")
     options.out.mkdir(parents=True, exist_ok=True)  # said before three minutes are spent

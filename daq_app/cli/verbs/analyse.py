@@ -8,8 +8,7 @@ import argparse
 import math
 
 from daq_app.batch.derived import analyse_session, analysis_document, outdated_prediction
-from daq_app.cli.options import add_number, add_session
-from daq_app.cli.session_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import add_analysis, add_number, add_session, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console, number, span, table
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals

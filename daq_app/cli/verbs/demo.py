@@ -14,7 +14,7 @@ from typing import Any
 from daq_app.batch.derived import analyse_session, predict_session
 from daq_app.cli.options import add_seed
 from daq_app.console import DONE, FLAWED, Console, number, table
-from daq_app.simulation.conduct import Study, StudyCutShort, simulated_study
+from daq_app.simulation.synthetic import Study, StudyCutShort, simulated_study
 from drivers.clock import LONGEST_STEP, clock_at
 from sessions.prediction import PredictionOptions, SessionPrediction
 from sessions.recording import Recording

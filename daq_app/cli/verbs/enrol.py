@@ -9,8 +9,7 @@ import secrets
 from pathlib import Path
 from typing import Any
 
-from daq_app.cli.options import add_seed
-from daq_app.cli.session_options import add_body_arguments, body_of
+from daq_app.cli.options import add_body_arguments, add_seed, body_of
 from daq_app.console import DONE, Console, WrongValue, table
 from sessions.file_access import write_whole
 from sessions.plan.protocols import protocol_file

@@ -13,15 +13,17 @@ from typing import Any
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.options import (
+    add_analysis,
     add_kinematics,
     add_number,
     add_quantity,
     add_tau,
     add_variants,
     add_visit,
+    area_law,
+    calibration_error,
     numbers_by_key,
 )
-from daq_app.cli.session_options import add_analysis, area_law, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.prediction import (
     BY_NAME,

@@ -8,8 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
-from daq_app.cli.options import add_paths, add_quantity, add_variants, add_visit
-from daq_app.cli.session_options import add_analysis, area_law, calibration_error
+from daq_app.cli.options import (
+    add_analysis,
+    add_paths,
+    add_quantity,
+    add_variants,
+    add_visit,
+    area_law,
+    calibration_error,
+)
 from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.plan import Blinded
 from sessions.plan.study import is_study

@@ -7,8 +7,8 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from daq_app.cli.attending import attend_session
 from daq_app.cli.options import add_session
+from daq_app.cli.terminal import attend_session
 from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, ResumeSession

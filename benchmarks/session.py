@@ -1,0 +1,94 @@
+"""What a session of ten trials costs: replayed, analysed, with bootstrap intervals, and with those of its SEDs.
+
+Run from the repository's root: python -m benchmarks.session [SESSION]; without one a simulated one is recorded first.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from daq_app.cli.main import run
+from sessions.prediction import PredictionOptions, predict
+from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction.uncertainty import with_intervals
+from sessions.recording import Recording
+from sessions.run.replay import different_events, different_readings, replay
+from sessions.strokes import analyse
+from sessions.strokes.bootstrap import stroke_intervals
+
+RUNS = 9
+WORDS = ("run", "sensotact-friction", "--device", "sim:?seed=7&rate=200", "--subject", "P01", "--headless")
+
+
+def main() -> None:
+    """Print the medians."""
+    with tempfile.TemporaryDirectory() as room:
+        recording = Recording.open(_session(Path(room)))
+        _print_replay(recording, Path(room))
+        _print_analysis(recording)
+
+
+def _session(room: Path) -> Path:
+    """Return the folder named on the command line; without one, that of a session recorded in `room`."""
+    if len(sys.argv) > 1:
+        return Path(sys.argv[1])
+    folder = room / "session"
+    run([*WORDS, "--simulate-subject", "1", "--seed", "3", "--pace", "20", "--out", str(folder)])
+    return folder
+
+
+def _print_replay(recording: Recording, room: Path) -> None:
+    """Print how many times faster than real time the session is replayed, the solver left out."""
+    lasted = (recording.events[-1].time_ns - recording.events[0].time_ns) * 1e-9
+    replayed: list[float] = []
+    compared: list[float] = []
+    for number in range(RUNS):
+        began = time.perf_counter()
+        again = replay(recording, room / f"replay-{number}", None, lambda *_: None)
+        replayed.append(time.perf_counter() - began)
+        differences = [*different_readings(recording, again), *different_events(recording, again)]
+        analyse(again)
+        compared.append(time.perf_counter() - began)
+    print(f"session of {lasted:.1f} s, {recording.events[-1].readings} readings")
+    print(f"replayed in {median(replayed):.3f} s: {lasted / median(replayed):.0f} times real time (median of {RUNS})")
+    print(f"compared and analysed too: {median(compared):.3f} s, {lasted / median(compared):.0f} times real time")
+    print(f"differences: {len(differences)}")
+
+
+def _print_analysis(recording: Recording) -> None:
+    """Print the processor time of the analysis and of the prediction."""
+    analysis = analyse(recording)  # what is loaded once is loaded now
+    strokes = analysis.strokes
+    options = PredictionOptions(course="steady", intervals=True, variants="small")
+    prediction = predict(analysis, recording.plan, options)
+    carried = with_intervals(analysis, prediction)
+    with_alternatives(carried)
+    alone = _taken(lambda: analyse(Recording.open(recording.folder)))
+    drawn = _taken(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
+    solved = _taken(lambda: predict(analysis, recording.plan, prediction.options))
+    spans = _taken(lambda: with_intervals(analysis, prediction))
+    alternatives = _taken(lambda: with_alternatives(carried))
+    print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
+    print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
+    print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
+    ways = [one.method for row in carried.trials for one in (row.interval, row.opposite_interval) if one]
+    print(f"predicted both ways   {1000 * solved:6.0f} ms   at small strain")
+    print(f"intervals of the SEDs {1000 * spans:6.0f} ms   {len(ways)} of them, {ways.count('sampling')} by sampling")
+    print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
+
+
+def _taken(work: Callable[[], object]) -> float:
+    """Return the median processor time of some work [s]."""
+    times: list[float] = []
+    for _ in range(RUNS):
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return median(times)
+
+
+if __name__ == "__main__":
+    main()
