@@ -1,4 +1,4 @@
-"""The program's own texts in other languages, from Qt's translation files (.ts). No Qt: every process reads them."""
+"""The program's own texts in other languages, from XLIFF files, which every process reads."""
 
 import os
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 ENGLISH = "en"
 FOLDER = Path(__file__).parent / "translations"
 VARIABLE = "DAQ_APP_LANGUAGE"  # names the experimenter's language to this process and to those that it starts
-SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.ts
+SUBJECT, EXPERIMENTER = "subject", "experimenter"  # contexts: the name of a file is context_language.xlf
 
 T = TypeVar("T")
 
@@ -19,15 +19,15 @@ T = TypeVar("T")
 def translations(context: str, language: str) -> Mapping[str, str]:
     """Return the texts of a language by the English ones; none where its file is missing or cannot be read."""
     try:
-        messages = ElementTree.parse(FOLDER / f"{context}_{language}.ts").iter("message")
+        units = ElementTree.parse(FOLDER / f"{context}_{language}.xlf").iterfind(".//{*}trans-unit")
     except (OSError, ElementTree.ParseError):
         return {}
-    return {one.findtext("source", ""): text for one in messages if (text := one.findtext("translation", ""))}
+    return {one.findtext("{*}source", ""): text for one in units if (text := one.findtext("{*}target", ""))}
 
 
 def languages(context: str) -> tuple[str, ...]:
     """Return the languages that a context is translated into, English first."""
-    return (ENGLISH, *sorted(place.stem.removeprefix(f"{context}_") for place in FOLDER.glob(f"{context}_*.ts")))
+    return (ENGLISH, *sorted(place.stem.removeprefix(f"{context}_") for place in FOLDER.glob(f"{context}_*.xlf")))
 
 
 def tr(text: str, /, **values: object) -> str:

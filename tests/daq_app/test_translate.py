@@ -31,27 +31,27 @@ def test_what_is_translated_stays(capsys):
 
 
 @pytest.mark.parametrize(("language", "left"), [("de", 0), ("nl", len(SubjectText))])
-def test_the_program_s_own_texts_come_as_a_file_for_linguist(tmp_path, language, left):
-    out = tmp_path / "texts.ts"
+def test_the_program_s_own_texts_come_as_xliff(tmp_path, language, left):
+    out = tmp_path / "texts.xlf"
     assert run(["translate", "--program", "--language", language, "--out", str(out)]) == 0
     made = ElementTree.parse(out)
-    assert [message.findtext("source") for message in made.iter("message")] == list(SubjectText)
-    assert len([one for one in made.iter("translation") if one.get("type") == "unfinished"]) == left
+    assert [unit.findtext("{*}source") for unit in made.iterfind(".//{*}trans-unit")] == list(SubjectText)
+    assert len([one for one in made.iterfind(".//{*}target") if one.get("state") == "needs-translation"]) == left
 
 
 def test_the_windows_texts_come_as_a_file_that_keeps_what_was_translated(tmp_path, monkeypatch):
     monkeypatch.setattr("daq_app.wording.FOLDER", tmp_path)
-    file, again = tmp_path / "experimenter_nl.ts", tmp_path / "again.ts"
+    file, again = tmp_path / "experimenter_nl.xlf", tmp_path / "again.xlf"
     assert run(["translate", "--window", "--language", "nl", "--out", str(file)]) == 0
     before = file.read_text()
     for text in ("Redo {numbers}", "Press harder.", "Normal force", "Everything is set up. Press Space to begin."):
         assert before.count(f"<source>{text}</source>") == 1
-    place = '<source>Press harder.</source>\n            <translation type="unfinished" />'
+    place = '<source>Press harder.</source>\n        <target state="needs-translation" />'
     assert place in before
-    file.write_text(before.replace(place, "<source>Press harder.</source><translation>Druk harder.</translation>"))
+    file.write_text(before.replace(place, "<source>Press harder.</source><target>Druk harder.</target>"))
     translations.cache_clear()
     assert run(["translate", "--window", "--language", "nl", "--out", str(again)]) == 0
-    assert "<translation>Druk harder.</translation>" in again.read_text()
+    assert "<target>Druk harder.</target>" in again.read_text()
 
 
 def test_nonsense_is_refused_in_a_sentence(tmp_path, capsys):

@@ -1,7 +1,8 @@
-"""Write the file that a translator fills in: a protocol's texts as TOML tables, or the program's own as a .ts file.
+"""Write the file that a translator fills in: a protocol's texts as TOML tables, or the program's own as XLIFF.
 
 What is translated already is kept; what is not stands there in the language it is translated from. The tables go to the
-end of the protocol's file. A .ts file is edited with Qt Linguist or as text, and the window reads it as it is.
+end of the protocol's file. An XLIFF file is edited with Qt Linguist, another editor of XLIFF or as text, and the window
+reads it as it is.
 """
 
 import argparse
@@ -96,20 +97,23 @@ def window_texts() -> list[str]:
 
 
 def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[str, int]:
-    """Return the .ts file of a language, and how many of the texts are not translated."""
+    """Return the XLIFF file of a language, and how many of the texts are not translated."""
     earlier = translations(context, language)
-    root = ElementTree.Element("TS", version="2.1", language=language, sourcelanguage=ENGLISH)
-    group = ElementTree.SubElement(root, "context")
-    ElementTree.SubElement(group, "name").text = context
+    root = ElementTree.Element("xliff", version="1.2", xmlns="urn:oasis:names:tc:xliff:document:1.2")
+    languages = {"source-language": ENGLISH, "target-language": language}
+    file = ElementTree.SubElement(root, "file", original=context, datatype="plaintext", **languages)
+    units = ElementTree.SubElement(file, "body")
     missing = 0
-    for text in texts:
-        message = ElementTree.SubElement(group, "message")
-        ElementTree.SubElement(message, "source").text = text
-        translation = ElementTree.SubElement(message, "translation")
-        translation.text = earlier.get(text, "")
-        if not translation.text:
-            translation.set("type", "unfinished")
+    for number, text in enumerate(texts, 1):
+        unit = ElementTree.SubElement(units, "trans-unit", id=str(number))
+        ElementTree.SubElement(unit, "source").text = text
+        target = ElementTree.SubElement(unit, "target")
+        target.text = earlier.get(text, "")
+        if target.text:
+            unit.set("approved", "yes")
+        else:
+            target.set("state", "needs-translation")
             missing += 1
-    ElementTree.indent(root, "    ")
+    ElementTree.indent(root)
     body = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE TS>\n{body}\n', missing
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{body}\n', missing

@@ -86,11 +86,11 @@ def english_in(window):
 def marked_language(tmp_path_factory):
     """A language that puts marks around each English text."""
     folder = tmp_path_factory.mktemp("translations")
-    messages = (
-        f"<message><source>{escape(text)}</source><translation>{escape(translated(text))}</translation></message>"
+    units = (
+        f"<trans-unit><source>{escape(text)}</source><target>{escape(translated(text))}</target></trans-unit>"
         for text in window_texts()
     )
-    (folder / "experimenter_xx.ts").write_text(f"<TS><context>{''.join(messages)}</context></TS>", "utf-8")
+    (folder / "experimenter_xx.xlf").write_text(f"<xliff><file>{''.join(units)}</file></xliff>", "utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(wording, "FOLDER", folder)
         patch.setenv(VARIABLE, "xx")
@@ -140,7 +140,7 @@ def test_a_translation_with_other_braces_leaves_its_text_in_english(monkeypatch)
 
 def test_a_file_that_cannot_be_read_leaves_the_window_in_english(tmp_path, monkeypatch):
     monkeypatch.setattr(wording, "FOLDER", tmp_path)
-    (tmp_path / "experimenter_yy.ts").write_text("<TS><context>")
+    (tmp_path / "experimenter_yy.xlf").write_text("<xliff><file>")
     assert translations(EXPERIMENTER, "yy") == {}
 
 
@@ -157,8 +157,8 @@ def test_the_language_chosen_in_the_menu_is_that_of_the_next_start(driver):
 
 
 def test_a_process_that_is_started_speaks_the_language_of_the_environment(tmp_path):
-    (tmp_path / "experimenter_zz.ts").write_text(
-        "<TS><message><source>predicting</source><translation>voorspellen</translation></message></TS>"
+    (tmp_path / "experimenter_zz.xlf").write_text(
+        "<xliff><trans-unit><source>predicting</source><target>voorspellen</target></trans-unit></xliff>"
     )
     code = (
         "from pathlib import Path; from daq_app import wording;"
