@@ -16,7 +16,7 @@ from daq_app.batch.pool import Shelf, computed, computed_from, content_of, visit
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
-from sessions import atomic_file
+from sessions import file_access
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.head import software_versions
@@ -108,7 +108,7 @@ def test_a_full_disk_ends_a_study_in_a_sentence_and_leaves_no_part_of_a_file(tmp
         return Path("/dev/full").open("wb")
 
     shelf = Shelf(tmp_path, STEADY)
-    monkeypatch.setattr(atomic_file, "open_new", full)
+    monkeypatch.setattr(file_access, "open_new", full)
     with pytest.raises(RecordingError, match=r"cannot be written \(No space left on device\): make room"):
         shelf.keep("key", {})
     assert list(tmp_path.iterdir()) == []
