@@ -100,8 +100,8 @@ def program_texts(context: str, texts: Iterable[str], language: str) -> tuple[st
     """Return the XLIFF file of a language, and how many of the texts are not translated."""
     earlier = translations(context, language)
     root = ElementTree.Element("xliff", version="1.2", xmlns="urn:oasis:names:tc:xliff:document:1.2")
-    languages = {"source-language": ENGLISH, "target-language": language}
-    file = ElementTree.SubElement(root, "file", original=context, datatype="plaintext", **languages)
+    about = {"original": context, "datatype": "plaintext", "source-language": ENGLISH, "target-language": language}
+    file = ElementTree.SubElement(root, "file", about)
     units = ElementTree.SubElement(file, "body")
     missing = 0
     for number, text in enumerate(texts, 1):
