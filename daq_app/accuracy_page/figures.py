@@ -9,20 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
 
-from sessions.report.figures.style import (
-    GREEN,
-    GREY,
-    INK,
-    PALE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    Panel,
-    Plate,
-    look,
-    sheet,
-    svg,
-)
+from sessions.report.figures import style
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate, Guaranteed
 from solver.verification.growth import FEWEST, Growth, exponent
@@ -31,22 +18,22 @@ from solver.verification.orders import Order
 from solver.verification.speed import Speed
 from solver.verification.truth import JUDGED, NUMBERS, Truth
 
-COLOURS = {"small": GREEN, "finite": VERMILLION}
+COLOURS = {"small": style.GREEN, "finite": style.VERMILLION}
 MARKS = {"small": "o", "finite": "s"}
 WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
 
 
-def plates(measured: Measured) -> dict[str, Plate]:
+def plates(measured: Measured) -> dict[str, style.Plate]:
     """Return the figures that there are numbers for, by name."""
-    drawings: tuple[Callable[[Measured], Plate], ...] = (
+    drawings: tuple[Callable[[Measured], style.Plate], ...] = (
         speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate
     )  # fmt: skip
-    with look():
+    with style.look():
         drawn = [make(measured) for make in drawings]
     return {plate.name: plate for plate in drawn if plate.panels}
 
 
-def speed_plate(measured: Measured) -> Plate:
+def speed_plate(measured: Measured) -> style.Plate:
     """Draw time against true error, one curve a way of solving."""
     rows: list[Speed] = measured.of(Speed)
     truths: list[Truth] = [truth for truth in measured.of(Truth) if truth.case in JUDGED]
@@ -62,11 +49,11 @@ def speed_plate(measured: Measured) -> Plate:
         "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
         "and estimate included: filled by the largest estimate, hollow by the largest true error."
     )
-    return Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
+    return style.Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
 
 
-def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> Panel | None:
-    drawn = sheet(*SQUARE)
+def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
+    drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
@@ -92,15 +79,15 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
     name = f"speed-{time.removesuffix('_s')}"
     header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
-    return Panel(
-        name, f"Time against true error, {title}", svg(drawn, name, title, simulated=False), header, tuple(table)
+    return style.Panel(
+        name, f"Time against true error, {title}", style.svg(drawn, name, title, simulated=False), header, tuple(table)
     )
 
 
-def _guaranteed_panel(rows: Sequence[Guaranteed]) -> Panel | None:
+def _guaranteed_panel(rows: Sequence[Guaranteed]) -> style.Panel | None:
     if not rows:
         return None
-    drawn = sheet(*SQUARE)
+    drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
         mine = [row for row in rows if row.kinematics == kinematics]
@@ -131,45 +118,45 @@ def _guaranteed_panel(rows: Sequence[Guaranteed]) -> Panel | None:
     )  # fmt: skip
     name = "speed-guaranteed"
     words = f"Time against guaranteed error, {title}"
-    return Panel(name, words, svg(drawn, name, words, simulated=False), header, table)
+    return style.Panel(name, words, style.svg(drawn, name, words, simulated=False), header, table)
 
 
-def benchmark_plate(measured: Measured) -> Plate:
+def benchmark_plate(measured: Measured) -> style.Plate:
     """Draw time against true error on the published problems."""
     panel = _order_panel(measured.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
     caption = (
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
         "half-plane under a round body, and the finger at its ending. The table of orders names every point."
     )
-    return Plate("benchmarks", caption, () if panel is None else (panel,))
+    return style.Plate("benchmarks", caption, () if panel is None else (panel,))
 
 
-def order_plate(measured: Measured) -> Plate:
+def order_plate(measured: Measured) -> style.Plate:
     """Draw errors against element size."""
     panel = _order_panel(measured.of(Order), "orders", "error [–]", None)
     caption = (
         "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
         "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size."
     )
-    return Plate("orders", caption, () if panel is None else (panel,))
+    return style.Plate("orders", caption, () if panel is None else (panel,))
 
 
 def _order_panel(
     rows: Sequence[Order], name: str, label: str, time: Callable[[Order], tuple[float, ...]] | None
-) -> Panel | None:
+) -> style.Panel | None:
     if not rows:
         return None
-    drawn = sheet(*WIDE)
+    drawn = style.sheet(*WIDE)
     axes = drawn.axes[0]
     table: list[tuple[str | float, ...]] = []
-    shown = {"displacement": SKY, "stress": PURPLE, "energy": GREY, "force": VERMILLION}
+    shown = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
     for row in rows:
         across = row.errors if time is not None else row.sizes
         up = time(row) if time is not None else row.errors
         words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
-        style = "--" if row.kinematics == "finite" else "-"
+        dashes = "--" if row.kinematics == "finite" else "-"
         axes.plot(
-            across, up, style, marker=_mark(row.problem), color=shown.get(row.quantity, GREEN), markersize=3.5,
+            across, up, dashes, marker=_mark(row.problem), color=shown.get(row.quantity, style.GREEN), markersize=3.5,
             linewidth=0.9, gid=drawn.note(words),
         )  # fmt: skip
         table += [
@@ -177,17 +164,17 @@ def _order_panel(
             for size, error, took in zip(row.sizes, row.errors, row.took_s, strict=True)
         ]
     for quantity in dict.fromkeys(row.quantity for row in rows):
-        axes.plot([], [], "-", color=shown.get(quantity, GREEN), label=quantity)
+        axes.plot([], [], "-", color=shown.get(quantity, style.GREEN), label=quantity)
     for kind in dict.fromkeys(row.problem.split(",")[0] for row in rows):
-        axes.plot([], [], " ", marker=_mark(kind), color=GREY, markersize=3.5, label=kind)
+        axes.plot([], [], " ", marker=_mark(kind), color=style.GREY, markersize=3.5, label=kind)
     if any(row.kinematics == "finite" for row in rows):
-        axes.plot([], [], "--", color=GREY, label="finite strain")
+        axes.plot([], [], "--", color=style.GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
     axes.set(xlabel="error [–]" if time is not None else "element size, by the unit of each problem [–]", ylabel=label)
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
     title = "Time against true error on published problems" if time is not None else "Error against element size"
-    return Panel(name, title, svg(drawn, name, title, simulated=False), header, tuple(table))
+    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, tuple(table))
 
 
 def _mark(problem: str) -> str:
@@ -196,7 +183,7 @@ def _mark(problem: str) -> str:
     return marks.get(problem.split(",")[0], "x")
 
 
-def estimate_plate(measured: Measured) -> Plate:
+def estimate_plate(measured: Measured) -> style.Plate:
     """Draw estimates against true errors, a panel a number."""
     rows: list[Estimate] = measured.of(Estimate)
     panels = [_estimate_panel([r for r in rows if r.number == number], number) for number in NUMBERS]
@@ -205,13 +192,13 @@ def estimate_plate(measured: Measured) -> Plate:
         "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
         "the truth is too doubtful to tell."
     )
-    return Plate("estimates", caption, tuple(panel for panel in panels if panel is not None))
+    return style.Plate("estimates", caption, tuple(panel for panel in panels if panel is not None))
 
 
-def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
+def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None:
     if not rows:
         return None
-    drawn = sheet(*SQUARE)
+    drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for row in rows:
         face = COLOURS[row.kinematics] if row.above is not None else "none"
@@ -223,8 +210,8 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
     _logarithmic(axes)
     low, high = axes.get_xlim()
     line = np.geomspace(low, max(high, axes.get_ylim()[1]), 50)
-    axes.plot(line, line, color=GREY, linewidth=0.8)
-    axes.plot(line, 10 * np.maximum(line, 0.02), "--", color=GREY, linewidth=0.8)
+    axes.plot(line, line, color=style.GREY, linewidth=0.8)
+    axes.plot(line, 10 * np.maximum(line, 0.02), "--", color=style.GREY, linewidth=0.8)
     axes.set_xlim(low, high)
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
         axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
@@ -234,16 +221,16 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> Panel | None:
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
     table = tuple((r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows)
     title = f"Estimated against true error of the {number}"
-    return Panel(name, title, svg(drawn, name, title, simulated=False), header, table)
+    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, table)
 
 
-def cost_plate(measured: Measured) -> Plate:
+def cost_plate(measured: Measured) -> style.Plate:
     """Draw where the time of one solve goes."""
     rows: list[Cost] = measured.of(Cost)
     caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
     if not rows:
-        return Plate("costs", caption, ())
-    drawn = sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
+        return style.Plate("costs", caption, ())
+    drawn = style.sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
     axes = drawn.axes[0]
     parts = list(dict.fromkeys(name for row in rows for name in row.parts))
     colours = dict(zip(parts, _distinct(len(parts)), strict=True))
@@ -265,16 +252,28 @@ def cost_plate(measured: Measured) -> Plate:
     axes.set_xlabel("time [ms]")
     header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
     title = "Where the time of a solve goes"
-    panel = Panel("costs", title, svg(drawn, "costs", title, simulated=False), header, tuple(table))
-    return Plate("costs", caption, (panel,))
+    panel = style.Panel("costs", title, style.svg(drawn, "costs", title, simulated=False), header, tuple(table))
+    return style.Plate("costs", caption, (panel,))
 
 
 def _distinct(count: int) -> list[str]:
-    base = [GREEN, VERMILLION, SKY, PURPLE, "#E69F00", "#0072B2", "#F0E442", GREY, PALE, "#8C564B", INK]
+    base = [
+        style.GREEN,
+        style.VERMILLION,
+        style.SKY,
+        style.PURPLE,
+        "#E69F00",
+        "#0072B2",
+        "#F0E442",
+        style.GREY,
+        style.PALE,
+        "#8C564B",
+        style.INK,
+    ]
     return [base[n % len(base)] for n in range(count)]
 
 
-def growth_plate(measured: Measured) -> Plate:
+def growth_plate(measured: Measured) -> style.Plate:
     """Draw the time of one linear system against its unknowns."""
     rows: list[Growth] = measured.of(Growth)
     caption = (
@@ -282,8 +281,8 @@ def growth_plate(measured: Measured) -> Plate:
         f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5."
     )
     if not rows:
-        return Plate("growth", caption, ())
-    drawn = sheet(*SQUARE)
+        return style.Plate("growth", caption, ())
+    drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
         mine = [row for row in rows if row.kinematics == kinematics]
@@ -300,8 +299,8 @@ def growth_plate(measured: Measured) -> Plate:
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
     table = tuple((r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows)
     title = "Growth of the time with the unknowns"
-    panel = Panel("growth", title, svg(drawn, "growth", title, simulated=False), header, table)
-    return Plate("growth", caption, (panel,))
+    panel = style.Panel("growth", title, style.svg(drawn, "growth", title, simulated=False), header, table)
+    return style.Plate("growth", caption, (panel,))
 
 
 def _logarithmic(axes: Axes) -> None:
@@ -322,4 +321,4 @@ def _decades(limits: tuple[float, float]) -> tuple[float, float]:
 def _power_line(axes: Axes, rows: Sequence[Growth]) -> None:
     largest = max(rows, key=lambda row: row.dofs)
     ends = np.array([min(row.dofs for row in rows), largest.dofs])
-    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=GREY, linewidth=0.7)
+    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=style.GREY, linewidth=0.7)

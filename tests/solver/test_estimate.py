@@ -16,7 +16,7 @@ from solver.prediction import COUNT, NestedNumbers
 from solver.scene.published import STICKINESS, scene
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.random_scenes import random_scene
-from tests.solver.drawn_scenes import DRAWN, HELD_OUT
+from tests.solver.drawn_scenes import DECEIVING, DRAWN, HELD_OUT
 
 
 def drawn(depth, mu, bound, slide, angle, moduli, solving=None):
@@ -153,31 +153,6 @@ def test_the_nested_value_is_nearer_the_truth_than_the_meshs_own(kinematics):
     nearer = [abs(p.sed_ending_corrected / truth - 1.0) / abs(p.sed_ending / truth - 1.0) for p in answers]
     assert np.median(nearer) < 0.5
     assert max(nearer) < 1.0
-
-
-# Published scenes of solver/verification/random_scenes.py at finite strain and others with low bounds: depth, mu,
-# bound, slide, contact angle, moduli, and the mean of three solves on far finer meshes.
-# Two meshes easily agree on them and are wrong: with three layers in the fat, and where the bound acts at an edge.
-DECEIVING = (
-    (
-        1.99320910990755,
-        0.5670427049329415,
-        0.04581172098166008,
-        "-x",
-        36.29489091638562,
-        (0.1074120661063343, 0.07798624984533795, 0.029127994577057028),
-        (0.00100988, 0.11117694, 0.06304208),
-    ),
-    (
-        1.8244161575188902,
-        0.46395847982401955,
-        0.00511502663592019,
-        "+x",
-        67.47383524256935,
-        (0.15543655238990728, 0.06828896150165999, 0.039045860033311154),
-        (0.00515991, 0.19396537, 0.03331597),
-    ),
-)
 
 
 @pytest.mark.parametrize("tolerance", [pytest.param(0.01, marks=pytest.mark.slow), None])

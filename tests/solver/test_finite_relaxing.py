@@ -2,13 +2,14 @@
 """Tissues that relax at finite strain: closed forms, derivatives, what is never gained, limits, the whole finger."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver import Materials, Relaxation, Solve, solve
+from solver import Relaxation, solve
 from solver.accuracy.audits import course_audits
 from solver.body.finite import FiniteBody
 from solver.constitutive import Hooke, NeoHooke, Prony, overstress
@@ -18,12 +19,13 @@ from solver.constitutive.overstress import Past
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.progress import listening
-from solver.scene.published import SLIPPERINESS, scene
 from tests.solver.finite_examples import block
 from tests.solver.oracle import finite as oracle
 from tests.solver.oracle.laws import overstress_energy, overstress_tangent
-from tests.solver.test_relaxing import TABLE, TIMES
+from tests.solver.test_relaxing import TABLE, TIMES, of_layers
+from tests.solver.test_relaxing import published as published_scene
 
+published = partial(published_scene, kinematics="finite")
 entries = st.floats(-0.4, 0.4)
 gradients = st.tuples(entries, entries, entries, entries).map(lambda g: np.eye(2) + np.reshape(g, (2, 2)))
 tensors = st.tuples(*[st.floats(0.5, 2.0)] * 2, st.floats(-0.4, 0.4), st.floats(0.5, 2.0)).map(np.array)
@@ -267,17 +269,6 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     assert "course_work_balance" not in found
 
 
-def of_layers(*terms):
-    usual = Materials()
-    return replace(usual, **{name: replace(usual.of(name), prony=terms) for name in ("epidermis", "dermis", "fat")})
-
-
-def published(materials, course="history", kinematics="finite", **loading):
-    given = scene(SLIPPERINESS[4])
-    driven = replace(given.loading, **loading)
-    return replace(given, materials=materials, loading=driven, solve=Solve(kinematics, course, 0.5))
-
-
 def bone_work(course):
     """Work done at the bone [N mm per mm], from what a result tells of its course."""
     told = (course.normal_force, -course.bone_y, course.tangential_force, course.bone_x)
@@ -320,12 +311,3 @@ def test_a_relaxing_course_says_at_every_step_what_it_does_and_why_it_takes_step
         parts = [part for one, part in course if one == doing]
         assert parts == sorted(parts)
         assert 0.0 <= parts[0] < parts[-1] <= 1.0
-
-
-@pytest.mark.slow
-def test_a_given_force_presses_a_relaxing_finger_deeper_with_time():
-    found = solve(published(of_layers(Relaxation(0.5, 0.5)), indentation=None, normal_force=0.05, slide="none"))
-    depth, time = -found.history.bone_y, found.history.time
-    np.testing.assert_allclose(found.history.normal_force[time >= 1.0], 0.05, rtol=1e-7)
-    assert (np.diff(depth[time >= 1.0]) > -1e-9).all()
-    assert depth[-1] > 1.1 * depth[np.argmin(np.abs(time - 1.0))]

@@ -10,6 +10,12 @@ from solver.prediction import History
 from solver.quantities import NAMES
 from solver.response.rates import course_errors, course_numbers, rates
 
+RELAXING = Scene(
+    friction=Friction(0.3),
+    loading=Loading(0.8, "+x"),
+    materials=Materials(dermis=Material(0.08, 0.48, prony=(Relaxation(0.3, 0.5),))),
+)
+
 
 def course(time, bone_x, slipping, response):
     none = np.zeros(len(time))
@@ -47,14 +53,7 @@ def test_twice_as_fast_a_slide_breaks_away_twice_as_fast_and_its_end_is_the_pred
 
 
 def test_where_tissues_relax_the_sed_alone_has_a_course():
-    relaxing = Material(0.08, 0.48, prony=(Relaxation(0.3, 0.5),))
-    scene = Scene(
-        friction=Friction(0.3),
-        loading=Loading(0.8, "+x"),
-        materials=replace(Materials(), dermis=relaxing),
-        solve=Solve("small", "history"),
-    )
-    found = rates(solve(scene).history)
+    found = rates(solve(replace(RELAXING, solve=Solve("small", "history"))).history)
     assert np.isfinite(found["sed"]).all()
     assert np.isnan(found["pressure"]).all()
 
@@ -78,14 +77,7 @@ def test_errors_at_the_ends_of_press_and_break_away_and_of_rates_lie_above_the_t
 
 
 def test_where_tissues_relax_the_errors_of_a_course_are_those_of_its_sed_and_forces():
-    tissue = Material(0.08, 0.48, prony=(Relaxation(0.3, 0.5),))
-    scene = Scene(
-        friction=Friction(0.3),
-        loading=Loading(0.8, "+x"),
-        materials=replace(Materials(), dermis=tissue),
-        solve=Solve("small", "history", 0.02, "quick"),
-    )
-    errors = course_errors(solve(scene))
+    errors = course_errors(solve(replace(RELAXING, solve=Solve("small", "history", 0.02, "quick"))))
     assert np.all(np.isfinite(errors.at[:, :6]))
     assert np.all(errors.at[:, 0] > 0.0)
     assert np.isnan(errors.at[:, 6:]).all()
