@@ -47,9 +47,7 @@ def text_of(path: Path) -> str:
         what = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
     try:
-        return read_limited(path, LARGEST_TEXT).decode(
-            "utf-8-sig"
-        )  # some editors begin a file with a mark that is no part of it
+        return read_limited(path, LARGEST_TEXT).decode("utf-8-sig")  # some editors begin a file with a mark
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
     except OSError as error:
@@ -65,9 +63,7 @@ def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | 
         return from_table({**tables_in(text, where), **(instead or {})}, cls, where)
     except _Wrong as wrong:
         line = _line_of(text, wrong.key)
-        raise SettingsError(
-            f"{where}, line {line}: {wrong.sentence}" if line else f"{where}: {wrong.sentence}"
-        ) from wrong
+        raise SettingsError(f"{where}{f', line {line}' if line else ''}: {wrong.sentence}") from wrong
 
 
 def tables_in(text: str, where: str) -> dict[str, Any]:

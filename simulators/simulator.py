@@ -192,9 +192,7 @@ class Simulated:
     bench: Bench  # what it feels
     now: Callable[[], float]  # its time and the bench's [s]
     close: Callable[[], None]  # takes it away
-    open_handles: Callable[[], int] = lambda: (
-        0
-    )  # handles that somebody has on it, where there are some beyond open files
+    open_handles: Callable[[], int] = lambda: 0  # that somebody has on it, where there are some beyond open files
     forget: Callable[[], None] = lambda: None  # lets the computer have its own USB and libraries again
 
 

@@ -111,9 +111,7 @@ class HealthReport(Struct, frozen=True):
     """Four times a second, also where no transducer is open: a recorder that is silent for longer hangs or sleeps."""
 
     health: Health  # totals since the stream began
-    rate: (
-        float  # readings a second over the last second of the machine's clock [Hz]; of a paced clock simulated seconds
-    )
+    rate: float  # readings a second over the machine's last second [Hz]; of a paced clock simulated seconds
     load: Six  # greatest |Fx .. Tz| since the last report, nothing subtracted, over the rated range [-]; nan: no range
     peak: Six  # the same since somebody acknowledged overloads
     saturated: int  # readings the device called invalid since somebody acknowledged
@@ -152,9 +150,7 @@ class SessionBegun(Struct, frozen=True):
     plan: SessionPlan
     people: Kind
     simulated: str | None  # the sentence that heads every file, where something is simulated
-    clock_offset_ns: (
-        int  # session clock minus this machine's monotonic clock [ns]; a simulated clock has none of its own
-    )
+    clock_offset_ns: int  # session clock minus the machine's monotonic one [ns]; a simulated clock has no offset
     factor: float  # session seconds in one real second [-]
     events: tuple[LoggedEvent, ...] = ()  # all that was recorded before, of a session that goes on
 

@@ -300,12 +300,9 @@ def _changed(folder: Path, subject: str, choose: Callable[[Study], tuple[str, Ma
     """Add the event that `choose` makes of the study as it stands, while nobody else can change it."""
     open_study(folder)  # says what is wrong where it is none
     with _changing(folder) as connection:
-        _tell(connection, *_ordered(subject, *choose(_study(connection, folder))))
+        kind, data = choose(_study(connection, folder))
+        _tell(connection, kind, subject, data)
         return _study(connection, folder)
-
-
-def _ordered(subject: str, kind: str, data: Mapping[str, Any]) -> tuple[str, str, Mapping[str, Any]]:
-    return kind, subject, data
 
 
 def _tell(connection: sqlite3.Connection, kind: str, subject: str, data: Mapping[str, Any]) -> None:

@@ -104,9 +104,7 @@ def checked_gain_error(stored: object) -> float | None:
 
 
 MADE_BY = "made_by"  # versions of what made a stored document
-TIMINGS = frozenset(
-    {"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"}
-)  # not numbers of the session
+TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "SIMULATED"})  # no numbers of a session
 _MOST = 20  # differences named one by one
 
 

@@ -200,11 +200,8 @@ def check_provenance(data: object) -> None:
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
     """Return the line that heads every file of a recording in which something was simulated, else None."""
-    parts = [
-        name
-        for name, simulated in (("transducer", info is not None and info.simulated), ("subject", subject_simulated))
-        if simulated
-    ]
+    simulated = {"transducer": info is not None and info.simulated, "subject": subject_simulated}
+    parts = [name for name, yes in simulated.items() if yes]
     if not parts:
         return None
     return f"SIMULATED: the {' and the '.join(parts)} of this recording {'are' if len(parts) > 1 else 'is'} simulated"

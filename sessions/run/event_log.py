@@ -104,24 +104,10 @@ _EVENTS: dict[str, type[steps.Event]] = {_kind(cls): cls for cls in get_args(ste
 
 
 # What experimenter and subject do. All else that happens comes of readings and clock, and is found in them once more.
-ACTS = frozenset(
-    {
-        "begin",
-        "stimulus_mounted",
-        "stroke_done",
-        "scored",
-        "number_given",
-        "chosen",
-        "note",
-        "redo",
-        "undo_redo",
-        "skip",
-        "pause",
-        "resume",
-        "abort",
-        "finish",
-    }
-)
+ACTS = frozenset({
+    "begin", "stimulus_mounted", "stroke_done", "scored", "number_given", "chosen", "note", "redo", "undo_redo", "skip",
+    "pause", "resume", "abort", "finish",
+})  # fmt: skip
 NOTICED = frozenset({"zeroed", "contact_onset", "finger_lifted", "settled", "rest_over"})  # by the runner
 
 
