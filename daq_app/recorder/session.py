@@ -23,8 +23,8 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.plan.study import StudyError, study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
-from sessions.recording.archive import is_sealed
 from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
+from sessions.recording.manifest import is_sealed
 from sessions.recording.rescue import fold_log
 from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming

@@ -15,7 +15,7 @@ from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, pl
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
 from sessions.plan.study import StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
-from sessions.recording.archive import is_sealed
+from sessions.recording.manifest import is_sealed
 from sessions.recording.storage import check_room, need
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError

@@ -23,7 +23,7 @@ from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
 from sessions.file_access import json_object, packed_lines, read_limited, write_json
 from sessions.recording import Recording
-from sessions.recording.archive import description
+from sessions.recording.manifest import description
 
 VERSION = "1.10.0"
 BREAK = 1.0  # a longer silence of the transducer begins a new file [s]

@@ -12,7 +12,7 @@ from sessions.exchange.exported import ExportedSession, head_of, side_files
 from sessions.exchange.session_tables import EACH_EVENT, Column, Table, event_columns, logged_event, tables
 from sessions.file_access import json_object, read_limited, write_json
 from sessions.recording import Recording
-from sessions.recording.archive import description
+from sessions.recording.manifest import description
 from sessions.recording.schema import DESCRIPTION_FILE, SEALED_FILE
 
 READINGS, EVENTS, README = "readings.csv", "events.csv", "README.md"

@@ -15,10 +15,10 @@ from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS
 from sessions.exchange.csv_text import ImportRefused
 from sessions.file_access import holds_something, remedy, whole_folder, write_whole
-from sessions.recording.archive import Digest, different, digest_of
 from sessions.recording.derived import GAIN_ERROR, bytes_of
 from sessions.recording.head import info_from_dict, plan_from_dict, software_versions
 from sessions.recording.log import LoggedEvent
+from sessions.recording.manifest import Digest, different, digest_of
 from sessions.recording.reader import Recording
 from sessions.recording.replay import RecordedReadings
 from sessions.recording.schema import FORMAT, FORMAT_VERSION, LIVE_FILE, RecordingError

@@ -22,8 +22,8 @@ import numpy as np
 from sessions.exchange import ExportError, ExportSource, Progress
 from sessions.exchange.session_tables import Column, Table, tables
 from sessions.recording import Recording
-from sessions.recording.archive import description
 from sessions.recording.head import json_text
+from sessions.recording.manifest import description
 
 if TYPE_CHECKING:
     from pynwb import NWBFile

@@ -9,9 +9,9 @@ from typing import Any, cast
 
 from sessions.file_access import json_object, read_limited, remedy, write_whole
 from sessions.plan.study import Key, StudyError
-from sessions.recording.archive import is_sealed, list_in_manifest
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
+from sessions.recording.manifest import is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
 from sessions.toml_file import SettingsError

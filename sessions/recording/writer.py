@@ -13,9 +13,9 @@ from drivers.transducer import TransducerInfo
 from sessions.file_access import remedy, sync_folder
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.archive import is_sealed
 from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence, without_home
 from sessions.recording.log import LoggedEvent
+from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import fold_log, identities, rescued
 from sessions.recording.schema import RecordingError

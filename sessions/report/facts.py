@@ -10,9 +10,9 @@ from typing import Any
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, Block, Origin
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings, usual_settings
-from sessions.recording.archive import file_sha256
 from sessions.recording.head import calibration_hash
 from sessions.recording.log import TrialRecord
+from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile

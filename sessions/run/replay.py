@@ -14,8 +14,8 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, FleetingWriter, LoggedEvent, Recording, RecordingError
-from sessions.recording.archive import digest_of
 from sessions.recording.derived import differences
+from sessions.recording.manifest import digest_of
 from sessions.recording.reader import TELL_LOSSES
 from sessions.recording.replay import RecordedReadings, health_of
 from sessions.run.event_log import Step, parts, steps_of

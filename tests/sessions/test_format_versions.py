@@ -11,8 +11,9 @@ from recordings import begun, change, ended, rows
 from daq_app.cli.main import run
 from sessions.exchange.exported import exported, import_session
 from sessions.recording import Recording, RecordingError, writer
-from sessions.recording.archive import digest_of, problems, seal
+from sessions.recording.archive import problems, seal
 from sessions.recording.head import plan_to_dict
+from sessions.recording.manifest import digest_of
 from sessions.recording.schema import FORMAT_VERSION
 from sessions.strokes import analyse
 

@@ -14,7 +14,8 @@ from recordings import PLAN, begun, change, crashed, ended, readings, with_a_lon
 from stand_ins import CALIBRATION, INFO
 
 from sessions.recording import Recording, RecordingError
-from sessions.recording.archive import list_in_manifest, problems, seal
+from sessions.recording.archive import problems, seal
+from sessions.recording.manifest import list_in_manifest
 from sessions.recording.sealed_copy import TextColumn, read_texts, write_texts
 
 REAL = replace(INFO, simulated=False)

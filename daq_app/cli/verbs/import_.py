@@ -61,7 +61,8 @@ def _foreign(options: argparse.Namespace, console: Console) -> int:
     """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
     from sessions.recording import Recording
-    from sessions.recording.archive import list_in_manifest, seal
+    from sessions.recording.archive import seal
+    from sessions.recording.manifest import list_in_manifest
 
     units = _parts(options.units)
     if units is not None and len(units) != 2:

@@ -13,7 +13,8 @@ from daq_app.console import DONE, FLAWED, Console, WrongValue
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import People, ResumeSession
 from sessions.recording import Recording, RecordingError
-from sessions.recording.archive import is_sealed, seal
+from sessions.recording.archive import seal
+from sessions.recording.manifest import is_sealed
 from sessions.run.resuming import check_resumable
 
 EXAMPLE = "daq-app resume recordings/P07 --device net-ft://192.168.1.1"

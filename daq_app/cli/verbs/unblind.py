@@ -13,8 +13,8 @@ from pathlib import Path
 from daq_app.console import DONE, FLAWED, Console
 from sessions.plan.study import Key, StudyError, check_code, is_study, note, open_study, study_key
 from sessions.recording import Recording, RecordingError
-from sessions.recording.archive import is_sealed
 from sessions.recording.derived import RECORDED, UNBLINDING, load_derived, sessions_of, store_derived
+from sessions.recording.manifest import is_sealed
 
 EXAMPLE = "daq-app unblind studies/friction --by E02"
 

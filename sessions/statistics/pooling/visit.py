@@ -14,9 +14,9 @@ from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
 from sessions.prediction.stored import model_facts
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
-from sessions.recording.archive import file_sha256
 from sessions.recording.derived import gain_error_set, revealed
 from sessions.recording.log import TrialRecord
+from sessions.recording.manifest import file_sha256
 from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
