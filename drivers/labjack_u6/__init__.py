@@ -110,11 +110,7 @@ def _again(place: _Where, serial: int, deadline: Deadline) -> UsbLink:
 
 
 def _info(
-    place: _Where,
-    file: CalibrationFile,
-    identity: wire.Identity,
-    constants: wire.Constants,
-    scans: wire.ScanClock,
+    place: _Where, file: CalibrationFile, identity: wire.Identity, constants: wire.Constants, scans: wire.ScanClock
 ) -> TransducerInfo:
     return TransducerInfo(
         uri=place.uri,

@@ -116,10 +116,7 @@ class TaskLink:
             self._task = library.Task()
             differential = library.constants.TerminalConfiguration.DIFF
             channels = self._task.ai_channels.add_ai_voltage_chan(
-                f"{device}/ai0:{GAUGES - 1}",
-                terminal_config=differential,
-                min_val=-RANGE,
-                max_val=RANGE,
+                f"{device}/ai0:{GAUGES - 1}", terminal_config=differential, min_val=-RANGE, max_val=RANGE
             )
             low, high = float(channels.ai_min), float(channels.ai_max)
             if low > -RANGE or high < RANGE or channels.ai_term_cfg != differential:

@@ -256,11 +256,7 @@ class _Run:
             raise AssertionError("a zero is measured only where there is a transducer")
         settings = self.settings
         self._watch = TakeWatch(
-            transducer.info,
-            self.plan.frame,
-            settings.zero_duration,
-            settings.detection,
-            settings.after_lift,
+            transducer.info, self.plan.frame, settings.zero_duration, settings.detection, settings.after_lift
         )
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 

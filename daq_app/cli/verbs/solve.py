@@ -87,23 +87,17 @@ def _print(prediction: "Prediction", title: str, console: Console, deep: "Recept
     plain = prediction.to_dict()
     console.result({**plain, **row_at, **({} if course is None else _course_in_json(*course))})
     console.say(title)
+    corrected = ["corrected", number(prediction.sed_ending_corrected, 5, factor=1e3), "kPa", ""]
+    shift = ["sideways shift", number(prediction.shift, 4), "mm", _length(plain["shift_error"])]
     rows = [
         ["SED at the ending", number(prediction.sed_ending, 5, factor=1e3), "kPa", _percent(plain["error_estimate"])],
-        *(
-            [["corrected", number(prediction.sed_ending_corrected, 5, factor=1e3), "kPa", ""]]
-            if prediction.nested
-            else []
-        ),
+        *([corrected] if prediction.nested else []),
         ["SED at the point", number(prediction.sed_point, 5, factor=1e3), "kPa", _percent(plain["sed_point_error"])],
         ["normal force", number(prediction.normal_force, 5), "N/mm", _percent(plain["normal_force_error"])],
         ["tangential force", number(prediction.tangential_force, 5), "N/mm", _percent(plain["tangential_force_error"])],
         ["contact width", number(prediction.contact_width, 3), "mm", _percent(plain["contact_width_error"])],
         ["indentation", number(prediction.indentation, 4), "mm", _percent(plain["indentation_error"])],
-        *(
-            []
-            if prediction.shift is None
-            else [["sideways shift", number(prediction.shift, 4), "mm", _length(plain["shift_error"])]]
-        ),
+        *([] if prediction.shift is None else [shift]),
         ["unknowns", str(prediction.dofs), "", ""],
         ["solving took", number(prediction.wall_s, factor=1e3), "ms", ""],
         ["setting up took", number(prediction.setup_s, factor=1e3), "ms", ""],
@@ -168,22 +162,13 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
 def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:
     labels = [*COURSE, *(one.label for one in QUANTITIES)]
     units = ["MPa", "MPa", "N/mm", "N/mm", "mm", *(one.unit for one in QUANTITIES)]
-    for title, values, off, names, per in (
-        (
-            "At the ends of the press, of the break-away (full slip) and of the slide:",
-            numbers.at,
-            errors.at,
-            labels,
-            "",
-        ),
-        (
-            "Mean rates in the press, the break-away and the slide:",
-            numbers.rate,
-            errors.rate,
-            labels[len(COURSE) :],
-            "/s",
-        ),
-    ):
+    ends = "At the ends of the press, of the break-away (full slip) and of the slide:"
+    paces = "Mean rates in the press, the break-away and the slide:"
+    parts = (
+        (ends, numbers.at, errors.at, labels, ""),
+        (paces, numbers.rate, errors.rate, labels[len(COURSE) :], "/s"),
+    )
+    for title, values, off, names, per in parts:
         lines = [
             [name, *(_with_error(*pair) for pair in zip(value, error, strict=True)), f"{unit}{per}"]
             for name, value, error, unit in zip(names, values.T, off.T, units[-len(names) :], strict=True)
