@@ -1,22 +1,157 @@
-"""The other end of every driver: the list of simulated devices, and each of them served to any client.
+"""The other end of every driver: the list of simulated devices, each served to any client, and the timetable of one.
 
 The list reads itself from the modules of this package. A test that is run on every driver takes it from here.
 """
 
+import itertools
 import pkgutil
+import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 import simulators
 from drivers.clock import clock_at
 from drivers.transducer import SetupError
+from simulators.bench import Bench, BenchSettings
 from simulators.digital_ft_box import DigitalFtBox
-from simulators.faults import Faults
+from simulators.faults import Fault, Faults, Kind
 from simulators.net_ft_box import NetFtBox
 from simulators.serial_ft_box import SerialFtBox
 from simulators.simulator import Simulator
-from simulators.timetable import ScriptedBench, load_timetable, usual_timetable
+from simulators.stroke import CONTACT_AREA, Surface, paper_surfaces
+from simulators.subject import SimulatedSubject
+
+APART = 5.0  # least time from one stroke's beginning to the next; none lasts longer [s]
+
+_Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
+_Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
+
+
+class TimetableError(ValueError):
+    """A timetable file says something that cannot be carried out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timetable:
+    """Strokes, in order of time, and faults; begun anew every `repeat` seconds where that is above 0."""
+
+    strokes: tuple[tuple[float, Surface], ...]  # beginning [s] and surface of each
+    faults: tuple[Fault, ...] = ()
+    repeat: float = 0.0  # [s]
+
+    def __post_init__(self) -> None:
+        """Refuse strokes that would overlap. Raises TimetableError."""
+        times = [at for at, _ in self.strokes]
+        if self.repeat > 0.0 and times:
+            times.append(times[0] + self.repeat)
+        for before, after in itertools.pairwise(times):
+            if after - before < APART:
+                raise TimetableError(f"the strokes at {before:g} s and {after:g} s are less than {APART:g} s apart")
+        if self.repeat > 0.0 and any(fault.stop > self.repeat for fault in self.faults):
+            raise TimetableError(f"a fault ends after repeat = {self.repeat:g} s, when the timetable begins anew")
+
+
+class ScriptedBench(Bench):
+    """A bench that is stroked by one subject as a timetable says."""
+
+    def __init__(self, seed: int, timetable: Timetable, settings: BenchSettings | None = None) -> None:
+        """Begin the timetable at the bench's time 0. The seed is that of the noise and of the subject."""
+        super().__init__(seed, settings)
+        self._timetable = timetable
+        self._subject = SimulatedSubject(seed)
+        self._begun = 0  # strokes so far
+
+    def wrench(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what the transducer feels (n, 6) at `times` (n,) [s], after beginning the strokes due by then."""
+        strokes = self._timetable.strokes
+        while len(times) and strokes:
+            cycle, position = divmod(self._begun, len(strokes))
+            at, surface = strokes[position]
+            at += cycle * self._timetable.repeat
+            if at > times[-1] or (cycle > 0 and self._timetable.repeat == 0.0):
+                break
+            self._begun += 1
+            if at + APART < times[0]:  # nobody asked in its time
+                continue
+            self.mount(surface)
+            self.begin_stroke(self._subject.stroke(surface, repetition=cycle + 1), at)
+        return super().wrench(times)
+
+
+def usual_timetable() -> Timetable:
+    """Return what a box does without a script: the paper's ten surfaces, one every six seconds, again and again."""
+    surfaces = paper_surfaces().values()
+    return Timetable(tuple((6.0 * i, surface) for i, surface in enumerate(surfaces)), repeat=6.0 * len(surfaces))
+
+
+def load_timetable(path: Path) -> Timetable:
+    """Return the timetable in a TOML file. Raises SetupError where there is none, TimetableError where it is wrong."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SetupError(f"{path} cannot be read ({(error.strerror or 'refused').lower()}); check its name") from None
+    except (ValueError, RecursionError) as error:  # no TOML, no UTF-8, a number of thousands of digits, brackets on end
+        raise TimetableError(f"{path} is not TOML: {error}") from None
+    try:
+        script = msgspec.convert(table, _Script)
+        strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
+        faults = tuple(Fault(f.kind, f.start, f.stop, f.share, f.delay, f.status) for f in script.fault)
+        return Timetable(tuple(strokes), faults, script.repeat)
+    except (msgspec.ValidationError, ValueError) as error:
+        raise TimetableError(f"{path}: {error}") from None
+
+
+class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """One [[stroke]]: a surface of the paper by descriptor and index, or any other by mu and the rest."""
+
+    at: _Time
+    descriptor: str | None = None
+    index: int | None = None
+    mu: _Positive | None = None
+    peak_normal_force: _Positive = 3.0
+    speed: _Positive = 20.0
+    direction: int = 1
+    holds: bool = True
+
+
+class _FaultEntry(msgspec.Struct, forbid_unknown_fields=True):
+    """One [[fault]]."""
+
+    kind: Kind
+    start: _Time = msgspec.field(name="from")
+    stop: _Time = msgspec.field(name="to")
+    share: float = 1.0
+    delay: float = 0.05
+    status: int = 0
+
+
+class _Script(msgspec.Struct, forbid_unknown_fields=True):
+    """The whole file."""
+
+    stroke: list[_StrokeEntry] = []  # msgspec copies an empty default for each instance
+    fault: list[_FaultEntry] = []
+    repeat: _Time = 0.0
+
+
+def _surface(entry: _StrokeEntry) -> Surface:
+    if entry.mu is not None:
+        if entry.descriptor is not None or entry.index is not None:
+            raise TimetableError(f"the stroke at {entry.at:g} s gives mu as well as descriptor and index; give either")
+        tau_max = entry.mu * entry.peak_normal_force / CONTACT_AREA
+        return Surface(entry.mu, "scripted", 0, tau_max, entry.speed, entry.direction, entry.holds)
+    surface = paper_surfaces().get((entry.descriptor or "", -1 if entry.index is None else entry.index))
+    if surface is None:
+        known = ", ".join(f"{descriptor} {index}" for descriptor, index in paper_surfaces())
+        raise TimetableError(f"the stroke at {entry.at:g} s needs mu, or a descriptor and an index out of {known}")
+    return surface
+
 
 _MODULES = [import_module(f"simulators.{module.name}") for module in pkgutil.iter_modules(simulators.__path__)]
 SIMULATORS: Mapping[str, Simulator] = {

@@ -43,7 +43,7 @@ _WRONG = (
     "drivers.address.AddressError",
     "sessions.strokes.decisions.DecisionError",
     "sessions.toml_file.SettingsError",
-    "simulators.timetable.TimetableError",
+    "simulators.serving.TimetableError",
     "solver.scene.tables.SceneError",
 )
 _FAILED = (

@@ -28,8 +28,7 @@ from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
 from sessions.statistics.pooling.ground_truth import Spoilt
 from sessions.statistics.pooling.visit import EXCLUSIONS
-from simulators.bench import Bench, BenchSettings, PlantedStroke
-from simulators.direct import DirectTransducer, Hurt
+from simulators.bench import Bench, BenchSettings, DirectTransducer, Hurt, PlantedStroke
 from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
 

@@ -15,10 +15,9 @@ from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
 from simulators.bench import Bench
 from simulators.net_ft_box import NetFtBox
-from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
+from simulators.serving import TimetableError, serve_digital_ft, serve_net_ft, serve_serial_ft
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
-from simulators.timetable import TimetableError
 
 __all__ = [
     "Connected",

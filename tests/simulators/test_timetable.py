@@ -10,9 +10,8 @@ from drivers.catalog import open_transducer
 from drivers.clock import PacedClock
 from drivers.transducer import SetupError
 from simulators.faults import Fault
-from simulators.serving import serve_net_ft
+from simulators.serving import ScriptedBench, Timetable, TimetableError, load_timetable, serve_net_ft, usual_timetable
 from simulators.stroke import Surface, paper_surfaces
-from simulators.timetable import ScriptedBench, Timetable, TimetableError, load_timetable, usual_timetable
 
 SCRIPT = """
 repeat = 20.0
