@@ -85,11 +85,11 @@ ALARM_COMBINED = 1.05  # of two taken together: where the Ethernet Axia's manual
 
 
 def loads(wrench: Array, rated: Array) -> Array:
-    """Return |Fx .. Tz| over their ranges and the combined load, shape (n, 7) [-], for a wrench (n, 6) [N, N mm].
+    """Return the amounts of Fx to Tz over their ranges and the combined load (n, 7) [-], of a wrench (n, 6) [N, N mm].
 
     Forces across strain the same beams as the torque about z, and the force along z those that the torques across do:
-    the combined load is the greater of |Fxy| + |Tz| and |Fz| + |Txy|, each over its range (maker's manual of the
-    Ethernet Axia, status bit 30). nan where a range `rated` (6,) is unknown.
+    the combined load is the greater of Fxy + Tz and Fz + Txy, amounts over their ranges (maker's manual of the Ethernet
+    Axia, status bit 30). nan where a range `rated` (6,) is unknown.
 
     >>> loads(np.array([[18.0, 0.0, -9.0, 0.0, 0.0, 250.0]]), np.array([36.0, 36.0, 36.0, 500.0, 500.0, 500.0]))
     array([[0.5 , 0.  , 0.25, 0.  , 0.  , 0.5 , 1.  ]])
