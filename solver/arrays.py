@@ -24,6 +24,18 @@ def inverse(matrices: Array) -> Array:
     return adjugate / determinant(matrices)[..., None, None]
 
 
+class ElementGeometry(NamedTuple):
+    """What is integrated over e elements, whatever they are made of; q = 9 quadrature points."""
+
+    grad_x: Array  # as in `ElementArrays`
+    grad_y: Array
+    weight: Array
+    modes: Array
+    laplace: Array
+    centre: Array  # (e, 2) from which x and y of the modes are counted [mm]
+    combination: Array  # (e, 3, 3) the modes by 1, x, y: the inverse of the Cholesky factor of their mass
+
+
 class ElementArrays(NamedTuple):
     """Elements of nine nodes and what they are made of: e elements, q = 9 quadrature points."""
 
@@ -31,7 +43,7 @@ class ElementArrays(NamedTuple):
     grad_y: Array  # (e, q, 9)
     weight: Array  # (e, q) areas of the quadrature points [mm2]
     modes: Array  # (e, q, 3) pressure modes there, orthonormal over the element [1/mm]
-    laplace: Array  # (e, 9, 9) integrals of the shear modulus times grad N_i . grad N_j [N/mm per mm]
+    laplace: Array  # (e, 9, 9) integrals of grad N_i . grad N_j [-]
     shear: Array  # (e,) [MPa]
     stiffening: Array  # (e,) Ogden's exponent [-]
     lame: Array  # (e,) [MPa]
@@ -48,6 +60,8 @@ class ElementSystem(NamedTuple):
     condensed_inverse: Array  # (e, 3) of the centre's stiffness: xx, xy, yy
     dilate: Array  # (e, 3, 18) derivative of the modes of ln J
     volume: Array  # (e, 3) those modes
+    more_force: Array  # (e, 18) of relaxing tissue, ordered as in `ElementWork`; (0, 18) where there is none
+    more_tangent: Array  # (e, 18, 18) of it, or (0, 18, 18)
 
 
 class ElementWork(NamedTuple):
@@ -66,19 +80,10 @@ class ElementWork(NamedTuple):
     f: Array  # (18,) forces
     by_x: Array  # (9, 16) products of deformed gradients, by x of a node
     by_y: Array  # (9, 16) and by its y
-    laplace: Array  # (9, 9) as in `ElementArrays`, of tissue that stiffens
+    laplace: Array  # (9, 9) as in `ElementArrays`, times the shear modulus as it has grown [N/mm per mm]
     left: Array  # (18, 5) the tangent less the products is left right: three modes of pressure, and the centre
     right: Array  # (5, 16)
-    own: Array  # (16, 16) their product
-
-
-class OverstressWork(NamedTuple):
-    """Memory for what relaxing tissue adds to one element; x of a node, then its y."""
-
-    full: Array  # (18, 18) tangent, lower half by nodes
-    own: Array  # (18,) forces
-    points: Array  # (4, 9) F T and F^-T times the gradients, x and y of each
-    across: Array  # (2, 17) stiffness between the centre and the others, and the force on it
+    own: Array  # (18, 18) their product, and what is added to it
 
 
 class BodyState(NamedTuple):
@@ -88,24 +93,6 @@ class BodyState(NamedTuple):
     pressure: Array  # (e, 3) modes
 
 
-class ProbeArrays(NamedTuple):
-    """Places inside elements, p of them."""
-
-    element: Narrow  # (p,)
-    grad_x: Array  # (p, 9) gradients of the shape functions there [1/mm]
-    grad_y: Array  # (p, 9)
-    modes: Array  # (p, 3) pressure modes there
-
-
-class LinearMesh(NamedTuple):
-    """Elements of a body at small strain, and what they are made of."""
-
-    place: Array  # (nodes, 2) undeformed positions [mm]
-    nodes: Indices  # (e, 9)
-    shear: Array  # (e,) [MPa]
-    lame: Array  # (e,) [MPa]
-
-
 class ShapeFunctions(NamedTuple):
     """The shape functions of nine nodes at the quadrature points."""
 
@@ -113,32 +100,6 @@ class ShapeFunctions(NamedTuple):
     along: Array  # (q, 9) slopes along the first local coordinate
     up: Array  # (q, 9) and along the second
     weights: Array  # (q,)
-
-
-class LinearElements(NamedTuple):
-    """What is filled of elements at small strain; displacements are ordered x, y, x, y, ... within each."""
-
-    stiffness: Array  # (e, 18, 18) [N/mm per mm]
-    dilatation: Array  # (e, 3, 18) displacements to the modes 1, x - xc, y - yc of the volume strain
-    centre: Array  # (e, 2) xc, yc [mm]
-    recovery_matrix: Array  # (e, 2, 16): displacement of the centre node = -(recovery_matrix @ outer displacements)
-
-
-class LinearWork(NamedTuple):
-    """Memory for one element at small strain; columns are x of nine nodes, then y."""
-
-    h: Array  # (q, 18) gradients
-    bent: Array  # (q, 18) those times weight and shear modulus
-    modes: Array  # (q, 3) weights times 1, x - xc, y - yc
-    d: Array  # (3, 18) volume strain by modes that are orthonormal over the element
-    root: Array  # (3, 3) L of the Cholesky factor of the mass of the modes
-
-
-class RecoveryArrays(NamedTuple):
-    """What recovers the centre nodes of elements at small strain."""
-
-    nodes: Indices  # (e, 9)
-    recovery_matrix: Array  # (e, 2, 16)
 
 
 class SymbolicFactorization(NamedTuple):

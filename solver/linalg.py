@@ -8,13 +8,13 @@ matrix. The work grows like unknowns^1.5.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from solver._kernels import multifrontal
 from solver._kernels.compiling import bind_arguments
-from solver.arrays import Array, Factors, Indices, Narrow, SymbolicFactorization
+from solver.arrays import Array, Factors, Flags, Indices, Narrow, SymbolicFactorization
 from solver.mesh import Mesh, distinct
 
 
@@ -216,41 +216,61 @@ def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
     return (np.cumsum(room) - room)[slot], int(room.sum())
 
 
-class Elimination:
-    """One body's tangent, eliminated again and again; the memory is set aside once."""
+class Some(NamedTuple):
+    """Elements whose displacements are wanted."""
 
-    def __init__(self, plan: SymbolicFactorization) -> None:
-        """Set memory aside for `plan`."""
+    parts: Flags  # (p,) of the elimination that hold their unknowns
+    nodes: Narrow  # (e, 9)
+    unknown: Narrow  # (e, 8, 2)
+    recovery_matrix: Array  # (e, 2, 16): displacement of the centre = -(recovery_matrix @ outer displacements)
+
+
+class Elimination:
+    """One body's tangent, eliminated down to its skin; the memory is set aside once."""
+
+    def __init__(self, plan: SymbolicFactorization, waiting: Array | None = None) -> None:
+        """Set memory aside for `plan`, but for what is `waiting` where that is given."""
         skin = int(plan.border[-1])
         self.plan = plan
         self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
-        self.carried = np.zeros(plan.size)  # L^-1 force, the skin's condensed forces at the end
-        self._still = np.zeros(plan.size)
-        values, waiting = np.empty(plan.factors), np.empty(plan.waiting)
-        self.skin_force = self.carried[plan.size - skin :]
-        self.factors = factors_of(plan, values)
+        values, near = np.empty(plan.factors), np.empty(int((plan.inner + plan.border).max()))
+        waiting = np.empty(plan.waiting) if waiting is None else waiting
+        factors = Factors(
+            plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, values, near
+        )
+        self._every = np.ones(len(plan.start), bool)
         self._eliminate = bind_arguments(multifrontal.eliminate, plan, values, waiting, self.stiffness)
-        self._condense = bind_arguments(multifrontal.condense, self.factors)
-        self._back_substitute = bind_arguments(multifrontal.back_substitute, self.factors)
+        self._condense = bind_arguments(multifrontal.condense, factors)
+        self._back_substitute = bind_arguments(multifrontal.back_substitute, factors)
+        self._displace = bind_arguments(multifrontal.displace, factors)
 
-    def factorise(self, tangent: Array) -> bool:
-        """Eliminate the elements' tangents (e, 16, 16), lower halves; False where that is not possible."""
+    def factorise(self, tangent: Array) -> int:
+        """Eliminate the elements' tangents (e, 16, 16), lower halves; return UNSOLVABLE, INDEFINITE or DEFINITE."""
         return self._eliminate(tangent)
 
     def condense(self, force: Array) -> Array:
-        """Return the forces (m,) that the skin feels of `force` (n,), all of it being kept for `back_substitute`."""
-        self.carried[:] = force
-        self._condense(self.carried)
-        return self.skin_force
+        """Replace `force` (n,) by what `back_substitute` needs of it, and return its end (m,): what the skin feels."""
+        self._condense(force)
+        return force[self.plan.size - len(self.stiffness) :]
 
-    def back_substitute(self, skin: Array, *, still: bool = False) -> Array:
-        """Return all displacements (n,) for the skin's (m,), balancing the forces condensed last, or none of them."""
+    def needed(self, unknowns: Narrow) -> Flags:
+        """Return which parts (p,) hold the displacements of some `unknowns`, -1 being those of none."""
+        plan = self.plan
+        part = np.full(plan.size + 1, len(plan.inner))  # the last stands for no part
+        part[: -len(self.stiffness) - 1] = np.repeat(np.arange(len(plan.inner)), plan.inner)
+        out = np.zeros(len(plan.inner) + 1, bool)
+        out[part[unknowns]] = True
+        out[-1] = False
+        for p, (one, other) in enumerate(plan.children.tolist()):
+            out[p] |= out[one] or out[other]
+        return out[:-1]
+
+    def back_substitute(self, carried: Array, skin: Array) -> Array:
+        """Return all displacements (n,) for the skin's (m,) under a force that was condensed, `carried` (n,)."""
         out = np.empty(self.plan.size)
-        self._back_substitute(self._still if still else self.carried, np.ascontiguousarray(skin), out)
+        self._back_substitute(carried, np.ascontiguousarray(skin), self._every, out)
         return out
 
-
-def factors_of(plan: SymbolicFactorization, values: Array) -> Factors:
-    """Return the factors in `values`, as loops take them."""
-    near = np.empty(int((plan.inner + plan.border).max()))
-    return Factors(plan.start, plan.inner, plan.border, plan.border_at, plan.numbers, plan.factor_at, values, near)
+    def displace(self, carried: Array, skin: Array, some: Some, out: Array) -> None:
+        """Fill the displacements `out` (nodes, 2, c) of some elements for the skin's (c, m) under a condensed force."""
+        self._displace(carried, np.ascontiguousarray(skin), *some, out)

@@ -1,9 +1,19 @@
-"""Elements: forces, tangents and energies of all of them. e elements of nine nodes, q = 9 quadrature points."""
+"""Elements: their integrals, forces and tangents. e elements of nine nodes, q = 9 quadrature points."""
 
 import numpy as np
 
 from solver._kernels.compiling import compiled
-from solver.arrays import Array, BodyState, ElementArrays, ElementSystem, ElementWork, Indices, Narrow, ProbeArrays
+from solver.arrays import (
+    Array,
+    BodyState,
+    ElementArrays,
+    ElementGeometry,
+    ElementSystem,
+    ElementWork,
+    Indices,
+    Narrow,
+    ShapeFunctions,
+)
 
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 
@@ -57,11 +67,74 @@ def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> N
 
 
 @compiled
-def assemble(u: Array, pressure: Array, elements: ElementArrays, system: ElementSystem) -> float:
+def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
+    """Fill the `geometry` of elements whose `nodes` (e, 9) lie at `place` (n, 2); False where one is folded."""
+    px, py, work = np.empty(9), np.empty(9), np.empty(9)
+    for e in range(nodes.shape[0]):
+        gather(place, nodes, e, px, py)
+        if not map_points(e, px, py, shapes, geometry):
+            return False
+        modes, own = geometry.modes[e], geometry.combination[e]
+        m00 = m01 = m02 = m11 = m12 = m22 = 0.0
+        for q in range(9):
+            w, x, y = geometry.weight[e, q], modes[q, 1], modes[q, 2]
+            m00 += w
+            m01 += w * x
+            m02 += w * y
+            m11 += w * x * x
+            m12 += w * x * y
+            m22 += w * y * y
+            work[q] = w
+        l00 = np.sqrt(m00)
+        l10, l20 = m01 / l00, m02 / l00
+        l11 = np.sqrt(m11 - l10 * l10)
+        l21 = (m12 - l20 * l10) / l11
+        l22 = np.sqrt(m22 - l20 * l20 - l21 * l21)
+        own[0, 0], own[1, 1], own[2, 2] = 1.0 / l00, 1.0 / l11, 1.0 / l22
+        own[1, 0], own[2, 1] = -l10 * own[0, 0] * own[1, 1], -l21 * own[1, 1] * own[2, 2]
+        own[2, 0] = -(l20 * own[0, 0] + l21 * own[1, 0]) * own[2, 2]
+        own[0, 1] = own[0, 2] = own[1, 2] = 0.0
+        for q in range(9):
+            x, y = modes[q, 1], modes[q, 2]
+            modes[q, 0], modes[q, 1] = own[0, 0], own[1, 0] + own[1, 1] * x
+            modes[q, 2] = own[2, 0] + own[2, 1] * x + own[2, 2] * y
+        sum_laplace(geometry.grad_x[e], geometry.grad_y[e], work, geometry.laplace[e])
+    return True
+
+
+@compiled
+def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
+    """Fill gradients and weights of an element with nodes at `px`, `py` (9,), and x, y in place of its modes."""
+    values, along, up, weights = shapes
+    centre = geometry.centre[e]
+    centre[0] = centre[1] = 0.0
+    for q in range(9):
+        for i in range(9):
+            centre[0] += values[q, i] * px[i] / 9.0
+            centre[1] += values[q, i] * py[i] / 9.0
+    for q in range(9):
+        x_xi, x_eta, y_xi, y_eta = displacement_gradient(px, py, along[q], up[q])
+        det = x_xi * y_eta - x_eta * y_xi
+        if not det > 0.0:
+            return False
+        a00, a01, a10, a11 = y_eta / det, -y_xi / det, -x_eta / det, x_xi / det
+        x, y = -centre[0], -centre[1]
+        for i in range(9):
+            x += values[q, i] * px[i]
+            y += values[q, i] * py[i]
+            geometry.grad_x[e, q, i] = a00 * along[q, i] + a01 * up[q, i]
+            geometry.grad_y[e, q, i] = a10 * along[q, i] + a11 * up[q, i]
+        geometry.weight[e, q], geometry.modes[e, q, 1], geometry.modes[e, q, 2] = det * weights[q], x, y
+    return True
+
+
+@compiled
+def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
     `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
-    from `u` alone. Where det F is not positive, the system is left half filled.
+    from `u` alone. Unless `anew`, the tangent is one assembled before. Where det F is not positive, the system is left
+    half filled.
     """
     system.force[:] = 0.0
     least = np.inf
@@ -69,23 +142,27 @@ def assemble(u: Array, pressure: Array, elements: ElementArrays, system: Element
     work = ElementWork(
         np.empty((9, 18)), np.empty((9, 18)), np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9),
         np.empty((3, 18)), np.empty(18), np.empty((9, 16)), np.empty((9, 16)), np.empty((9, 9)), np.empty((18, 5)),
-        np.empty((5, 16)), np.empty((16, 16)),
+        np.empty((5, 16)), np.empty((18, 18)),
     )  # fmt: skip
     for e in range(elements.nodes.shape[0]):
         gather(u, elements.nodes, e, ux, uy)
         least = min(least, strain_points(e, ux, uy, pressure, elements, work, system.volume))
         if not least > 0.0:
             return least
-        stiffens = elements.stiffening[e] != PLAIN
         sum_points(e, elements.lame[e], work, system)
-        even = elements.laplace[e]
-        if stiffens:
-            even = work.laplace
-            sum_laplace(e, elements, work)
-        sum_geometric(work)
-        eliminate_centre(e, even, stiffens, work, system)
-        write_tangent(e, even, stiffens, work, system)
-        add_forces(e, elements.unknown, work, system)
+        if anew:
+            stiffens = elements.stiffening[e] != PLAIN
+            if stiffens:
+                sum_laplace(elements.grad_x[e], elements.grad_y[e], work.push, work.laplace)
+            else:
+                for i in range(9):
+                    for c in range(9):
+                        work.laplace[i, c] = elements.shear[e] * elements.laplace[e, i, c]
+            sum_geometric(work)
+            sum_dyads(e, stiffens, work, system)
+            eliminate_centre(e, work, system)
+            write_tangent(e, work, system)
+        add_forces(e, elements.unknown, work.f, system)
     return least
 
 
@@ -138,7 +215,6 @@ def strain_points(
 def sum_points(e: int, lam: float, work: ElementWork, system: ElementSystem) -> None:
     """Fill the derivatives of an element's volume modes, its forces, and what its pressure makes of the tangent."""
     h, s, wide, push, d, f = work.h, work.s, work.wide, work.push, work.d, work.f
-    left, right, dilate = work.left, work.right, system.dilate
     v0, v1, v2 = system.volume[e, 0], system.volume[e, 1], system.volume[e, 2]
     for c in range(18):
         d0 = d1 = d2 = total = 0.0
@@ -149,26 +225,22 @@ def sum_points(e: int, lam: float, work: ElementWork, system: ElementSystem) -> 
             total += push[q] * s[q, c]
         d[0, c], d[1, c], d[2, c] = d0, d1, d2
         f[c] = total + lam * (d0 * v0 + d1 * v1 + d2 * v2)
-    for m in range(3):
-        for c in range(8):
-            dilate[e, m, 2 * c], dilate[e, m, 2 * c + 1] = d[m, c], d[m, 8 + c]
-        dilate[e, m, 16], dilate[e, m, 17] = d[m, 16], d[m, 17]
-        for c in range(16):
-            right[m, c] = d[m, c]
+        work.left[c, 0], work.left[c, 1], work.left[c, 2] = lam * d0, lam * d1, lam * d2
+    if system.more_force.shape[0] > 0:
         for c in range(18):
-            left[c, m] = lam * d[m, c]
+            f[c] += system.more_force[e, c]
 
 
 @compiled
-def sum_laplace(e: int, elements: ElementArrays, work: ElementWork) -> None:
-    """Fill the integrals of the shear modulus, as it has grown, times grad N_i . grad N_j."""
-    grad_x, grad_y, push, out = elements.grad_x, elements.grad_y, work.push, work.laplace
+def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
+    """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus, which is `push` (q,) by weight."""
     for i in range(9):
-        out[i] = 0.0
+        for c in range(9):
+            out[i, c] = 0.0
         for q in range(9):
-            x, y = push[q] * grad_x[e, q, i], push[q] * grad_y[e, q, i]
+            x, y = push[q] * grad_x[q, i], push[q] * grad_y[q, i]
             for c in range(9):
-                out[i, c] += x * grad_x[e, q, c] + y * grad_y[e, q, c]
+                out[i, c] += x * grad_x[q, c] + y * grad_y[q, c]
 
 
 @compiled
@@ -189,11 +261,26 @@ def sum_geometric(work: ElementWork) -> None:
 
 
 @compiled
-def eliminate_centre(e: int, even: Array, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
+def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
+    """Fill `own` (18, 18) with what makes an element stiffer as it is strained, and with what relaxing tissue adds."""
+    s, more, own = work.s, work.more, work.own
+    for i in range(18):
+        for c in range(18):
+            own[i, c] = system.more_tangent[e, i, c] if system.more_tangent.shape[0] > 0 else 0.0
+    if stiffens:
+        for i in range(18):
+            for q in range(9):
+                x = more[q] * s[q, i]
+                for c in range(18):
+                    own[i, c] += x * s[q, c]
+
+
+@compiled
+def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill what eliminates an element's centre, which meets no other element: in the `system`, `left` and `right`."""
-    h, s, more, bend, d = work.h, work.s, work.more, work.bend, work.d
-    by_x, by_y, left, right = work.by_x, work.by_y, work.left, work.right
-    xx, yy, xy = even[8, 8], even[8, 8], 0.0
+    h, bend, d, own, by_x, by_y = work.h, work.bend, work.d, work.own, work.by_x, work.by_y
+    left, right, even, inverse = work.left, work.right, work.laplace, system.condensed_inverse
+    xx, yy, xy = even[8, 8] + own[16, 16], even[8, 8] + own[17, 17], own[17, 16]
     for q in range(9):
         x, y = bend[q] * h[q, 16], bend[q] * h[q, 17]
         xx += x * h[q, 16]
@@ -203,48 +290,41 @@ def eliminate_centre(e: int, even: Array, stiffens: bool, work: ElementWork, sys
         xx += left[16, m] * d[m, 16]
         xy += left[16, m] * d[m, 17]
         yy += left[17, m] * d[m, 17]
-    if stiffens:
-        for q in range(9):
-            xx += more[q] * s[q, 16] * s[q, 16]
-            xy += more[q] * s[q, 16] * s[q, 17]
-            yy += more[q] * s[q, 17] * s[q, 17]
     det = xx * yy - xy * xy
     k00, k01, k11 = yy / det, -xy / det, xx / det
-    system.condensed_inverse[e, 0], system.condensed_inverse[e, 1], system.condensed_inverse[e, 2] = k00, k01, k11
+    inverse[e, 0], inverse[e, 1], inverse[e, 2] = k00, k01, k11
     for c in range(16):
-        i = c % 8
-        if c < 8:
-            x, y = by_x[8, i] + even[8, i], by_x[8, 8 + i]
+        i, a = c % 8, c // 8
+        x, y = own[16, c], own[17, c]
+        if a == 0:
+            x += by_x[8, i] + even[8, i]
+            y += by_x[8, 8 + i]
         else:
-            x, y = by_y[8, i], by_y[8, 8 + i] + even[8, i]
+            x += by_y[8, i]
+            y += by_y[8, 8 + i] + even[8, i]
         for m in range(3):
             x += left[16, m] * d[m, c]
             y += left[17, m] * d[m, c]
-        if stiffens:
-            for q in range(9):
-                x += more[q] * s[q, 16] * s[q, c]
-                y += more[q] * s[q, 17] * s[q, c]
+            right[m, c] = d[m, c]
         left[c, 3], left[c, 4] = -x, -y
         right[3, c], right[4, c] = k00 * x + k01 * y, k01 * x + k11 * y
+        system.recovery_matrix[e, 0, 2 * i + a], system.recovery_matrix[e, 1, 2 * i + a] = right[3, c], right[4, c]
 
 
 @compiled
-def write_tangent(e: int, even: Array, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
-    """Fill an element's tangent, lower half, its centre eliminated."""
-    s, more, left, right, own = work.s, work.more, work.left, work.right, work.own
-    by_x, by_y, tangent = work.by_x, work.by_y, system.tangent
+def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
+    """Fill an element's tangent, lower half, its centre eliminated, and how its volume modes follow displacements."""
+    left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
+    by_x, by_y = work.by_x, work.by_y
+    for m in range(3):
+        for c in range(18):
+            system.dilate[e, m, 2 * (c % 8) + c // 8 if c < 16 else c] = work.d[m, c]
     for i in range(16):
         for c in range(16):
             total = 0.0
             for m in range(5):
                 total += left[i, m] * right[m, c]
-            own[i, c] = total
-    if stiffens:
-        for i in range(16):
-            for q in range(9):
-                x = more[q] * s[q, i]
-                for c in range(16):
-                    own[i, c] += x * s[q, c]
+            own[i, c] += total
     for i in range(8):
         for c in range(i + 1):
             tangent[e, 2 * i, 2 * c] = own[i, c] + by_x[i, c] + even[i, c]
@@ -254,75 +334,16 @@ def write_tangent(e: int, even: Array, stiffens: bool, work: ElementWork, system
 
 
 @compiled
-def add_forces(e: int, unknown: Narrow, work: ElementWork, system: ElementSystem) -> None:
-    """Add an element's forces, its centre eliminated, and fill what recovers the centre."""
-    f, right, force, recovery_matrix = work.f, work.right, system.force, system.recovery_matrix
+def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None:
+    """Add an element's forces `f` (18,), its centre eliminated, and fill what recovers the centre under them."""
+    recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse
     for m in range(2):
-        for c in range(8):
-            recovery_matrix[e, m, 2 * c], recovery_matrix[e, m, 2 * c + 1] = right[3 + m, c], right[3 + m, 8 + c]
-        k0, k1 = system.condensed_inverse[e, m], system.condensed_inverse[e, m + 1]
-        recovery_matrix[e, m, 16] = k0 * f[16] + k1 * f[17]
+        recovery_matrix[e, m, 16] = inverse[e, m] * f[16] + inverse[e, m + 1] * f[17]
     for c in range(16):
-        row = unknown[e, c % 8, c // 8]
+        i, a = c % 8, c // 8
+        row, at = unknown[e, i, a], 2 * i + a
         if row >= 0:
-            force[row] += f[c] - right[3, c] * f[16] - right[4, c] * f[17]
-
-
-@compiled
-def forces(u: Array, elements: ElementArrays, system: ElementSystem) -> float:
-    """Fill the internal forces at displacements `u` for a tangent assembled elsewhere; return the least det F.
-
-    Of that tangent are `recovery_matrix` and `condensed_inverse`, by which the centres are eliminated. Filled: `force`,
-    the last column of `recovery_matrix`, and `volume`.
-    """
-    grad_x, grad_y, weight, modes, _, shear, stiffening, lame, nodes, unknown = elements
-    _, force, recovery_matrix, condensed_inverse, _, volume = system
-    force[:] = 0.0
-    least = np.inf
-    ux, uy = np.empty(9), np.empty(9)
-    fx, fy = np.empty(9), np.empty(9)
-    inverse, stress = np.empty((9, 4)), np.empty((9, 4))  # transposed, and without the pressure, at quadrature points
-    for e in range(nodes.shape[0]):
-        gather(u, nodes, e, ux, uy)
-        v0 = v1 = v2 = 0.0
-        for q in range(9):
-            h00, f01, f10, h11 = displacement_gradient(ux, uy, grad_x[e, q], grad_y[e, q])
-            grown = volume_growth(h00, f01, f10, h11)
-            f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
-            least = min(least, j)
-            if not j > 0.0:
-                return least
-            w = weight[e, q]
-            log = np.log1p(grown)
-            v0 += w * modes[e, q, 0] * log
-            v1 += w * modes[e, q, 1] * log
-            v2 += w * modes[e, q, 2] * log
-            g = w * shear[e]
-            if stiffening[e] != PLAIN:
-                g *= stiffened(stiffening[e], excess_of(h00, f01, f10, h11, log))[0]
-            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j
-            inverse[q, 0], inverse[q, 1], inverse[q, 2], inverse[q, 3] = a00, a01, a10, a11
-            stress[q, 0], stress[q, 1] = g * (h00 - h11 + grown * f00) / j, g * (f01 - a01)  # as exactly
-            stress[q, 2], stress[q, 3] = g * (f10 - a10), g * (h11 - h00 + grown * f11) / j
-        volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
-        fx[:] = 0.0
-        fy[:] = 0.0
-        for q in range(9):
-            gx, gy = grad_x[e, q], grad_y[e, q]
-            push = lame[e] * weight[e, q] * (modes[e, q, 0] * v0 + modes[e, q, 1] * v1 + modes[e, q, 2] * v2)
-            p00, p01 = stress[q, 0] + push * inverse[q, 0], stress[q, 1] + push * inverse[q, 1]
-            p10, p11 = stress[q, 2] + push * inverse[q, 2], stress[q, 3] + push * inverse[q, 3]
-            for i in range(9):
-                fx[i] += p00 * gx[i] + p01 * gy[i]
-                fy[i] += p10 * gx[i] + p11 * gy[i]
-        recovery_matrix[e, 0, 16] = condensed_inverse[e, 0] * fx[8] + condensed_inverse[e, 1] * fy[8]
-        recovery_matrix[e, 1, 16] = condensed_inverse[e, 1] * fx[8] + condensed_inverse[e, 2] * fy[8]
-        for i in range(16):
-            row = unknown[e, i // 2, i % 2]
-            if row >= 0:
-                mine = fx[i // 2] if i % 2 == 0 else fy[i // 2]
-                force[row] += mine - recovery_matrix[e, 0, i] * fx[8] - recovery_matrix[e, 1, i] * fy[8]
-    return least
+            system.force[row] += f[c] - recovery_matrix[e, 0, at] * f[16] - recovery_matrix[e, 1, at] * f[17]
 
 
 @compiled
@@ -359,32 +380,3 @@ def advance(
                 change += dilate[e, m, i] * move[i]
             pressure_new[e, m] = pressure[e, m] + scale * (lame[e] * change - pressure[e, m])
     return largest
-
-
-@compiled
-def energies(u: Array, elements: ElementArrays, probes: ProbeArrays, out: Array) -> None:
-    """Fill `out` (p,) with the strain-energy density at probes; ln J is the element's best fit by its three modes."""
-    modes, nodes = elements.modes, elements.nodes
-    ux, uy = np.empty(9), np.empty(9)
-    seen = -1
-    v0 = v1 = v2 = 0.0
-    for p in range(probes.element.shape[0]):
-        e = probes.element[p]
-        if e != seen:
-            gather(u, nodes, e, ux, uy)
-            v0 = v1 = v2 = 0.0
-            for q in range(9):
-                xx, xy, yx, yy = displacement_gradient(ux, uy, elements.grad_x[e, q], elements.grad_y[e, q])
-                log = elements.weight[e, q] * np.log1p(volume_growth(xx, xy, yx, yy))
-                v0 += log * modes[e, q, 0]
-                v1 += log * modes[e, q, 1]
-                v2 += log * modes[e, q, 2]
-            seen = e
-        xx, xy, yx, yy = displacement_gradient(ux, uy, probes.grad_x[p], probes.grad_y[p])
-        fit = probes.modes[p, 0] * v0 + probes.modes[p, 1] * v1 + probes.modes[p, 2] * v2
-        excess = excess_of(xx, xy, yx, yy, np.log1p(volume_growth(xx, xy, yx, yy)))
-        exponent = elements.stiffening[e]
-        if exponent != PLAIN:
-            half = np.sinh(exponent / 2.0 * np.arcsinh(0.5 * np.sqrt(max(excess, 0.0))))
-            excess = 16.0 / exponent**2 * half * half
-        out[p] = 0.5 * elements.shear[e] * excess + 0.5 * elements.lame[e] * fit * fit

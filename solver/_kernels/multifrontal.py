@@ -8,18 +8,23 @@ U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows 
 import numpy as np
 
 from solver._kernels.compiling import compiled
-from solver.arrays import Array, Factors, Narrow, SymbolicFactorization
+from solver.arrays import Array, Factors, Flags, Narrow, SymbolicFactorization
+
+UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # what `eliminate` returns
 
 
 @compiled
-def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> bool:
-    """Fill `factors` and the skin's stiffness `skin` (m, m); False where a pivot is zero.
+def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> int:
+    """Fill `factors` and the skin's stiffness `skin` (m, m); return UNSOLVABLE where a pivot is zero, else the sign.
+
+    That is DEFINITE where every pivot is positive, as those of a stable body are, else INDEFINITE.
 
     `tangent` (e, 16, 16), lower half, of the elements; `factors` and `waiting` are memory as large as `plan` says.
     There is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to
     an equilibrium.
     """
     inner, border, factor_at, wait_at = plan.inner, plan.border, plan.factor_at, plan.wait_at
+    sign = DEFINITE
     for p in range(inner.shape[0]):
         k, b = inner[p], border[p]
         wide = k + b
@@ -35,13 +40,16 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
                 below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
                 _add_child(below, plan.place[first : first + size], plan.run[first : first + size], top, rest)
         if not _factorised(top, rest):
-            return False
+            return UNSOLVABLE
+        for i in range(k):
+            if not top[i, i] > 0.0:
+                sign = INDEFINITE
     m = skin.shape[0]
     last = waiting[wait_at[-1] : wait_at[-1] + m * m].reshape(m, m)
     for i in range(m):
         for j in range(i, m):
             skin[i, j] = skin[j, i] = last[i, j]
-    return True
+    return sign
 
 
 @compiled
@@ -229,10 +237,43 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
 
 
 @compiled
-def back_substitute(carried: Array, skin: Array, out: Array, factors: Factors) -> None:
-    """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,)."""
+def back_substitute(carried: Array, skin: Array, needed: Flags, out: Array, factors: Factors) -> None:
+    """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,).
+
+    Parts of the body that are not `needed` (p,) are left out.
+    """
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):
         out[first + i] = skin[i]
-    for p in range(factors.start.shape[0] - 1, -1, -1):
-        back_substitute_part(p, carried, factors, out)
+    for p in range(needed.shape[0] - 1, -1, -1):
+        if needed[p]:
+            back_substitute_part(p, carried, factors, out)
+
+
+@compiled
+def displace(
+    carried: Array,
+    skin: Array,
+    needed: Flags,
+    nodes: Narrow,
+    unknown: Narrow,
+    recovery_matrix: Array,
+    out: Array,
+    factors: Factors,
+) -> None:
+    """Fill the displacements `out` (n, 2, c) of `nodes` (e, 9) by their `unknown` (e, 8, 2), for the skin's (c, m).
+
+    Those of the centres follow from the others by `recovery_matrix` (e, 2, 16).
+    """
+    inside = np.zeros(carried.shape[0])
+    for c in range(skin.shape[0]):
+        back_substitute(carried, skin[c], needed, inside, factors)
+        for e in range(nodes.shape[0]):
+            x = y = 0.0
+            for i in range(16):
+                row = unknown[e, i // 2, i % 2]
+                move = inside[row] if row >= 0 else 0.0
+                out[nodes[e, i // 2], i % 2, c] = move
+                x -= recovery_matrix[e, 0, i] * move
+                y -= recovery_matrix[e, 1, i] * move
+            out[nodes[e, 8], 0, c], out[nodes[e, 8], 1, c] = x, y

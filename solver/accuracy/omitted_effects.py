@@ -144,12 +144,12 @@ def _finite_strain(finger: LinearFinger, displacement: Array) -> dict[str, Any]:
     gradient = probes.displacement_gradient(mesh, displacement)
     f = gradient + np.eye(2)
     det = determinant(f)
-    shear, lame = elastic.shear[probes.element], elastic.lame[probes.element]
+    shear, lame = elastic.elements.shear[probes.element], elastic.elements.lame[probes.element]
     estimate = None
     if det.min() > 0.0:
         log = np.log(det)
         finite = shear / 2.0 * (np.sum(f * f, axis=(1, 2)) - 2.0 - 2.0 * log) + lame / 2.0 * log**2
-        hooke = elastic.energy(mesh, probes, displacement[:, :, None])[:, 0]
+        hooke = elastic.energy(probes, displacement[:, :, None])[:, 0]
         estimate = abs(float(weights @ finite) / float(weights @ hooke) - 1.0)
     strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
     at_ending = float(np.abs(np.linalg.eigvalsh(strain)).max())

@@ -1,16 +1,20 @@
 """A body: what is asked of it as a whole, as Newton sees it, condensed to its skin, and of places inside it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property, lru_cache
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import NDArray
 
-from solver.arrays import Array, Indices, Narrow, inverse
-from solver.mesh import Q2P1, Mesh
+from solver._kernels import elements as element_loops
+from solver._kernels.compiling import HELD_X, HELD_Y
+from solver.arrays import Array, ElementArrays, ElementGeometry, Indices, Narrow, ShapeFunctions, inverse
+from solver.constitutive import PLAIN, Elasticity, LocalState
+from solver.mesh import Q2P1, Mesh, distinct
 from solver.tolerances import UNHELD
 
 
@@ -147,7 +151,9 @@ class CondensedLinear:
         inverse = np.asarray(np.linalg.inv(inside), np.float64)
         if not np.abs(inside).max(initial=0.0) * np.abs(inverse).max(initial=0.0) < UNHELD:
             raise LinAlgError("the body is neither held nor balanced")
-        out = np.block([[np.zeros(self.stiffness.shape), self.motions], [self.motions.T, np.zeros((count, count))]])
+        size = len(self.stiffness)
+        out = np.zeros((size + count, size + count))
+        out[:size, size:], out[size:, :size] = self.motions, self.motions.T
         out[np.ix_(free, free)] = (inverse + inverse.T) / 2.0
         return out
 
@@ -250,20 +256,142 @@ class Endings:
         return total / self.areas[wide]
 
 
-class Patches(Protocol):
-    """Endings of one body, r of them."""
+VALUES, _SLOPES = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
+_SHAPES = ShapeFunctions(
+    VALUES, np.ascontiguousarray(_SLOPES[..., 0]), np.ascontiguousarray(_SLOPES[..., 1]), Q2P1.weights
+)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshElements:
+    """The elements of a mesh, integrated: e of them, q = 9 quadrature points each.
+
+    What is driven is fixed; centre nodes meet no other element and are eliminated inside their own.
+    """
+
+    mesh: Mesh
+    elements: ElementArrays  # as loops take them; modes are orthonormal over the element
+    centre: Array  # (e, 2) the modes are combinations of 1, x - centre, y - centre [mm]
+    combination: Array  # (e, 3, 3) mode m = sum over l of combination[m, l] (1, x - centre, y - centre)[l]
+
+    @classmethod
+    def of(cls, mesh: Mesh, materials: Sequence[Elasticity]) -> Self:
+        """Integrate the elements of `mesh`, of `materials` by region. Raises LinAlgError where one is folded."""
+        return cls(*integrated(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
+
+    def volume_modes(self, volume: Array, element: Indices | slice = slice(None)) -> Array:
+        """Return the modes (e, 3, ...) that fit a measure of `volume` (e, q, ...) best."""
+        return np.einsum("eq,eqm,eq...->em...", self.elements.weight[element], self.elements.modes[element], volume)
+
+    def volume(self, xx: Array, xy: Array, yx: Array, yy: Array) -> Array:  # noqa: ARG002 - as at finite strain
+        """Return the measure of volume change of a displacement gradient: its trace at small strain, else ln J."""
+        return xx + yy
+
+    def state(self, probes: "Probes", displacement: Array, tangent: Array | None = None) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
+
+        `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
+        """
+        of = self.elements
+        wide = (slice(None), *([None] * (displacement.ndim - 2)))
+        gradient = probes.displacement_gradient(self.mesh, displacement)
+        held, place = np.unique(probes.element, return_inverse=True)
+        local = displacement[self.mesh.elements[held]]
+        local = (local - local[:, 8:]).reshape(len(local), 9, -1)
+        shape = (len(held), 9, *displacement.shape[1:])
+        by_x, by_y = (np.moveaxis((grad[held] @ local).reshape(shape), 2, 0) for grad in (of.grad_x, of.grad_y))
+        fit = self.volume_modes(self.volume(by_x[0], by_y[0], by_x[1], by_y[1]), held)[place]
+        along = np.array([[1.0, 0.0]]) if tangent is None else tangent
+        return LocalState(
+            xx=gradient[:, 0, 0],
+            xy=gradient[:, 0, 1],
+            yx=gradient[:, 1, 0],
+            yy=gradient[:, 1, 1],
+            dilatation=np.einsum("pm,pm...->p...", self.combined(probes), fit),
+            shear=of.shear[probes.element][wide],
+            lame=of.lame[probes.element][wide],
+            stiffening=of.stiffening[probes.element][wide],
+            tangent=(along[:, 0][wide], along[:, 1][wide]),
+        )
+
+    @cached_property
+    def divergence(self) -> Array:
+        """Matrices (e, 3, 18) from displacements of elements' nodes, x, y, x, y, ..., to the modes of their trace."""
+        weighted = np.swapaxes(self.elements.weight[:, :, None] * self.elements.modes, 1, 2)
+        by_axis = np.stack([weighted @ self.elements.grad_x, weighted @ self.elements.grad_y], axis=-1)
+        return by_axis.reshape(-1, 3, 18)
+
+    def combined(self, probes: "Probes") -> Array:
+        """Return the elements' own modes (p, 3) at probes."""
+        return (self.combination[probes.element] @ probes.modes[:, :, None])[:, :, 0]
+
+
+@lru_cache(maxsize=4)  # bodies of one mesh and several materials follow one another
+def _geometry(mesh: Mesh) -> tuple[Array, ...]:
+    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
+
+    Raises LinAlgError where an element is folded.
+    """
+    count = len(mesh.elements)
+    sizes = (9, 9), (9, 9), (9,), (9, 3), (9, 9), (2,), (3, 3)
+    out = tuple(np.empty((count, *size)) for size in sizes)
+    if not element_loops.integrate(mesh.nodes, mesh.elements, _SHAPES, ElementGeometry(*out)):
+        raise LinAlgError("an element is folded")
+    return out
+
+
+def integrated(
+    mesh: Mesh, materials: Sequence[Elasticity], unknown: Narrow
+) -> tuple[Mesh, ElementArrays, Array, Array]:
+    """Return what `MeshElements` are made of; `unknown` (e, 16) are those of their outer nodes, -1 where fixed.
+
+    Raises LinAlgError where an element is folded.
+    """
+    shear, lame, stiffening = (
+        np.array(numbers, np.float64)[mesh.region]
+        for numbers in zip(*((m.shear, m.lame, getattr(m, "stiffening", PLAIN)) for m in materials), strict=True)
+    )
+    grad_x, grad_y, weight, modes, laplace, centre, combination = _geometry(mesh)
+    elements = ElementArrays(
+        grad_x, grad_y, weight, modes, laplace, shear, stiffening, lame, mesh.elements.astype(np.int32),
+        unknown.reshape(-1, 8, 2),
+    )  # fmt: skip
+    return mesh, elements, centre, combination
+
+
+def held(mesh: Mesh) -> Narrow:
+    """Return whether each node of the skin is held (k,): along x HELD_X, along y HELD_Y, both their sum."""
+    return (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
+class Patches:
+    """Endings of a body, averaged over r patches."""
+
+    elements: MeshElements
+    endings: Endings
+    quantities: ClassVar[tuple[Callable[[LocalState], Array], ...]]  # of the kinematics, SED first
 
     def nodes(self) -> Indices:
         """Return the numbers of the nodes whose displacements count."""
-        ...
+        return distinct(self.elements.mesh.elements[distinct(self.endings.probes.element)])
+
+    def state(self, displacement: Array) -> LocalState:
+        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
+        return self.elements.state(self.endings.probes, displacement, self.endings.tangent)
+
+    def energy(self, displacement: Array) -> Array:
+        """Return the SED at the places (p, ...) [MPa] for displacements (nodes, 2, ...)."""
+        return self.quantities[0](self.state(displacement))
 
     def average(self, displacement: Array) -> Array:
         """Return the SED averaged over each (r, ...) [MPa] for displacements (nodes, 2, ...); nan where no patch."""
-        ...
+        return self.endings.means(self.energy(displacement))
 
     def responses(self, displacement: Array) -> Array:
         """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
-        ...
+        state = self.state(displacement)
+        return np.stack([self.endings.means(quantity(state)) for quantity in self.quantities])
 
 
 def local_coordinates(corners: Array, points: Array, start: Array) -> Array:

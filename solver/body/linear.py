@@ -10,101 +10,53 @@ from typing import Literal
 import numpy as np
 from numpy.linalg import LinAlgError
 
-from solver._kernels import hooke, multifrontal
-from solver._kernels.compiling import HELD_X, HELD_Y
-from solver.arrays import (
-    Array,
-    Indices,
-    LinearElements,
-    LinearMesh,
-    RecoveryArrays,
-    ShapeFunctions,
-    determinant,
-    inverse,
-)
-from solver.body import CondensedLinear, Endings, Probes
+from solver._kernels import elements as element_loops
+from solver._kernels.multifrontal import DEFINITE
+from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
+from solver.body import CondensedLinear, MeshElements, Patches, Probes, held, integrated
 from solver.body.validation import check_body, check_held, check_loads, loose
-from solver.constitutive import PLAIN, Elasticity
-from solver.linalg import factors_of, symbolic_factorization
-from solver.mesh import GAUSS_4, Q2P1, Mesh, distinct, jacobians, line
-from solver.quantities import QUANTITIES, SED, LocalState
+from solver.constitutive import Elasticity
+from solver.linalg import Elimination, Some, symbolic_factorization
+from solver.mesh import GAUSS_4, Q2P1, Mesh, jacobians, line
+from solver.quantities import QUANTITIES, SED
 
-_Q_VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
-_SHAPES = ShapeFunctions(
-    _Q_VALUES, np.ascontiguousarray(_GRADIENTS[..., 0]), np.ascontiguousarray(_GRADIENTS[..., 1]), Q2P1.weights
-)
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 
 
 Carried = tuple[Array, Array]  # a load condensed on the unknowns (n,), and the moves (e, 2) of centres under it alone
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Elastic:
-    """Elements made of Hooke materials: e of them, displacements ordered x, y, x, y, ... within each."""
+class Elastic(MeshElements):
+    """Elements made of Hooke materials; displacements of their nodes are ordered x, y, x, y, ..."""
 
-    stiffness: Array  # (e, 18, 18) [N/mm per mm]
-    dilatation: Array  # (e, 3, 18): displacements to the volume strain's modes 1, x - xc, y - yc
-    centre: Array  # (e, 2) xc, yc of the modes [mm]
-    shear: Array  # (e,) [MPa]
-    lame: Array  # (e,) [MPa]
+    @cached_property
+    def stiffness(self) -> Array:
+        """The integral (e, 18, 18) of 2 G eps:eps + lambda theta^2 [N/mm per mm], theta the volume strain's best fit.
 
-    @staticmethod
-    def of(mesh: Mesh, materials: Sequence[Elasticity]) -> "Elastic":
-        """Integrate the stiffness of every element with 3 x 3 Gauss points; `materials` by region.
-
-        K = integral of 2 G eps:eps + lambda theta^2, where theta is the best fit of the volume strain by 1, x, y. That
-        is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke). Raises
-        LinAlgError where an element is folded.
+        That is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).
         """
-        return condensed_elements(mesh, materials, np.empty((len(mesh.elements), 16, 16)))[0]
+        of = self.elements
+        weight = of.weight[:, :, None] * of.shear[:, None, None]
+        along, up = np.swapaxes(weight * of.grad_x, 1, 2), np.swapaxes(weight * of.grad_y, 1, 2)
+        xy = along @ of.grad_y
+        out = np.swapaxes(of.lame[:, None, None] * self.divergence, 1, 2) @ self.divergence
+        laplace = of.shear[:, None, None] * of.laplace
+        out[:, ::2, ::2] += laplace + along @ of.grad_x
+        out[:, 1::2, 1::2] += laplace + up @ of.grad_y
+        out[:, ::2, 1::2] += np.swapaxes(xy, 1, 2)
+        out[:, 1::2, ::2] += xy
+        return out
 
-    def state(self, mesh: Mesh, probes: Probes, displacement: Array, tangent: Array | None = None) -> LocalState:
-        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
+    def forces(self, local: Array) -> Array:
+        """Return the forces (e, 9, 2) [N/mm] that hold the elements' nodes at displacements `local` (e, 9, 2).
 
-        `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
+        What moves an element as a whole strains nothing, but would drown small strains in round-off.
         """
-        gradient = probes.displacement_gradient(mesh, displacement)
-        held, place = np.unique(probes.element, return_inverse=True)
-        local = displacement[mesh.elements[held]]
-        local = (local - local[:, 8:]).reshape(len(local), 18, -1)
-        volume = (probes.modes[:, None] @ (self.dilatation[held] @ local)[place])[:, 0]
-        wide = (slice(None), *([None] * (displacement.ndim - 2)))
-        half = (gradient[:, 0, 1] + gradient[:, 1, 0]) / 2.0
-        along = np.array([[1.0, 0.0]]) if tangent is None else tangent
-        return LocalState(
-            xx=gradient[:, 0, 0],
-            xy=half,
-            yx=half,
-            yy=gradient[:, 1, 1],
-            dilatation=volume.reshape(half.shape),
-            shear=self.shear[probes.element][wide],
-            lame=self.lame[probes.element][wide],
-            stiffening=np.array(PLAIN),
-            tangent=(along[:, 0][wide], along[:, 1][wide]),
-        )
+        return (self.stiffness @ (local - local[:, 8:]).reshape(-1, 18, 1)).reshape(local.shape)
 
-    def energy(self, mesh: Mesh, probes: Probes, displacement: Array) -> Array:
+    def energy(self, probes: Probes, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...)."""
-        return SED.small(self.state(mesh, probes, displacement))
-
-
-def condensed_elements(mesh: Mesh, materials: Sequence[Elasticity], outer: Array) -> tuple[Elastic, Array]:
-    """Return the elements of `mesh`, and the matrices (e, 2, 16) that recover their centre nodes.
-
-    Filled: `outer` (e, 16, 16), lower half, their stiffness when the centre nodes are eliminated. Raises LinAlgError
-    where an element is folded.
-    """
-    count = len(mesh.elements)
-    shear = np.array([m.shear for m in materials])[mesh.region]
-    lame = np.array([m.lame for m in materials])[mesh.region]
-    filled = LinearElements(
-        np.empty((count, 18, 18)), np.empty((count, 3, 18)), np.empty((count, 2)), np.empty((count, 2, 16))
-    )
-    if not hooke.stiffen(LinearMesh(mesh.nodes, mesh.elements, shear, lame), _SHAPES, filled, outer):
-        raise LinAlgError("an element is folded")
-    stiffness, dilatation, centre, recovery_matrix = filled
-    return Elastic(stiffness, dilatation, centre, shear, lame), recovery_matrix
+        return SED.small(self.state(probes, displacement))
 
 
 class LinearElimination:
@@ -116,50 +68,69 @@ class LinearElimination:
         Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
         """
         plan = symbolic_factorization(mesh)
-        count, width = len(mesh.elements), int(plan.border[-1])
-        values = np.empty(plan.factors)
-        self.stiffness = np.empty((width, width))  # of the skin
+        self.elastic = Elastic(*integrated(mesh, materials, plan.unknown))
+        count = len(mesh.elements)
+        still, self._inverse, self._recovery_matrix = (
+            np.zeros(mesh.nodes.shape),
+            np.zeros((count, 3)),
+            np.zeros((count, 2, 17)),
+        )
         with _ALONE:
             memory = _memory(256 * count + plan.waiting)
-            outer, waiting = memory[: 256 * count].reshape(count, 16, 16), memory[256 * count :]
-            self.elastic, self._recovery_matrix = condensed_elements(mesh, materials, outer)
-            regular = multifrontal.eliminate(outer, plan, values, waiting, self.stiffness)
-        self._factors = factors_of(plan, values)
-        if not regular or not hooke.definite(self._factors):
+            self._inside = Elimination(plan, memory[256 * count :])
+            system = ElementSystem(
+                memory[: 256 * count].reshape(count, 16, 16), np.zeros(plan.size), self._recovery_matrix, self._inverse,
+                np.empty((count, 3, 18)), np.empty((count, 3)), np.zeros((0, 18)), np.zeros((0, 18, 18)),
+            )  # fmt: skip
+            element_loops.assemble(still, np.zeros((count, 3)), True, self.elastic.elements, system)
+            sign = self._inside.factorise(system.tangent)
+        if sign != DEFINITE:
             raise LinAlgError("the stiffness inside the body is not positive definite")
-        self._mesh, self._plan = mesh, plan
+        self._recovery_matrix = self._recovery_matrix[:, :, :16].copy()
+        self.stiffness = self._inside.stiffness
         self.unloaded: Carried = np.zeros(plan.size), np.zeros((count, 2))
+        self._some: dict[bytes | None, tuple[Indices, Some]] = {}
 
     def condense(self, loads: Array) -> Carried:
         """Return dead `loads` (nodes, 2) as the factors carry them."""
-        mesh, plan = self._mesh, self._plan
+        mesh, plan = self.elastic.mesh, self._inside.plan
         centre = loads[mesh.elements[:, 8], :, None]
-        own: Array = np.asarray(np.linalg.solve(self.elastic.stiffness[:, 16:, 16:], centre)[:, :, 0], np.float64)
+        own = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
         passed = (np.swapaxes(self._recovery_matrix, 1, 2) @ centre)[:, :, 0]  # (e, 16)
         free = plan.unknown >= 0
         force = np.zeros(plan.size)
         force[plan.unknown[free]] = -loads[mesh.elements[:, :8]].reshape(-1, 16)[free]
         np.add.at(force, plan.unknown[free], passed[free])
-        multifrontal.condense(force, self._factors)
+        self._inside.condense(force)
         return force, own
 
     def skin_load(self, carried: Carried) -> Array:
         """Return what the skin feels (2 k,) of a load; nothing where it is held."""
-        force = -carried[0][self._plan.size - len(self.stiffness) :]
-        return np.where(self._mesh.driven[self._mesh.skin].ravel(), 0.0, force)
+        mesh = self.elastic.mesh
+        return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -carried[0][len(carried[0]) - len(self.stiffness) :])
 
     def displacement(self, skin: Array, carried: Carried, only: Indices | None = None) -> Array:
         """Return the displacements (nodes, 2, c) that go with those of the skin (2 k, c) under a load.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        needed = np.full(len(self._mesh.nodes), only is None)
-        if only is not None:
-            needed[only] = True
-        out = np.zeros((*self._mesh.nodes.shape, skin.shape[1]))
-        recovery = RecoveryArrays(self._mesh.elements, self._recovery_matrix)
-        hooke.displace(np.ascontiguousarray(skin.T), *carried, needed, self._plan, self._factors, recovery, out)
+        mesh, (used, some) = self.elastic.mesh, self._used(only)
+        out = np.zeros((*mesh.nodes.shape, skin.shape[1]))
+        self._inside.displace(carried[0], skin.T, some, out)
+        out[some.nodes[:, 8]] += carried[1][used, :, None]
         return out
+
+    def _used(self, only: Indices | None) -> tuple[Indices, Some]:
+        """Return the elements of the nodes `only`, or of all."""
+        key = None if only is None else only.tobytes()
+        if key not in self._some:
+            of = self.elastic.elements
+            wanted = np.full(len(self.elastic.mesh.nodes), only is None)
+            wanted[only] = True
+            used = np.flatnonzero(wanted[of.nodes].any(axis=1))
+            parts = self._inside.needed(of.unknown[used])
+            self._some[key] = used, Some(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used])
+        return self._some[key]
 
 
 @lru_cache(maxsize=1)
@@ -208,8 +179,7 @@ class LinearBody:
         moved = np.zeros(mesh.nodes.shape) if prescribed is None else np.array(prescribed, np.float64)
         force = np.zeros(mesh.nodes.shape) if loads is None else np.array(loads, np.float64)
         if prescribed is not None:
-            pushed = whole.elastic.stiffness @ moved[mesh.elements].reshape(-1, 18, 1)
-            force -= mesh.assemble(pushed)
+            force -= mesh.assemble(whole.elastic.forces(moved[mesh.elements]))
         carried = whole.condense(force) if force.any() else whole.unloaded
         condensed = _condensed(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
@@ -270,20 +240,12 @@ class LinearBody:
 
     def forces(self, displacement: Array) -> Array:
         """Do as `Body` says."""
-        return self.mesh.assemble(self.elastic.stiffness @ self._local(displacement).reshape(-1, 18, 1))
+        return self.mesh.assemble(self.elastic.forces(displacement[self.mesh.elements]))
 
     def energy_growth(self, displacement: Array) -> float:
         """Do as `Body` says."""
-        local = self._local(displacement).reshape(-1, 18, 1)
-        return float(np.sum(local * (self.elastic.stiffness @ local)))
-
-    def _local(self, displacement: Array) -> Array:
-        """Return the displacements (e, 9, 2) of the elements' nodes beyond that of the centre.
-
-        What moves an element as a whole strains nothing, but would drown small strains in round-off.
-        """
         local = displacement[self.mesh.elements]
-        return local - local[:, 8:]
+        return float(np.sum((local - local[:, 8:]) * self.elastic.forces(local)))
 
     def smallest_det(self, displacement: Array) -> float:
         """Do as `Body` says, of the corners of elements, where strains are largest."""
@@ -302,7 +264,8 @@ class LinearBody:
 
     def _at_corners(self, displacement: Array) -> Array:
         """Return F transposed (p, 2, 2) at every corner of every element."""
-        return (self._corners @ self._local(displacement)).reshape(-1, 2, 2) + np.eye(2)
+        local = displacement[self.mesh.elements]
+        return (self._corners @ (local - local[:, 8:])).reshape(-1, 2, 2) + np.eye(2)
 
     @cached_property
     def _corners(self) -> Array:
@@ -312,22 +275,15 @@ class LinearBody:
         return np.ascontiguousarray(np.swapaxes(gradient, 2, 3).reshape(-1, 8, 9))
 
 
-@dataclass(frozen=True, eq=False)  # without slots: the energy forms are made when they are first needed
-class LinearPatches:
+class LinearPatches(Patches):
     """Endings of an elastic body at small strain."""
 
-    mesh: Mesh
-    elastic: Elastic
-    endings: Endings
-
-    def nodes(self) -> Indices:
-        """Do as `Patches` says."""
-        return distinct(self.mesh.elements[distinct(self.endings.probes.element)])
+    quantities = tuple(quantity.small for quantity in QUANTITIES)
 
     def average(self, displacement: Array) -> Array:
         """Do as `Patches` says."""
         element, patch, form = self._energy_forms
-        local = displacement[self.mesh.elements[element]]
+        local = displacement[self.elements.mesh.elements[element]]
         local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
         energy = np.einsum("mic,mic->mc", local, form @ local)
         total, first = np.zeros((self.endings.count, energy.shape[1])), np.flatnonzero(np.diff(patch, prepend=-1))
@@ -349,32 +305,28 @@ class LinearPatches:
         roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx and d/dy of shape functions, modes
         sizes = np.sqrt(self.endings.weights[order])[:, None]
         roots[part, place, :18] = np.swapaxes(probes.gradient[order], 1, 2).reshape(-1, 18) * sizes
-        roots[part, place, 18:] = probes.modes[order] * sizes
+        roots[part, place, 18:] = self.elements.combined(probes)[order] * sizes
         sums = np.swapaxes(roots, 1, 2) @ roots
         xx, yx, yy, element = sums[:, :9, :9], sums[:, 9:18, :9], sums[:, 9:18, 9:18], element[first]
         form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
         form[:, :, 0, :, 0], form[:, :, 0, :, 1] = xx + yy / 2.0, yx / 2.0
         form[:, :, 1, :, 0], form[:, :, 1, :, 1] = np.swapaxes(yx, 1, 2) / 2.0, yy + xx / 2.0
-        theta = self.elastic.dilatation[element]
+        theta = self.elements.divergence[element]
         volume = np.swapaxes(theta, 1, 2) @ sums[:, 18:, 18:] @ theta
-        shear, lame = (modulus[element, None, None] for modulus in (self.elastic.shear, self.elastic.lame))
+        shear, lame = (
+            modulus[element, None, None] for modulus in (self.elements.elements.shear, self.elements.elements.lame)
+        )
         # W = G eps:eps + lambda/2 theta^2
         return element, patch[first], shear * form.reshape(-1, 18, 18) + lame / 2.0 * volume
-
-    def responses(self, displacement: Array) -> Array:
-        """Do as `Patches` says."""
-        state = self.elastic.state(self.mesh, self.endings.probes, displacement, self.endings.tangent)
-        return np.stack([self.endings.means(quantity.small(state)) for quantity in QUANTITIES])
 
 
 def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
     """Return the skin of a body by its `stiffness` (2 k, 2 k) and dead `load` (2 k,)."""
-    held = (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
     place = mesh.nodes[mesh.skin]
     (x, y), one, zero = place.T, np.ones(len(place)), np.zeros(len(place))
     shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
     rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
-    skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held)
+    skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held(mesh))
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
     skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * len(place), 0))
     return skin

@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import Elasticity, Law, Prony
+from solver.constitutive import Elasticity, Prony
 from solver.mesh import Q2P1, Mesh, jacobians
 from solver.scene.tables import STIFFENING
 from solver.tolerances import CUT
@@ -74,15 +74,16 @@ def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
             )
 
 
-def check_laws(laws: Sequence[Law]) -> None:
+def check_laws(laws: Sequence[Elasticity]) -> None:
     """Raise BodyError unless `laws` are those of finite strain, their exponents within what the scene file allows."""
     for number, law in enumerate(laws):
-        if not hasattr(law, "stiffening"):
+        exponent = getattr(law, "stiffening", None)
+        if exponent is None:
             raise BodyError(f"material {number}, {law}, is no law of finite strain; give one of solver.constitutive")
         low, high = STIFFENING
-        if not low <= law.stiffening <= high:
+        if not low <= exponent <= high:
             raise BodyError(
-                f"material {number}, {law}, stiffens with the exponent {law.stiffening:g}; it must lie between "
+                f"material {number}, {law}, stiffens with the exponent {exponent:g}; it must lie between "
                 f"{low:g} and {high:g}"
             )
 

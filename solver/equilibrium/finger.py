@@ -18,8 +18,8 @@ from solver._kernels import skin as skin_loops
 from solver._kernels.compiling import SLIP, STICK
 from solver._kernels.contact_system import tributary
 from solver.arrays import Array, Flags, Indices
-from solver.body import Body, Endings, Patches
-from solver.body.finite import VALUES, FiniteBody, FinitePatches
+from solver.body import VALUES, Body, Endings, Patches
+from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import LinearBody, LinearPatches
 from solver.body.receptor import endings, middle
 from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
@@ -166,15 +166,15 @@ class LinearFinger(Finger[LinearPatches]):
 
     def patches(self, placed: Endings) -> LinearPatches:
         """Do as `Finger` says."""
-        return LinearPatches(self.geometry.mesh, self.body.elastic, placed)
+        return LinearPatches(self.body.elastic, placed)
 
     @cached_property
     def ending_by_skin(self) -> Array:
         """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
         endings = self.ending.endings
-        at = self.body.elastic.state(self.geometry.mesh, endings.probes, self.body.every_step())  # (p, 2 k)
+        at = self.body.elastic.state(endings.probes, self.body.every_step())  # (p, 2 k)
         whole = np.sqrt(endings.weights / endings.areas)[:, None]
-        strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, np.sqrt(2.0) * at.xy])
+        strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, at.engineering_shear / np.sqrt(2.0)])
         lines = np.vstack([*(whole * strain), whole * np.sqrt(at.lame / 2.0) * at.dilatation])
         _, sizes, turns = np.linalg.svd(lines, full_matrices=False)
         large = sizes**2 > NO_ENERGY * sizes[0] ** 2
@@ -205,7 +205,7 @@ class FiniteFinger(Finger[FinitePatches]):
 
     def patches(self, placed: Endings) -> FinitePatches:
         """Do as `Finger` says."""
-        return FinitePatches.of(self.body, placed)
+        return FinitePatches(self.body, placed)
 
     def transfer(self, state: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
         """Return `state`, found on `other`, as a start on this mesh."""

@@ -83,12 +83,11 @@ class RelaxingBody:
         """
         form = self._form(step)
         past = self._past(step)
-        load = -np.einsum("eij,ej->ei", self.elastic.stiffness, past)
+        load = -self.elastic.forces(past.reshape(-1, 9, 2))
         moved = np.zeros(self.mesh.nodes.shape)
         if prescribed is not None:
             moved[self.mesh.driven] = prescribed[self.mesh.driven]
-            local = moved[self.mesh.elements].reshape(len(load), 18)
-            load -= np.einsum("eij,ej->ei", form.elastic.stiffness, local)
+            load -= form.elastic.forces(moved[self.mesh.elements])
         nodes = self.mesh.assemble(load)
         nodes[self.mesh.driven] = 0.0
         body, recover = form.under(nodes)
@@ -110,11 +109,12 @@ class RelaxingBody:
         """Return the stored energy density (p,) [MPa]."""
         element = probes.element
         local = self.displacement[self.mesh.elements[element]].reshape(len(element), 18)
-        shear, long_term = self.elastic.shear[element], 1.0 - self._g[element].sum(axis=1)
-        deviator, theta = self._strain(probes, local)
+        shear, long_term = self.elastic.elements.shear[element], 1.0 - self._g[element].sum(axis=1)
+        rows = self.elastic.combined(probes)[:, None] @ self.elastic.divergence[element]
+        deviator, theta = self._strain(probes, rows, local)
         out = shear * long_term * deviator + self._bulk[element] / 2.0 * theta**2
         for term in range(self._left.shape[2]):
-            deviator, _ = self._strain(probes, self._left[element, :, term])
+            deviator, _ = self._strain(probes, rows, self._left[element, :, term])
             out += shear * self._g[element, term] * deviator
         return out
 
@@ -122,11 +122,14 @@ class RelaxingBody:
         """Return the stored energy averaged over each patch (r,) [MPa]; nan where there is no patch."""
         return endings.means(self.energy(endings.probes))
 
-    def _strain(self, probes: Probes, local: Array) -> tuple[Array, Array]:
-        """Return e:e of the strain's deviator and the volume strain (p,) for element displacements (p, 18)."""
+    def _strain(self, probes: Probes, rows: Array, local: Array) -> tuple[Array, Array]:
+        """Return e:e of the strain's deviator and the volume strain (p,) for element displacements (p, 18).
+
+        The latter by its `rows` (p, 1, 18).
+        """
         gradient = np.einsum("pna,pnb->pab", local.reshape(-1, 9, 2), probes.gradient)
         strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
-        theta = np.einsum("pm,pmi,pi->p", probes.modes, self.elastic.dilatation[probes.element], local)
+        theta = (rows @ local[:, :, None])[:, 0, 0]
         return np.sum(strain * strain, axis=(1, 2)) - theta**2 / 3.0, theta
 
     def _past(self, step: float) -> Array:
@@ -154,7 +157,7 @@ class CondensedRelaxing(CondensedFinite):
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
-        super().__init__(body)
+        super().__init__(body, relaxes=True)
         check_moduli(body.mesh, laws)
         check_terms(laws)
         self.past = _at_rest(laws, np.repeat(body.mesh.region, body.elements.weight.shape[1]))
@@ -171,20 +174,17 @@ class CondensedRelaxing(CondensedFinite):
 
     def assemble(self, u: Array, pressure: Array) -> float:
         """Fill tangents and forces at a state and return the least det F."""
-        least = super().assemble(u, pressure)
-        if least > 0.0:
-            self._add(u, anew=True)
-        return least
+        self._add(u)
+        return super().assemble(u, pressure)
 
     def resist(self, u: Array) -> float:
         """Fill the forces at a state for the tangent that is there and return the least det F."""
-        least = super().resist(u)
-        if least > 0.0:
-            self._add(u, anew=False)
-        return least
+        self._add(u)
+        return super().resist(u)
 
-    def _add(self, u: Array, *, anew: bool) -> None:
-        overstress_loops.add_overstress(u, self.tensor, self.body.elements, self.system, anew)
+    def _add(self, u: Array) -> None:
+        more = self.system.more_force, self.system.more_tangent
+        overstress_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
 
     def excess(self, u: Array) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
@@ -240,7 +240,9 @@ class FiniteTissue:
         """Start at rest; `laws` by region, of which the terms and moduli at once are used."""
         self._relaxing, self._watched = CondensedRelaxing(body, laws), watched
         self._newton = Newton(self._relaxing)
-        self._pasts: list[Past] = [_at_rest(laws, body.mesh.region[patches.places.element]) for patches in watched]
+        self._pasts: list[Past] = [
+            _at_rest(laws, body.mesh.region[patches.endings.probes.element]) for patches in watched
+        ]
 
     def ready(self, step: float) -> Newton:
         """Do as `Tissue` says."""

@@ -105,7 +105,7 @@ class Sketch:
 
     def values(self, displacement: Array) -> Array:
         """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
-        state = self.elastic.state(self.mesh, self.probes, displacement)
+        state = self.elastic.state(self.probes, displacement)
         return np.stack([field.small(state) for field in FIELDS])
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:
@@ -141,7 +141,7 @@ def _values(prediction: Prediction, sketch: Sketch) -> Array:
     def values(probes: Probes) -> Array:
         places = Endings(probes, np.ones(count), np.arange(count), count, np.tile([1.0, 0.0], (count, 1)))
         with np.errstate(invalid="ignore", divide="ignore"):  # a node turned inside out has no energy
-            state = FinitePatches.of(body, places).state(prediction.displacement)
+            state = FinitePatches(body, places).state(prediction.displacement)
             return np.stack([field.finite(state) for field in FIELDS])
 
     fields = values(sketch.probes)

@@ -116,10 +116,8 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
         raise ValueError("with friction the normal force is no derivative of an energy")
     mesh = finger.geometry.mesh
     by_depth = finger.body.following(of_skin(finger.newton, state)[:, DEPTH, None])[:, :, 0]
-    moved, slope = (
-        field[mesh.elements].reshape(len(mesh.elements), 18) for field in (finger.displacement(state), by_depth)
-    )
-    work = np.einsum("ei,eij,ej->e", slope, finger.body.elastic.stiffness, moved)
+    forces = finger.body.elastic.forces(finger.displacement(state)[mesh.elements])
+    work = np.sum(by_depth[mesh.elements] * forces, axis=(1, 2))
     return np.bincount(mesh.region, work, minlength=len(TISSUES)) / float(state.normal.sum())
 
 

@@ -101,8 +101,8 @@ def _probed(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:
     elastic = Elastic.of(mesh, settled_moduli(materials))
     row = endings(prediction.geometry, elastic.centre, receptor, arcs)
     if prediction.scene.solve.kinematics == "small":
-        return LinearPatches(mesh, elastic, row)
-    return FinitePatches.of(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
+        return LinearPatches(elastic, row)
+    return FinitePatches(FiniteBody.of(mesh, finite_laws(materials), checked=True), row)
 
 
 FINENESS = 6.0  # elements to a tip radius, at small strain

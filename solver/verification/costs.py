@@ -25,12 +25,11 @@ PARTS = {
     "mesh": "mesh and tables", "body": "assembly", "constitutive": "assembly", "linalg": "factorisation",
     "contact": "contact", "quantities": "receptor", "equilibrium": "iteration", "continuation": "proof of existence",
     "accuracy": "audits", "body.receptor": "receptor", "body.linear.average": "receptor",
-    "body.linear._energy_forms": "receptor", "body.linear.responses": "receptor", "body.finite.average": "receptor",
-    "body.finite.responses": "receptor", "equilibrium.finger": "carrying states",
+    "body.linear._energy_forms": "receptor", "body.average": "receptor", "body.responses": "receptor",
+    "body.state": "receptor", "equilibrium.finger": "carrying states",
     "continuation.small_states": "iteration", "continuation.finite_states": "iteration",
     "accuracy.adaptivity": "iteration",
-    "_kernels.elements": "assembly", "_kernels.elements.energies": "receptor", "_kernels.hooke": "assembly",
-    "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
+    "_kernels.elements": "assembly", "_kernels.overstress": "assembly", "_kernels.multifrontal": "factorisation",
     "_kernels.active_set": "contact", "_kernels.contact_system": "contact", "_kernels.skin": "proof of existence",
 }  # fmt: skip
 WHOLE = {"on_nested": "error estimate", "with_held": "evidence"}  # all that these do, on whatever mesh

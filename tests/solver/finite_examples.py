@@ -6,9 +6,8 @@ import numpy as np
 
 from solver import Finger, Friction, Loading, Materials, Receptor, Scene, Solve
 from solver.body.finite import FiniteBody, FinitePatches
-from solver.body.linear import Elastic
 from solver.body.receptor import endings
-from solver.constitutive import Hooke, NeoHooke
+from solver.constitutive import NeoHooke
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import FiniteFinger
 from solver.mesh import Mesh
@@ -22,8 +21,7 @@ def finger(fineness, indentation=2.0, margin=2.0, nu=0.48):
     tissues = Materials()
     moduli = [tissue.E for tissue in (tissues.epidermis, tissues.dermis, tissues.fat)]
     body = FiniteBody.of(made.mesh, [NeoHooke(E, nu) for E in moduli])
-    elastic = Elastic.of(made.mesh, [Hooke(E, nu) for E in moduli])
-    probes = FinitePatches.of(body, endings(made, elastic.centre, Receptor(), np.zeros(1)))
+    probes = FinitePatches(body, endings(made, body.centre, Receptor(), np.zeros(1)))
     return Newton(body.condensed), probes, made.whole
 
 

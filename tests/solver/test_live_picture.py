@@ -35,7 +35,7 @@ def test_nodes_and_energies_are_those_that_the_body_gives_for_the_same_skin(fing
     probes = Probes.at(
         mesh, elastic.centre, np.full(4, third), np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
     )
-    expected = elastic.energy(mesh, probes, moved[:, :, None])[:, 0]
+    expected = elastic.energy(probes, moved[:, :, None])[:, 0]
     assert picture.sed(state)[4 * third : 4 * third + 4] == pytest.approx(expected, rel=1e-9)
 
 

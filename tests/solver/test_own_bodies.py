@@ -40,8 +40,7 @@ def test_a_halved_mesh_is_the_same_body_and_has_what_the_coarse_one_could_do():
     moved = np.random.default_rng(1).normal(size=mesh.nodes.shape)
     energies = []
     for one, u in ((mesh, moved), (halved.mesh, halved.between(moved))):
-        local = u[one.elements].reshape(len(one.elements), 18)
-        energies.append(np.einsum("ei,eij,ej->", local, Elastic.of(one, laws).stiffness, local))
+        energies.append(np.sum(u[one.elements] * Elastic.of(one, laws).forces(u[one.elements])))
     assert energies[1] == pytest.approx(energies[0], rel=1e-12)
     assert quality(halved.mesh)["jacobian_ratio"] == pytest.approx(1.0)
     assert len(halved.mesh.nodes) == 81

@@ -106,7 +106,7 @@ def test_scaling_all_stiffness_scales_the_answer():
     one = settled(newton, LoadState(1.0, 0.44, 0.02, 1))
     ten = settled(Newton(stiffer.condensed), LoadState(1.0, 0.44, 0.2, 1))
     np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
-    assert replace(probes, body=stiffer).average(ten.u)[0] == pytest.approx(10 * probes.average(one.u)[0], rel=1e-9)
+    assert replace(probes, elements=stiffer).average(ten.u)[0] == pytest.approx(10 * probes.average(one.u)[0], rel=1e-9)
 
 
 @pytest.mark.parametrize("distortion", [0.0, 0.06])

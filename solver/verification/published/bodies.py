@@ -178,11 +178,9 @@ def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     element, local = placed(mesh, points)
     probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
-    strain = (strain + np.swapaxes(strain, 1, 2)) / 2
-    moved = displacement[mesh.elements[element]].reshape(len(points), 18)
-    theta = np.einsum("pm,pmi,pi->p", probes.modes, elastic.dilatation[element], moved)
-    shear, lame = elastic.shear[element, None, None], elastic.lame[element] * theta
-    return 2 * shear * strain + lame[:, None, None] * np.eye(2)
+    at = elastic.state(probes, displacement)
+    pressure = (at.lame * at.dilatation)[:, None, None] * np.eye(2)
+    return at.shear[:, None, None] * (strain + np.swapaxes(strain, 1, 2)) + pressure
 
 
 def touching_within(newton: Newton, half_width: float) -> Indices:

@@ -55,7 +55,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     element = np.repeat(np.arange(len(mesh.elements)), len(_POINTS))
     probes = Probes.at(mesh, body.elastic.centre, element, np.tile(_POINTS, (len(mesh.elements), 1)))
     gradient = probes.displacement_gradient(mesh, displacement)
-    shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.shear[element]
+    shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.elements.shear[element]
     at = _placed(mesh, element)
     closed = -2 * _SHARE * OUTER**2 * at[:, 0] * at[:, 1] / np.sum(at * at, axis=1) ** 2
     energy = 0.5 * float(np.sum(loads * displacement))

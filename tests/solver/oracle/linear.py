@@ -1,12 +1,24 @@
 """A body at small strain assembled and eliminated in plain NumPy: the judge of the compiled loops."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from solver.body.linear import Elastic
+from solver.arrays import Array
 from solver.mesh import Q2P1
 
 _VALUES, _GRADIENTS = Q2P1.shape(Q2P1.points)  # (9 points, 9 nodes), (9, 9, 2)
 _ALONG, _UP = np.ascontiguousarray(_GRADIENTS[..., 0].T), np.ascontiguousarray(_GRADIENTS[..., 1].T)  # (9 nodes, 9)
+
+
+class Plain(NamedTuple):
+    """Elements by their matrices, displacements being ordered x, y, x, y, ..."""
+
+    stiffness: Array  # (e, 18, 18) [N/mm per mm]
+    dilatation: Array  # (e, 3, 18): displacements to the volume strain's modes 1, x - xc, y - yc
+    centre: Array  # (e, 2) xc, yc of the modes [mm]
+    shear: Array  # (e,) [MPa]
+    lame: Array  # (e,) [MPa]
 
 
 def elastic(mesh, materials):
@@ -50,7 +62,7 @@ def elastic(mesh, materials):
     blocks[:, :, 1, :, 1] += both + yy
     blocks[:, :, 0, :, 1] += np.swapaxes(xy, 1, 2)
     blocks[:, :, 1, :, 0] += xy
-    return Elastic(stiff, dilatation, centre, shear, lame)
+    return Plain(stiff, dilatation, centre, shear, lame)
 
 
 class Reduced:

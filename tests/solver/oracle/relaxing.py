@@ -7,9 +7,8 @@ from solver.body.linear import Elastic
 
 def forces(body, laws):
     """Return the forces (nodes, 2) that hold all nodes where they are [N/mm]."""
-    local = body.displacement[body.mesh.elements].reshape(len(body._left), 18)
-    inner = np.einsum("eij,ej->ei", Elastic.of(body.mesh, [law.relaxed for law in laws]).stiffness, local)
-    inner += np.einsum("eij,ejm,em->ei", body.elastic.stiffness, body._left, body._g)
+    inner = Elastic.of(body.mesh, [law.relaxed for law in laws]).forces(body.displacement[body.mesh.elements])
+    inner += body.elastic.forces(np.einsum("ejm,em->ej", body._left, body._g).reshape(-1, 9, 2))
     return body.mesh.assemble(inner)
 
 
@@ -20,8 +19,8 @@ def stress(body, probes):
     springs = local * (1.0 - body._g[element].sum(axis=1))[:, None]
     springs += np.einsum("pim,pm->pi", body._left[element], body._g[element])
     gradient = np.einsum("pna,pnb->pab", springs.reshape(-1, 9, 2), probes.gradient)
-    rows = np.einsum("pm,pmi->pi", probes.modes, body.elastic.dilatation[element])
+    rows = np.einsum("pm,pmi->pi", body.elastic.combined(probes), body.elastic.divergence[element])
     theta, volume = np.sum(rows * springs, axis=1), np.sum(rows * local, axis=1)
-    shear = body.elastic.shear[element]
+    shear = body.elastic.elements.shear[element]
     mean = body._bulk[element] * volume - 2.0 / 3.0 * shear * theta
     return shear[:, None, None] * (gradient + np.swapaxes(gradient, 1, 2)) + mean[:, None, None] * np.eye(2)
