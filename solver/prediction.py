@@ -75,6 +75,7 @@ class NestedNumbers:
     of_edges: Array  # (COUNT,) what they change by when edges of contact move by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
     row_of_edges: Array  # (r,) and what that changes by likewise
+    shares: Array | None = None  # (a + b,) of the SED's error in each column and row of the mesh, where it is too large
 
 
 @dataclass(frozen=True, slots=True, eq=False)

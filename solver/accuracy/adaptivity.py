@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked
+from solver.accuracy.refinement import with_shares
+from solver.arrays import Array
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import nearby, roughly, settled
 from solver.equilibrium import EquilibriumState
@@ -11,7 +13,7 @@ from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.mesh.mesher import Sizing
+from solver.mesh.mesher import Lines, Sizing
 from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
@@ -52,7 +54,7 @@ class Meshes:
         self._coarse: dict[tuple[Scene, Sizing], MeshSolution | SolveFailure] = {}
         self._last: MeshSolution | None = None
 
-    def keep(self, fineness: float) -> None:
+    def keep(self, fineness: float | Lines) -> None:
         """Forget meshes that are neither coarse nor of this fineness."""
         self._fingers = {sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (COARSE, fineness)}
 
@@ -83,7 +85,7 @@ class Meshes:
         return solution
 
 
-def coarse_solution(scene: Scene, expected: float, fineness: float, meshes: Meshes) -> MeshSolution:
+def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
     """Return the settled state on a coarse mesh, from which finer ones begin.
 
     `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
@@ -91,7 +93,7 @@ def coarse_solution(scene: Scene, expected: float, fineness: float, meshes: Mesh
     a mesh of `fineness` itself can tell. Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
-    sizing = Sizing(min(COARSE, fineness), depth, margin=MARGIN)
+    sizing = Sizing(COARSE if isinstance(fineness, Lines) else min(COARSE, fineness), depth, margin=MARGIN)
     beyond = False
     try:
         low = meshes.coarse(scene, sizing)
@@ -141,7 +143,7 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger).last
 
 
-def refine(scene: Scene, fineness: float, low: MeshSolution, meshes: Meshes) -> NestedSolution:
+def refine(scene: Scene, fineness: float | Lines, low: MeshSolution, meshes: Meshes) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
     steps = steps_asked(scene, low.finger, low.state)
     sizing = replace(low.sizing, fineness=fineness)
@@ -164,7 +166,8 @@ def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshe
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
-    begun = _begun(scene, replace(sizing, fineness=ELSEWHERE * sizing.fineness), below, meshes)
+    elsewhere = ELSEWHERE * (COARSE if isinstance(sizing.fineness, Lines) else sizing.fineness)
+    begun = _begun(scene, replace(sizing, fineness=elsewhere), below, meshes)
     return replace(begun, state=settled(begun.finger, scene, begun.state, times))
 
 
@@ -179,11 +182,12 @@ def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) ->
 
 
 def on_nested(
-    scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
+    scene: Scene, top: MeshSolution, numbers: Array, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedNumbers | None, Steps | None]:
     """Return the numbers of a scene on the nested mesh of `top`, None where it has no state there, and its steps.
 
-    `steps` are those taken where the state depends on its way. Raises Cancelled.
+    `numbers` (COUNT,) are those on the mesh of `top`, `steps` those taken where the state depends on its way. Raises
+    Cancelled.
     """
     begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
@@ -200,4 +204,7 @@ def on_nested(
         return None, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
-    return nested_numbers(values, changes, steps), steps
+    nested = nested_numbers(values, changes, steps)
+    if nested is None:
+        return None, steps
+    return with_shares(scene, numbers, nested, steps, (finger, state), changes[:, 0]), steps

@@ -5,8 +5,8 @@ the error of all that both resolve. Errors of quadratic elements beneath a conta
 element, so that the error on H is at most 1 + 1/4 + 1/16 + ... = 4/3 of the change (Roache 1994).
 What two meshes may agree on by chance is where contact states change: an edge of contact, or of skin that sticks or
 slips at the bound, lies anywhere between two nodes. Each edge is moved by one node of h to either side, every other
-state kept, and the linearised body is solved again. The true edge lies within half that distance, so half the larger
-change counts. Edges err independently: their changes are added as squares.
+state kept, and the linearised body is solved again. A third of the larger change counts, since numbers follow an edge
+by a parabola about its true place. Edges err independently: their changes are added as squares.
 
 Much of what a mesh makes wrong is the same for all surfaces of one finger and falls out of their differences. What is
 left in a difference is estimated in the same way: each surface has its edges of contact elsewhere.
@@ -130,32 +130,35 @@ def edge_changes(
     newton: Newton,
     states: Sequence[tuple[EquilibriumState, ForceLoad | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
-) -> tuple[Array, Array]:
-    """Return the numbers (c, n) of states, and what each changes by when its edges of contact move by a node (c, n).
+) -> tuple[Array, list[Array]]:
+    """Return the numbers (c, n) of states, and of each what they change by as each of its m edges of contact moves.
 
-    The latter is the root of the sum of squares over a state's edges. `states` are equilibria, each with the forces it
-    is under or None for its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no
-    equilibrium.
+    That is (m, n), by a node to the worse side. `states` are equilibria, each with the forces it is under or None for
+    its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no equilibrium.
     """
     moved = [_with_moved_edges(newton, state, forces) for state, forces in states]
     known = [one for edges in moved for sides in edges for one in sides if one is not None]
     values = numbers([*(state for state, _ in states), *known])
     here, there = values[: len(states)], iter(values[len(states) :])
-    out = np.zeros_like(here)
-    for number, edges in enumerate(moved):
-        for sides in edges:
-            changes = [np.inf if one is None else np.abs(next(there) - here[number]) for one in sides]
-            out[number] += np.max(np.broadcast_arrays(*changes), axis=0) ** 2
-    np.sqrt(out, out=out)
-    return here, out
+    size = here.shape[1]
+
+    def change(sides: list[EquilibriumState | None], before: Array) -> Array:
+        changes = [np.full(size, np.inf) if one is None else np.abs(next(there) - before) for one in sides]
+        return np.max(changes, axis=0)
+
+    return here, [
+        np.array([change(sides, before) for sides in edges]).reshape(-1, size)
+        for edges, before in zip(moved, here, strict=True)
+    ]
 
 
 def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers | None:
-    """Return what a nested mesh has of one scene: its `values` (COUNT + r,) and what edges of contact change of them.
+    """Return what a nested mesh has of one scene: `values` (COUNT + r,) and their `changes` by edges (m, COUNT + r).
 
     `steps` are those taken where its state depends on its way. None where contact with a moved edge has no equilibrium,
     as at a limit of friction.
     """
+    changes = np.linalg.norm(changes, axis=0)
     if np.isinf(changes).any():
         return None
     numbers = values[:COUNT] if steps is None else steps.taken(values[:COUNT])
@@ -333,7 +336,7 @@ def estimated(
     (corrected,), (edges,) = edge_changes(
         finer, [(there, forces)], lambda states: np.array([numbers(finer, one) for one in states])
     )
-    error = half_width(corrected - value, edges)
+    error = half_width(corrected - value, np.linalg.norm(edges, axis=0))
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

@@ -290,6 +290,16 @@ class LinearPatches(Patches):
         total[patch[first]] = np.add.reduceat(energy, first)
         return (total / self.endings.areas[:, None]).reshape(-1, *displacement.shape[2:])
 
+    def gradient(self, displacement: Array) -> Array:
+        """Return the derivative (nodes, 2) of the first ending's SED by the `displacement` (nodes, 2) [MPa/mm]."""
+        element, patch, form = self._energy_forms
+        mesh, first = self.elements.mesh, patch == 0
+        local = displacement[mesh.elements[element[first]]]
+        local = (local - local[:, 8:]).reshape(len(local), 18, 1)
+        every = np.zeros((len(mesh.elements), 18))
+        every[element[first]] = 2.0 / self.endings.areas[0] * (form[first] @ local)[:, :, 0]
+        return mesh.assemble(every)
+
     @cached_property
     def _energy_forms(self) -> tuple[Indices, Indices, Array]:
         """The parts of patches within one element (m,): element, patch, and the energy as a quadratic form (m, 18, 18).

@@ -129,8 +129,8 @@ class Mesh:
 
 # offsets along the grid's two directions of an element's nodes, for grids whose first direction turns to the second
 # clockwise (as from proximal to distal, then outwards to the skin)
-_ALONG = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])
-_OUT = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])
+ALONG = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])
+OUT = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])
 
 
 class MeshError(ValueError):
@@ -146,7 +146,7 @@ def grid_mesh(points: Array, layers: Indices, skin: slice, held: Indices) -> Mes
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
     first = number[: long - 1 : 2, : wide - 1 : 2].ravel()  # lowest node of each element
-    elements = first[:, None] + _ALONG * wide + _OUT
+    elements = first[:, None] + ALONG * wide + OUT
     region = np.tile(layers, (long - 1) // 2)
     mesh = Mesh(points.reshape(-1, 2), elements, region, number[skin, -1].copy(), held)
     quality(mesh)

@@ -149,10 +149,40 @@ SIZES = ElementSizes()
 
 
 @dataclass(frozen=True, slots=True)
+class Lines:
+    """Where the lines between elements lie, in the order of the nodes: from proximal to distal, and outwards."""
+
+    arcs: tuple[float, ...]  # arc positions of those across the tissue [mm]
+    bone: tuple[float, ...]  # of those along it, in a meshed bone: radii, from the core to 1, by the bone's; else none
+    fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
+    skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
+
+    @property
+    def rows(self) -> int:
+        """Number of elements across the tissue."""
+        return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
+
+    def divided(self, columns: Indices, rows: Indices) -> "Lines":
+        """Return the lines with each gap between two in so many equal parts: `columns` (a,) and `rows` (b,) of them."""
+        bone, fat = max(len(self.bone) - 1, 0), len(self.fat) - 1
+        return Lines(
+            _divided(self.arcs, columns),
+            _divided(self.bone, rows[:bone]),
+            _divided(self.fat, rows[bone : bone + fat]),
+            _divided(self.skin, rows[bone + fat :]),
+        )
+
+
+def _divided(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
+    gaps = zip(pairwise(lines), parts.tolist(), strict=True)
+    return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])
+
+
+@dataclass(frozen=True, slots=True)
 class Sizing:
     """How fine the mesh is, and where."""
 
-    fineness: float  # elements to a tip radius
+    fineness: float | Lines  # elements to a tip radius, or where lines lie
     indentation: float  # the skin that lies lower than this may touch [mm]
     shift: bool = False  # move the mesh along the skin by half an element
     margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
@@ -167,6 +197,7 @@ class FingerMesh:
     mesh: Mesh
     outline: Outline
     sizing: Sizing
+    lines: Lines  # before elements are halved
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
     fat: int  # elements below the dermis: of the fat, and of the bone where it is meshed
@@ -187,28 +218,23 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     Raises MeshError where the outline cannot be meshed.
     """
     outline = Outline.of(finger)
-    size = finger.tip_radius / sizing.fineness
-    fine = _fine(outline, sizing)
-    row = _Row.of(outline, fine, receptor, sizing)
-    arcs = row.lines(row.gaps(), shift=sizing.shift)
-    lines, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else SIZES.thin * _fold(finger))
+    base = sizing.fineness if isinstance(sizing.fineness, Lines) else _lines(outline, receptor, sizing, sizing.fineness)
+    lines = base
     if sizing.halved:
-        arcs, lines, fat = with_middles(arcs), with_middles(lines), with_middles(fat)
+        lines = base.divided(np.full(len(base.arcs) - 1, 2), np.full(base.rows, 2))
+    arcs, depths, fat = np.array(lines.arcs), np.array(lines.skin), np.array(lines.fat)
     every_arc = with_middles(arcs)
-    depths = with_middles(lines)
-    core = outline.tissue(every_arc, np.asarray(lines[0]))[:, None]
+    core = outline.tissue(every_arc, depths[0])[:, None]
     bone = outline.bone(every_arc)[:, None]
     inner = bone + (core - bone) * with_middles(fat)[:-1, None]
-    points = np.concatenate([inner, outline.tissue(every_arc[:, None], depths[None, :])], axis=1)
-    skin = np.where(_middles(lines) > finger.epidermis, DERMIS, EPIDERMIS)
-    layers = np.concatenate([np.full(len(fat) - 1, FAT), skin])
-    below = len(fat) - 1
-    if finger.bone == "meshed":
-        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (SIZES.bulk * size))) * (2 if sizing.halved else 1)
-        parts = np.linspace(CORE, 1.0, 2 * count + 1)[:-1]
-        points = np.concatenate([outline.bone(every_arc[:, None], parts), points], axis=1)
-        layers = np.concatenate([np.full(len(parts) // 2, BONE), layers])
-        below += len(parts) // 2
+    points = np.concatenate([inner, outline.tissue(every_arc[:, None], with_middles(depths)[None, :])], axis=1)
+    skin = np.where(_middles(depths) > finger.epidermis, DERMIS, EPIDERMIS)
+    below = lines.rows - len(skin)
+    layers = np.concatenate([np.full(below, FAT), skin])
+    if lines.bone:
+        radii = with_middles(np.array(lines.bone))[:-1]
+        points = np.concatenate([outline.bone(every_arc[:, None], radii), points], axis=1)
+        layers[: len(radii) // 2] = BONE
     low, high = _touchable(outline, arcs, sizing)
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
@@ -225,7 +251,21 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
         high = min(high, int(nail[0]) // 2 - 1)
         loose &= _far(arcs, outline.dorsal, outline.nail_end, finger)
     mesh = grid_mesh(points, layers, slice(2 * low, 2 * high + 1), distinct(np.concatenate(held)))
-    return FingerMesh(mesh, outline, sizing, arcs, lines, below, number[:, -1].copy(), loose)
+    return FingerMesh(mesh, outline, sizing, base, arcs, depths, below, number[:, -1].copy(), loose)
+
+
+def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float) -> Lines:
+    """Return the lines that a `fineness` asks for."""
+    finger = outline.finger
+    fine, size = _fine(outline, sizing.indentation, fineness), finger.tip_radius / fineness
+    row = _Row.of(outline, fine, receptor, sizing, 1.0 / fineness)
+    arcs = row.lines(row.gaps(), shift=sizing.shift)
+    skin, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else SIZES.thin * _fold(finger))
+    bone = np.empty(0)
+    if finger.bone == "meshed":
+        count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (SIZES.bulk * size)))
+        bone = np.linspace(CORE, 1.0, count + 1)
+    return Lines(*(tuple(part.tolist()) for part in (arcs, bone, fat, skin)))
 
 
 def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
@@ -256,12 +296,12 @@ def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]
     return low, min(int(np.searchsorted(arcs, last)), len(arcs) - 1)
 
 
-def _fine(outline: Outline, sizing: Sizing) -> float:
+def _fine(outline: Outline, indentation: float, fineness: float) -> float:
     """Return the size of the smallest elements along the skin [mm]."""
-    low, high = _lower_than(outline, sizing.indentation)
+    low, high = _lower_than(outline, indentation)
     radius = outline.finger.tip_radius
     overlap = min(1.0, (high - low) / 2.0 / (SIZES.short * radius))
-    return max(radius / sizing.fineness * SIZES.anywhere * overlap, FINEST * radius)
+    return max(radius / fineness * SIZES.anywhere * overlap, FINEST * radius)
 
 
 def _middles(lines: Array) -> Array:
@@ -284,14 +324,13 @@ class _Row:
     spare: float  # part of an element that is spread over the others
 
     @staticmethod
-    def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing) -> "_Row":
+    def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing, scale: float) -> "_Row":
         """Return the row along the skin: fine in the contact, coarser with the distance from it.
 
         Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, and at
         the ends of the ending and of a nail plate.
         """
         low, high = _lower_than(outline, sizing.indentation)
-        scale = 1.0 / sizing.fineness
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
         palmar, dorsal = low + (outline.palmar_cut - low) * away, high + (outline.dorsal_cut - high) * away
         arc = np.concatenate([palmar, np.linspace(low, high, 1000), dorsal])

@@ -14,6 +14,7 @@ import numpy as np
 from solver.accuracy import audits as audit
 from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
 from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked, steps_of_press
+from solver.accuracy.refinement import with_shares
 from solver.arrays import Array
 from solver.body import Patches
 from solver.continuation.existence import doubts
@@ -26,7 +27,7 @@ from solver.equilibrium.load_path import Instant, end, march
 from solver.equilibrium.load_stepping import forces_of
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh.mesher import Sizing
+from solver.mesh.mesher import Lines, Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, check_stop, interruptible, report_part, report_progress
 from solver.response.answer import Solved, prediction
@@ -59,7 +60,7 @@ class Meshing(ABC):
         self.depth, self.progress = depth, progress
 
     @abstractmethod
-    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
         """Return the predictions of scenes, or why there is none, on meshes of that fineness.
 
         Raises SceneError where the finger cannot be meshed, Cancelled where `progress` says so.
@@ -101,7 +102,7 @@ class SmallMeshing(Meshing):
             self._fingers[sizing] = finger, perf_counter() - begun
         return self._fingers[sizing]
 
-    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
         """Do as `Meshing` says; where contact reaches out, all are solved again on a mesh with more skin."""
         self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
         most = max(self.depth, min(WIDE * self.depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
@@ -201,7 +202,7 @@ class SmallMeshing(Meshing):
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
-        nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved)
+        nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved, numbers)
         took = (perf_counter() - begun) / len(solved)
         return [
             prediction(one, finger, numbers[number], rows[:, number], nested[number], took)
@@ -209,8 +210,11 @@ class SmallMeshing(Meshing):
         ]
 
 
-def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved]) -> list[NestedNumbers | None]:
-    """Return the numbers of solved scenes on the nested `mesh`, None where one has no state there."""
+def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved], numbers: Array) -> list[NestedNumbers | None]:
+    """Return the numbers of solved scenes on the nested `mesh`, None where one has no state there.
+
+    `numbers` (c, COUNT) are theirs on the mesh that counts.
+    """
     states: dict[int, EquilibriumState] = {}
     for number, one in enumerate(solved):
         try:
@@ -221,8 +225,11 @@ def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved]) -> list[
     if states:
         forced = [(state, forces_of(solved[number].scene, state.load)) for number, state in states.items()]
         values, changes = edge_changes(mesh.newton, forced, mesh.numbers_and_row)
-        for number, value, change in zip(states, values, changes, strict=True):
-            out[number] = nested_numbers(value, change, solved[number].steps)
+        for (number, state), value, change in zip(states.items(), values, changes, strict=True):
+            one, nested = solved[number], nested_numbers(value, change, solved[number].steps)
+            if nested is not None:
+                there = mesh, state
+                out[number] = with_shares(one.scene, numbers[number], nested, one.steps, there, change[:, 0])
     return out
 
 
@@ -238,14 +245,14 @@ class FiniteMeshing(Meshing):
         super().__init__(depth, progress)
         self._meshes: dict[Pressed, Meshes] = {}
 
-    def answers(self, scenes: list[Scene], fineness: float, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
+    def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
         done: dict[int, Answer] = {}
         with interruptible(self.progress, lambda: len(done) / len(scenes)):
             for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
                 check_stop()
                 begun, scene = perf_counter(), scenes[number]
-                report_progress(f"solving on a mesh of {fineness:g} elements to the tip radius")
+                report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
                 meshes = self._meshes.setdefault(scene.pressed, Meshes())
                 meshes.keep(fineness)
                 try:
@@ -282,7 +289,7 @@ def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: floa
     numbers = finger.all_numbers([state])[0]
     before_estimate = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    finer, steps = on_nested(scene, top, steps, meshes)
+    finer, steps = on_nested(scene, top, numbers, steps, meshes)
     row = finger.row.average(state.u)
     took = perf_counter() - before_estimate
     warnings, wall = doubts(finger, state), before_estimate - begun - setup

@@ -124,5 +124,5 @@ def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Arr
     """Return what the numbers at an instant change by when edges of contact move by a node (5 + q,)."""
     by_force = scene.normal_force is not None
     forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
-    changes = edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0]
+    changes = np.linalg.norm(edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0], axis=0)
     return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])

@@ -1,17 +1,20 @@
 """From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
+
+import numpy as np
 
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
 from solver.accuracy.omitted_effects import COARSE, Answers, measured
+from solver.accuracy.refinement import refined
 from solver.accuracy.residual_overstress import with_viscosity
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
+from solver.mesh.mesher import FingerMesh, Lines
 from solver.prediction import Prediction
 from solver.progress import Progress, interruptible, report_progress
 from solver.response.answers import MESHINGS, Answer, Meshing, Watch
@@ -22,12 +25,11 @@ WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit i
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
 MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
 UNKNOWN = "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
+NOT_NESTED = NotConverged("The nested mesh has no such state.")
 DEFAULT = {"small": 8.0, "finite": 6.0}  # fineness where no tolerance is asked for: estimates of 0.1 % and 0.4 %
 FIRST = 4.0  # fineness where one is asked for: on 3 and on 5 ten surfaces take as long to 1 %
-FINEST = {"small": 24.0, "finite": 20.0}  # their nested meshes have 100,000 unknowns: 1 s at small strain, 4 at finite
-SAFETY = 1.1  # times the fineness that errors falling with its square ask for
-GROWTH = (1.2, 3.0)  # of the fineness from mesh to mesh
-NOT_KNOWN = 4.0  # times the tolerance, that an error is taken for of which nothing is known: twice the fineness
+NEXT = 1.2  # times as fine, or as coarse, is the mesh that is asked next where one may have no state by chance
+NOT_KNOWN = 4.0  # times the tolerance, that an error is taken for of which nothing is known
 Rough = Callable[[Prediction], None]  # called with an answer before it is refined: what there is, should work stop
 
 
@@ -166,7 +168,7 @@ class _Refined:
 
     answers: list[Answer]
     warnings: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
-    fineness: float  # of the last mesh
+    fineness: float | Lines  # of the last mesh
 
 
 def _refined(
@@ -181,45 +183,75 @@ def _refined(
     first, kind = fineness, scenes[0].solve.kinematics
     answers: dict[int, Answer] = {}
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
-    todo = list(range(len(scenes)))
+    work: dict[float | Lines, list[int]] = {first: list(range(len(scenes)))}
+    last: float | Lines = first
     while True:
-        solved = on_mesh.answers([scenes[i] for i in todo], fineness, watch)
-        for i, answer in zip(todo, solved, strict=True):
-            coarser = answers.get(i)
-            if isinstance(answer, SolveFailure) and coarser is not None and _stands(coarser, answer):
-                lost[i] = answer
-            else:
-                answers[i] = answer
-        missed = [
-            0.0 if i in lost else _missed(answers[i], limits=fineness >= DEFAULT[kind]) for i in range(len(scenes))
-        ]
+        for last, todo in work.items():
+            solved = on_mesh.answers([scenes[i] for i in todo], last, watch)
+            for i, answer in zip(todo, solved, strict=True):
+                coarser, failure = answers.get(i), answer if isinstance(answer, SolveFailure) else None
+                if isinstance(answer, Prediction) and answer.nested is None and _known(coarser):
+                    failure = NOT_NESTED
+                if failure is not None and coarser is not None and _stands(coarser, failure):
+                    lost[i] = failure
+                else:
+                    answers[i] = answer
+        limits = last != FIRST
+        missed = [0.0 if i in lost else _missed(answers[i], limits=limits) for i in range(len(scenes))]
         apart = [
             contrast_error([p for i in together if isinstance(p := answers[i], Prediction)]) for together in surfaces
         ]
-        contrasts = [
-            max(
-                (off.share / tolerance for i in together if (tolerance := scenes[i].solve.contrast_tolerance)),
-                default=0.0,
-            )
-            for together, off in zip(surfaces, apart, strict=True)
-        ]
-        worst = max(*missed, *contrasts, 0.0)
-        if worst <= 1.0 or fineness >= FINEST[kind]:
+        wanted = _wanted(scenes, missed, surfaces, apart)
+        work = _finer({i: answers[i] for i in sorted(wanted)}, wanted, DEFAULT[kind])
+        if not work:
             break
         for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-        again = {i for i, miss in enumerate(missed) if miss > 1.0}
-        for together, miss in zip(surfaces, contrasts, strict=True):
-            if miss > 1.0 or (miss > 0.0 and again.intersection(together)):  # what is compared shares a mesh
-                again.update(together)
-        todo = sorted(again)
-        fineness = min(fineness * min(max(SAFETY * sqrt(worst), GROWTH[0]), GROWTH[1]), FINEST[kind])
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, answers, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
     warnings = [_undone(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
-    return _Refined([answers[i] for i in range(len(scenes))], warnings, fineness)
+    return _Refined([answers[i] for i in range(len(scenes))], warnings, last)
+
+
+def _wanted(
+    scenes: Sequence[Scene], missed: Sequence[float], surfaces: Sequence[Sequence[int]], apart: Sequence[ContrastError]
+) -> dict[int, float]:
+    """Return by what the errors of scenes to be solved again have to fall: what is compared shares a mesh.
+
+    `missed` are the errors of all by their tolerances, `apart` those of differences within each of the sets `surfaces`.
+    """
+    out = {i: miss for i, miss in enumerate(missed) if miss > 1.0}
+    for together, off in zip(surfaces, apart, strict=True):
+        tolerance = min((t for i in together if (t := scenes[i].solve.contrast_tolerance)), default=np.inf)
+        if tolerance < np.inf and (off.share > tolerance or any(i in out for i in together)):
+            out |= {i: max(missed[i], off.share / tolerance) for i in together}
+    return out
+
+
+def _finer(
+    answers: Mapping[int, Answer], wanted: Mapping[int, float], default: float
+) -> dict[float | Lines, list[int]]:
+    """Return the scenes to be solved again on each finer mesh, none where none may be finer.
+
+    `answers` are those of scenes whose errors have to fall by what is `wanted` of each. What had a mesh together keeps
+    one together. A refusal is asked once more at the `default` fineness.
+    """
+    on: dict[FingerMesh | None, list[int]] = {}
+    for i, answer in answers.items():
+        on.setdefault(answer.geometry if isinstance(answer, Prediction) else None, []).append(i)
+    out: dict[float | Lines, list[int]] = {}
+    for mesh, together in on.items():
+        finer: float | Lines | None = default
+        if mesh is not None:
+            nested = [(wanted[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
+            parts = [miss * one.shares for miss, one in nested if one is not None and one.shares is not None]
+            unknown = any(one is None for _, one in nested)
+            finer = refined(mesh, None if unknown or not parts else np.max(parts, axis=0))
+        if finer is not None:
+            out.setdefault(finer, []).extend(together)
+    return out
 
 
 def _fallen_back(
@@ -232,11 +264,11 @@ def _fallen_back(
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := answers[i], SolveFailure) and _doubtful(scene, failure):
-            answer = on_mesh.answers([scene], first / GROWTH[0])[0]
+            answer = on_mesh.answers([scene], first / NEXT)[0]
             if _stands(answer, failure):
                 answers[i], lost[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
-            answers[i] = on_mesh.answers([scene], first * GROWTH[0])[0]
+            answers[i] = on_mesh.answers([scene], first * NEXT)[0]
     return lost
 
 
@@ -257,6 +289,11 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     if not isinstance(coarser, Prediction) or not _doubtful(coarser.scene, failure):
         return False
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
+
+
+def _known(answer: Answer | None) -> bool:
+    """Return whether there is an answer whose error is known."""
+    return isinstance(answer, Prediction) and answer.nested is not None
 
 
 def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Material, Materials, Relaxation, Scene, Solve, solve
+from solver.equilibrium.finger import KINDS
+from solver.equilibrium.load_path import march
 from solver.prediction import History
 from solver.quantities import NAMES
+from solver.response.answer import history
 from solver.response.rates import course_errors, course_numbers, rates
 
 RELAXING = Scene(
@@ -64,9 +67,10 @@ def test_errors_at_the_ends_of_press_and_break_away_and_of_rates_lie_above_the_t
     asked = Solve(kinematics, "history", evidence="quick")
     scene = Scene(friction=Friction(0.3), loading=Loading(1.0, slide, 10.0), solve=asked)
     found = solve(scene)
-    fine = solve(replace(scene, solve=replace(asked, tolerance=0.0005 if kinematics == "small" else 0.002)))
-    assert fine.dofs > 2 * found.dofs
-    numbers, true, errors = course_numbers(found.history), course_numbers(fine.history), course_errors(found)
+    sizing = replace(found.geometry.sizing, fineness=16.0 if kinematics == "small" else 10.0)
+    fine = KINDS[kinematics].of(scene, sizing)
+    true = course_numbers(history(scene, fine, march(scene, fine, 4.0)))
+    numbers, errors = course_numbers(found.history), course_errors(found)
     there = np.isfinite(true.at)
     assert np.array_equal(there, np.isfinite(errors.at))
     assert np.array_equal(there[:, 0], [True, slide != "none", slide != "none"])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from solver import Friction, Loading, Materials, NoSteadyState, NotConverged, Prediction, Scene, Solve, solve
+from solver.mesh.mesher import Lines
 from solver.response import solution
 from solver.response.answers import FiniteMeshing
 
@@ -26,12 +27,12 @@ def far_off(answer, **_):
 
 
 def meshing(monkeypatch, finer, *, missed=None):
-    """Let all meshes but the coarsest end as `finer`; return the finenesses asked for, and what solves indeed."""
+    """Let all refined meshes end as `finer`; return the meshes asked for, by fineness or lines."""
     whole, asked = FiniteMeshing.answers, []
 
     def solved(self, scenes, fineness, watch=None):
         asked.append(fineness)
-        return whole(self, scenes, fineness, watch) if fineness <= 7 else [finer] * len(scenes)
+        return [finer] * len(scenes) if isinstance(fineness, Lines) else whole(self, scenes, fineness, watch)
 
     monkeypatch.setattr(FiniteMeshing, "answers", solved)
     if missed is not None:
@@ -81,6 +82,6 @@ def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit
 
 def test_the_estimate_of_stiffening_skin_covers_what_meshes_of_14_to_28_tend_to():
     # From mu = 0.45 on the corner where the cut meets the bone errs by more than halving its elements shows: 1.7 % for
-    # 1.2 % estimated (docs/explanation/solver-error-estimate.md).
+    # 1.2 % estimated (docs/explanation/solver-errors.md).
     found = solve(stiffening(0.35))
     assert abs(found.sed_ending / 3.171e-3 - 1.0) <= found.error_estimate

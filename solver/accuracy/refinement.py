@@ -1,0 +1,195 @@
+"""Where a mesh is to be refined: what each gap between its lines adds to the error of the ending's SED.
+
+A mesh's lines divide it in columns and rows. On the nested mesh, every element in four, the solution u and the adjoint
+z of the SED are known. What a column is too wide for is what u and z differ by from their quadratic interpolants across
+it. The product of both differences in the energy of shear is its part of the error (dual-weighted residuals: Becker and
+Rannacher 2001, Acta Numerica 10, 1; by directions: Richter 2010, Int. J. Numer. Meth. Fluids 62, 90). Rows likewise.
+The energy of volume is left out: interpolants of nearly incompressible tissue change volume, solutions do not. So parts
+are right among each other, and are scaled to the estimate that two meshes give (`solver.accuracy.error_estimate`).
+
+What holds for small strain guides finite strain too, where the undeformed body stands for the tangent.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from solver._kernels.compiling import OPEN, SLIP, STICK
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, Steps, errors
+from solver.arrays import Array, Indices
+from solver.body.linear import Elastic
+from solver.constitutive import Moduli
+from solver.equilibrium import EquilibriumState
+from solver.equilibrium.finger import Finger, LinearFinger, settled_moduli
+from solver.mesh import ALONG, OUT, line
+from solver.mesh.mesher import FINEST, FingerMesh, Lines
+from solver.prediction import NestedNumbers
+from solver.scene import Scene
+
+MOST = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
+# Measured on 23 scenes at tolerances of 0.3 and 0.05 %: to halve or double any of the next three takes 1 to 18 % more
+# work, but for a smaller growth, which takes 4 % less in more rounds.
+PARTS = 4  # of one gap in a round, at most: an error says little about elements many times smaller
+GROWTH = 1.3  # of the unknowns in a round, at least
+AIM = 0.6  # sum of the parts on the next mesh, by the tolerance
+ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
+SCALES = 200  # that are tried, each a tenth smaller
+QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NestedGrid:
+    """A nested mesh by the elements that it divides: a columns of b, each with 5 x 5 nodes."""
+
+    finger: LinearFinger
+    nodes: Indices  # (a, b, 5, 5)
+    shear: Array  # (a, 2, b, 2, 18, 18) stiffness of the quarters' shear moduli alone
+    affine: Array  # (a, b, 25, 3) functions 1, x, y
+    fit: Array  # (a, b, 3, 25) what fits them to values at the nodes
+
+    @staticmethod
+    def of(finger: LinearFinger) -> "NestedGrid":
+        """Index the mesh of a finger that was halved."""
+        mesh, columns = finger.geometry.mesh, (len(finger.geometry.arcs) - 1) // 2
+        rows = len(mesh.elements) // columns // 4
+        wide, five = 4 * rows + 1, np.arange(5)
+        along = 4 * np.arange(columns)[:, None, None, None] + five[:, None]
+        nodes = along * wide + 4 * np.arange(rows)[:, None, None] + five
+        moduli = [Moduli(one.shear, 0.0) for one in settled_moduli(finger.scene.materials)]
+        shear = Elastic.of(mesh, moduli).stiffness.reshape(columns, 2, rows, 2, 18, 18)
+        place = mesh.nodes[nodes].reshape(columns, rows, 25, 2)
+        affine = np.concatenate([np.ones((*place.shape[:3], 1)), place - place.mean(axis=2, keepdims=True)], axis=3)
+        turned = np.swapaxes(affine, 2, 3)
+        return NestedGrid(
+            finger, nodes, shear, affine, np.asarray(np.linalg.solve(turned @ affine, turned), np.float64)
+        )
+
+    def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array]:
+        """Return what columns (a,) and rows (b,) add to the error of the SED [MPa], right among each other.
+
+        `displacement` (nodes, 2) and the contact of `state` are those on this mesh.
+        """
+        dual = adjoint(self.finger, displacement, state)
+        primal, dual = (self._curved(one) for one in (displacement, dual))
+        five = (*self.nodes.shape, 2)
+        columns = [one - (QUADRATIC @ one[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for one in (primal, dual)]
+        rows = [one - QUADRATIC @ one[:, :, :, ::2] for one in (primal, dual)]
+        return np.abs(self._energy(*columns).sum(axis=1)), np.abs(self._energy(*rows).sum(axis=0))
+
+    def _curved(self, values: Array) -> Array:
+        """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2) less what fits 1, x, y best.
+
+        Nodes of divided elements lie on the outline, and not where the element that they divide has it.
+        """
+        local = values[self.nodes].reshape(*self.affine.shape[:3], 2)
+        return (local - self.affine @ (self.fit @ local)).reshape(*self.nodes.shape, 2)
+
+    def _energy(self, one: Array, other: Array) -> Array:
+        """Return the energy of shear (a, b) that two fields (a, b, 5, 5, 2) have together."""
+        out = np.zeros(self.nodes.shape[:2])
+        for right in (0, 1):
+            for up in (0, 1):
+                first, second = (
+                    field[:, :, 2 * right + ALONG, 2 * up + OUT].reshape(*out.shape, 18) for field in (one, other)
+                )
+                out += np.sum(first * (self.shear[:, right, :, up] @ second[..., None])[..., 0], axis=2)
+        return out
+
+
+def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) -> Array:
+    """Return how the ending's SED follows forces on the nodes (nodes, 2), contact states kept [MPa per N/mm].
+
+    Skin that slips passes on mu times what its normal force changes by: there the adjoint's normal component is mu
+    times its tangential one, against the friction. Skin that sticks has none.
+    """
+    goal = finger.ending.gradient(displacement)
+    goal[finger.geometry.mesh.driven] = 0.0
+    loaded, recover = finger.body.under(goal)
+    compliance, free = loaded.compliance, loaded.untouched().ravel()
+    movable = compliance.diagonal().reshape(-1, 2).all(axis=1)
+    touching, stuck = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
+    lever = np.where(state.state == SLIP, state.load.mu * state.sense, 0.0)[touching, None]
+    forces = np.concatenate([2 * touching + 1, 2 * stuck])
+    rows = np.column_stack([compliance, free])
+    system = np.concatenate([rows[2 * touching + 1] + lever * rows[2 * touching], rows[2 * stuck]])
+    missing = np.linalg.lstsq(system[:, forces], -system[:, -1], rcond=None)[0]
+    return recover((free + compliance[:, forces] @ missing).reshape(-1, 2))
+
+
+def with_shares(
+    scene: Scene,
+    numbers: Array,
+    nested: NestedNumbers,
+    steps: Steps | None,
+    there: tuple[Finger[Any], EquilibriumState],
+    edges: Array,
+) -> NestedNumbers:
+    """Return `nested` with what each gap between lines has of the SED's error, where a finer mesh may be asked for.
+
+    `numbers` (COUNT,) are the scene's on the mesh that counts, `there` is the finger with its state on the nested one,
+    and `edges` (m,) are what the SED changes by as edges of contact move.
+    """
+    tolerance = scene.solve.tolerance
+    missed = tolerance is not None and errors(scene, numbers, nested, steps).sed > tolerance
+    if not missed and scene.solve.contrast_tolerance is None:
+        return nested
+    finger, state = there
+    parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
+    parts *= FROM_HALVING * abs(float(nested.numbers[0] - numbers[0])) / max(float(parts.sum()), np.finfo(float).tiny)
+    before = np.flatnonzero(np.diff(state.state))
+    columns = np.searchsorted(finger.geometry.lines.arcs, (finger.arcs[before] + finger.arcs[before + 1]) / 2.0) - 1
+    size = max(float(np.linalg.norm(edges)), np.finfo(float).tiny)
+    np.add.at(parts, columns, FROM_EDGES * edges**2 / size)
+    whole = float(parts.sum())
+    return replace(nested, shares=parts / whole if whole > 0.0 else None)
+
+
+@lru_cache(maxsize=1)
+def _grid(finger: Finger[Any]) -> NestedGrid:
+    """Return the grid of a nested finger, as at small strain; surfaces of one mesh follow each other and share it."""
+    return NestedGrid.of(finger if isinstance(finger, LinearFinger) else LinearFinger.on(finger.scene, finger.geometry))
+
+
+def refined(mesh: FingerMesh, parts: Array | None) -> Lines | None:
+    """Return the lines of a finer mesh; None where none may be finer.
+
+    `parts` (a + b,) are the errors of each column and row of `mesh`, by the tolerance; None where they are not known.
+    With the fewest lines for one sum of errors, a gap's parts grow with its error, by what a line costs there, to the
+    power of one by `ORDER` and one. Where errors fall more slowly, at edges and corners, another round follows.
+    """
+    lines = mesh.lines
+    counts = np.array([len(lines.arcs) - 1, lines.rows])
+    if parts is None:
+        halves = np.full(counts.sum(), 2)
+        return lines.divided(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST else None
+    most = np.clip(_lengths(mesh) / (FINEST * mesh.outline.finger.tip_radius), 1.0, PARTS)
+    per_line = parts * np.repeat(counts, counts)
+    least = GROWTH * _unknowns(np.ones(len(parts)), counts)
+    chosen = None
+    for scale in per_line.max() * np.geomspace(1.0, 1e-9, SCALES):
+        wanted = np.maximum(np.rint((per_line / scale) ** (1.0 / (ORDER + 1.0))), 1.0)
+        divided = np.minimum(wanted, most)
+        if (unknowns := _unknowns(divided, counts)) > MOST:
+            break
+        chosen = divided
+        if np.sum(parts / wanted**ORDER) <= AIM and unknowns >= least:
+            break
+    if chosen is None or chosen.max() == 1.0:
+        return None
+    return lines.divided(*np.split(chosen.astype(np.int64), counts[:1]))
+
+
+def _unknowns(parts: Array, counts: Indices) -> float:
+    """Return about how many unknowns a mesh has whose columns and rows, `counts` of them, are divided in `parts`."""
+    columns, rows = (float(part.sum()) for part in np.split(parts, counts[:1]))
+    return 2.0 * (2.0 * columns + 1.0) * (2.0 * rows + 1.0)
+
+
+def _lengths(mesh: FingerMesh) -> Array:
+    """Return the least widths (a + b,) of columns and rows [mm]."""
+    lines, finger = mesh.lines, mesh.outline.finger
+    fat = finger.pulp_thickness() - finger.epidermis - finger.dermis
+    scales = ((lines.arcs, 1.0), (lines.bone, finger.bone_radius), (lines.fat, fat), (lines.skin, -1.0))
+    return np.concatenate([scale * np.diff(part) for part, scale in scales])

@@ -1,0 +1,115 @@
+"""Meshes are refined where the error of the ending's SED comes from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver import Friction, Loading, Scene, Solve, solve
+from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refined
+from solver.continuation.small_states import WIDE
+from solver.continuation.small_states import settled as settled_state
+from solver.equilibrium import Newton
+from solver.equilibrium.finger import LinearFinger
+from solver.mesh.mesher import Sizing
+from solver.scene.published import scenes
+
+SLIDES = {
+    "slip": Scene(friction=Friction(0.4), loading=Loading(1.5, "+x")),
+    "slip at a bound": Scene(friction=Friction(0.6, 0.01), loading=Loading(1.5, "-x")),
+    "stick": Scene(friction=Friction(0.5), loading=Loading(1.5)),
+}
+COARSE = Sizing(4.0, 1.5, margin=WIDE)
+
+
+def sed(finger, scene):
+    return finger.seds([settled_state(scene, finger)])[0, 0]
+
+
+@pytest.mark.parametrize("scene", SLIDES.values(), ids=SLIDES)
+def test_the_adjoint_says_what_a_force_inside_the_finger_changes(scene):
+    finger = LinearFinger.of(scene, COARSE)
+    state = settled_state(scene, finger)
+    displacement = finger.displacement(state)
+    dual = adjoint(finger, displacement, state)
+    mesh, step = finger.geometry.mesh, 1e-7
+    inside = np.setdiff1d(np.arange(len(mesh.nodes)), np.concatenate([mesh.skin, mesh.held]))
+    for node in np.random.default_rng(1).choice(inside, 3, replace=False):
+        for along in (0, 1):
+            load = np.zeros(mesh.nodes.shape)
+            load[node, along] = step
+            body, recover = finger.body.under(load)
+            newton = Newton(body)
+            assert newton.linearise(state, state.load, newton.skin_x + state.u[:, 0])
+            pushed = state.u + newton.steps[:, 0].reshape(-1, 2)
+            change = (finger.sed_ending(recover(pushed)) - finger.sed_ending(displacement)) / step
+            assert change == pytest.approx(dual[node, along], rel=1e-4, abs=1e-4 * np.abs(dual).max())
+
+
+@pytest.mark.parametrize("place", [-1.0, 8.0])
+def test_four_columns_made_one_have_a_far_larger_part_of_the_error(place):
+    scene = SLIDES["slip"]
+    lines = LinearFinger.of(scene, replace(COARSE, fineness=8.0)).geometry.lines
+    gone = int(np.searchsorted(lines.arcs, place))
+    wide = replace(lines, arcs=(*lines.arcs[: gone - 1], *lines.arcs[gone + 2 :]))
+
+    def columns(lines):
+        finger = LinearFinger.of(scene, replace(COARSE, fineness=lines, halved=True))
+        state = settled_state(scene, finger)
+        return NestedGrid.of(finger).parts(finger.displacement(state), state)[0]
+
+    before, after = columns(lines), columns(wide)
+    assert after[gone - 2] > 4.0 * before[gone - 2 : gone + 2].sum()
+    assert after.sum() - after[gone - 2] < 1.5 * before.sum()
+
+
+def test_dividing_what_has_the_largest_part_changes_the_sed_most():
+    scene = scenes()[4]
+    sizing = Sizing(4.0, 2.0, margin=WIDE)
+    finger = LinearFinger.of(scene, replace(sizing, halved=True))
+    state = settled_state(scene, finger)
+    parts = np.concatenate(NestedGrid.of(finger).parts(finger.displacement(state), state))
+    lines = finger.geometry.lines
+    before = sed(LinearFinger.of(scene, sizing), scene)
+
+    def change(gap):
+        halves = np.ones(len(parts), np.int64)
+        halves[gap] = 2
+        divided = lines.divided(*np.split(halves, [len(lines.arcs) - 1]))
+        return abs(sed(LinearFinger.of(scene, replace(sizing, fineness=divided)), scene) - before)
+
+    changes = np.array([change(gap) for gap in range(len(parts))])
+    largest = np.argsort(parts)[-4:]
+    assert changes[largest].sum() > 0.6 * changes.sum()
+
+
+def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
+    mesh = LinearFinger.of(SLIDES["slip"], COARSE).geometry
+    gaps = len(mesh.lines.arcs) - 1 + mesh.lines.rows
+    few, many = (refined(mesh, np.full(gaps, error)) for error in (1e-6, 1e6))
+    halves = refined(mesh, None)
+    for lines in (few, many, halves):
+        assert set(mesh.lines.arcs) < set(lines.arcs)
+        assert np.all(np.diff(lines.arcs) > 0.0)
+        assert np.all(np.diff(lines.skin) < 0.0)
+        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.dofs <= MOST
+    assert len(few.arcs) < len(many.arcs)
+    assert len(halves.arcs) == 2 * len(mesh.lines.arcs) - 1
+
+
+def test_a_tolerance_is_met_with_few_unknowns():
+    scene = scenes()[9]
+    usual = solve(scene)
+    tight = solve(replace(scene, solve=replace(scene.solve, tolerance=0.0005)))
+    fine = sed(LinearFinger.of(scene, Sizing(26.0, 2.0, margin=WIDE)), scene)
+    assert tight.error_estimate <= 0.0005 < usual.error_estimate
+    assert tight.dofs < usual.dofs
+    assert abs(tight.sed_ending / fine - 1.0) < 0.0005
+
+
+def test_at_finite_strain_a_tolerance_is_met_on_lines_that_were_added():
+    scene = Scene(friction=Friction(0.3), loading=Loading(1.5, "+x"), solve=Solve("finite", tolerance=0.002))
+    tight = solve(scene)
+    usual = solve(replace(scene, solve=Solve("finite")))
+    assert tight.error_estimate <= 0.002
+    assert abs(tight.sed_ending / usual.sed_ending_corrected - 1.0) < 0.002 + usual.error_estimate
