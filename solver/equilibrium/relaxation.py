@@ -10,7 +10,7 @@ recursion is exact (Taylor, Pister and Goudreau 1970; Simo and Hughes 1998, sec.
 A step is then elastic, with the moduli `Prony.within(dt)` and what is left of the past as a load. The SED is the energy
 stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, e being the strain's deviator.
 
-At finite strain there are a relaxed law and the overstress of the past (`constitutive.overstress`). In the end only the
+At finite strain there are a relaxed law and the overstress of the past (`constitutive.Past`). In the end only the
 relaxed law is left. The finger carries its own skin along the surface and nothing flows through it, so that a settled
 slide stands still in the tissue and has relaxed wholly, whatever its speed.
 """
@@ -26,8 +26,7 @@ from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearBody
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
-from solver.constitutive import Moduli, Prony, kept, overstress
-from solver.constitutive.overstress import Past
+from solver.constitutive import Moduli, Past, Prony, kept, overstress
 from solver.equilibrium import EquilibriumState, Newton
 from solver.mesh import Mesh
 
@@ -189,7 +188,7 @@ class CondensedRelaxing(CondensedFinite):
     def excess(self, u: Array) -> Array:
         """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
         body = self.body
-        stress = overstress.stress(self.tensor, body.deformation(u))
+        stress = overstress(self.tensor, body.deformation(u))
         gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
         return np.einsum("eq,eqaA,eqiA->eia", body.elements.weight, stress, gradient).reshape(
             len(body.elements.nodes), 18

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from solver import Relaxation, solve
 from solver.accuracy.audits import course_audits
 from solver.body.finite import FiniteBody
-from solver.constitutive import Hooke, NeoHooke, Prony, overstress
+from solver.constitutive import Hooke, NeoHooke, Past, Prony, overstress
 from solver.constitutive import stress as relaxed_stress
 from solver.constitutive import tangent as relaxed_tangent
-from solver.constitutive.overstress import Past
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.progress import listening
@@ -47,8 +46,8 @@ def test_within_a_step_the_stress_is_the_derivative_of_an_energy_and_the_tangent
     small = 1e-30
     stepped = F + 1j * small * direction
     slope = overstress_energy(T, stepped).imag / small
-    np.testing.assert_allclose(np.sum(overstress.stress(T, F) * direction), slope, rtol=1e-10, atol=1e-12)
-    bend = overstress.stress(T, stepped).imag / small
+    np.testing.assert_allclose(np.sum(overstress(T, F) * direction), slope, rtol=1e-10, atol=1e-12)
+    bend = overstress(T, stepped).imag / small
     turned = np.einsum("aAbB,bB->aA", overstress_tangent(T, F), direction)
     np.testing.assert_allclose(turned, bend, rtol=1e-9, atol=1e-11)
 
@@ -63,8 +62,8 @@ def test_turning_the_body_turns_the_stress_and_nothing_else(path, angle):
         T, other = still.over(0.5)[0], turned.over(0.5)[0]
         still, turned = still.after(F[None], 0.5), turned.after((R @ F)[None], 0.5)
     np.testing.assert_allclose(turned.energy(), still.energy(), rtol=1e-9, atol=1e-14)
-    stress = overstress.stress(T, path[-1])
-    np.testing.assert_allclose(overstress.stress(other, R @ path[-1]), R @ stress, rtol=1e-9, atol=1e-12)
+    stress = overstress(T, path[-1])
+    np.testing.assert_allclose(overstress(other, R @ path[-1]), R @ stress, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("tau", sorted(TABLE))
@@ -76,7 +75,7 @@ def test_a_block_sheared_by_half_relaxes_as_the_standard_linear_solid_does_whate
         T = past.over(time - before)[0]
         past, before = past.after(F[None], time - before), time
         if time in TIMES:
-            true = overstress.stress(T, F) @ F.T
+            true = overstress(T, F) @ F.T
             found.append(0.7 * min(time, 1.0) + true[0, 1] / (G * 0.5))
     assert law.shear == pytest.approx(G / 2.0)
     np.testing.assert_allclose(found, TABLE[tau], atol=6e-7)
@@ -92,7 +91,7 @@ def test_the_normal_stress_of_a_steadily_growing_shear_converges_at_second_order
             F = sheared(rate * number / steps)
             T = past.over(1.0 / steps)[0]
             past = past.after(F[None], 1.0 / steps)
-        true = overstress.stress(T, F) @ F.T
+        true = overstress(T, F) @ F.T
         errors.append(abs(true[0, 0] - true[1, 1] - expected) / expected)
     assert errors[-1] < 1e-3
     assert np.log2(errors[0] / errors[1]) > 1.9
@@ -125,7 +124,7 @@ def test_the_work_done_on_a_cycle_is_what_is_lost_and_fine_steps_balance_it():
     for number in range(1, steps + 1):
         F = sheared(0.6 * np.sin(2.0 * np.pi * number / steps))
         last, T = P, past.over(1.0 / steps)[0]
-        P = overstress.stress(T, F)
+        P = overstress(T, F)
         work += np.sum((P + last) / 2.0 * (F - before))
         past, before = past.after(F[None], 1.0 / steps), F
         A, B = (_whole(t) for t in (past.metric[0, 0], past.before[0]))
@@ -150,17 +149,17 @@ def test_at_once_the_tissue_has_its_own_moduli_and_in_the_end_the_relaxed_ones()
     F = np.array([[1.3, 0.4], [-0.1, 0.8]])
     past = past.after(F[None], 1e-9)
     for _ in range(3):
-        left = overstress.stress(past.over(20.0)[0], F)
+        left = overstress(past.over(20.0)[0], F)
         past = past.after(F[None], 20.0)
     assert np.abs(left).max() < 1e-6 * np.abs(relaxed_stress(end, F)).max()
 
 
 def test_after_a_sudden_strain_the_stress_of_the_shape_falls_as_the_exponential():
     F, past = np.array([[1.3, 0.4], [-0.1, 0.8]]), one_term(0.5)
-    at_once = overstress.stress(past.over(1e-9)[0], F)
+    at_once = overstress(past.over(1e-9)[0], F)
     past = past.after(F[None], 1e-9)
     for time in (0.2, 0.5, 1.5):
-        np.testing.assert_allclose(overstress.stress(past.over(time)[0], F), np.exp(-time / 0.5) * at_once, rtol=1e-7)
+        np.testing.assert_allclose(overstress(past.over(time)[0], F), np.exp(-time / 0.5) * at_once, rtol=1e-7)
 
 
 def relaxing_block(distortion=0.06):

@@ -4,8 +4,7 @@
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import PLAIN, shape
-from solver.constitutive.overstress import turned
+from solver.constitutive import PLAIN, shape, turned
 from solver.contact import SHEAR_LIMITED, SLIP
 
 
@@ -32,7 +31,7 @@ def energy(law, F):
 
 
 def overstress_energy(T: Array, F: Array) -> Array:
-    """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress.stress` is the derivative within a step."""
+    """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress` is the derivative within a step."""
     J, _, _, whole = turned(F, T)
     return 0.5 * J ** (-2.0 / 3.0) * whole
 
