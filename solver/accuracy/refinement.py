@@ -164,7 +164,7 @@ def refined(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     if parts is None:
         halves = np.full(counts.sum(), 2)
         return lines.divided(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST else None
-    most = np.clip(_lengths(mesh) / (FINEST * mesh.outline.finger.tip_radius), 1.0, PARTS)
+    most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, PARTS)
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
     chosen = None

@@ -182,6 +182,7 @@ def _refined(
     surfaces = compared_sets(scenes)
     first, kind = fineness, scenes[0].solve.kinematics
     answers: dict[int, Answer] = {}
+    best: dict[int, Answer] = {}  # of each, by its estimate
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
     work: dict[float | Lines, list[int]] = {first: list(range(len(scenes)))}
     last: float | Lines = first
@@ -189,13 +190,12 @@ def _refined(
         for last, todo in work.items():
             solved = on_mesh.answers([scenes[i] for i in todo], last, watch)
             for i, answer in zip(todo, solved, strict=True):
-                coarser, failure = answers.get(i), answer if isinstance(answer, SolveFailure) else None
-                if isinstance(answer, Prediction) and answer.nested is None and _known(coarser):
-                    failure = NOT_NESTED
-                if failure is not None and coarser is not None and _stands(coarser, failure):
+                failure = _why_lost(answer, answers.get(i))
+                if failure is not None:
                     lost[i] = failure
-                else:
-                    answers[i] = answer
+                    continue
+                answers[i] = answer
+                best[i] = min(answer, best.get(i, answer), key=_estimate)
         limits = last != FIRST
         missed = [0.0 if i in lost else _missed(answers[i], limits=limits) for i in range(len(scenes))]
         apart = [
@@ -208,6 +208,7 @@ def _refined(
         for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
+    answers |= {i: best[i] for i, miss in enumerate(missed) if miss > 1.0}
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, answers, first, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
@@ -291,9 +292,17 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
 
 
-def _known(answer: Answer | None) -> bool:
-    """Return whether there is an answer whose error is known."""
-    return isinstance(answer, Prediction) and answer.nested is not None
+def _why_lost(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
+    """Return why the answer of a coarser mesh, if there is one, counts in place of this one; None where it does not."""
+    failure = answer if isinstance(answer, SolveFailure) else None
+    if isinstance(answer, Prediction) and answer.nested is None and _estimate(coarser) < 1.0:
+        failure = NOT_NESTED
+    return failure if failure is not None and coarser is not None and _stands(coarser, failure) else None
+
+
+def _estimate(answer: Answer | None) -> float:
+    """Return the error estimate of an answer; 1 where nothing is known."""
+    return answer.error_estimate if isinstance(answer, Prediction) and answer.nested is not None else 1.0
 
 
 def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Scene, Solve, solve
+from solver.accuracy import refinement
 from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refined
 from solver.continuation.small_states import WIDE
 from solver.continuation.small_states import settled as settled_state
@@ -95,6 +96,20 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
         assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.dofs <= MOST
     assert len(few.arcs) < len(many.arcs)
     assert len(halves.arcs) == 2 * len(mesh.lines.arcs) - 1
+
+
+def test_refinement_comes_to_an_end(monkeypatch):
+    monkeypatch.setattr(refinement, "MOST", 4000)
+    scene, dofs = scenes()[9], []
+    asked = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
+    tight = solve(asked, rough=lambda rough: dofs.append(rough.dofs))
+    assert tight.error_estimate > 1e-4
+    assert any("above the tolerance" in warning for warning in tight.warnings)
+    assert dofs[:-1] == sorted(set(dofs))  # the last is the answer, before its evidence
+    assert dofs[-1] <= 4000
+    # elements so small that none may be divided
+    monkeypatch.setattr(refinement, "FINEST", 1.0)
+    assert refined(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9)) is None
 
 
 def test_a_tolerance_is_met_with_few_unknowns():
