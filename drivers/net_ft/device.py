@@ -145,10 +145,10 @@ class NetFtTransducer(ThreadedTransducer):
         with self.lock:
             self.digest()
             account = self._account
-            sentences = [self._rate_change()] if account.changed else []
-            sentences += (
-                [rate_words("its clock runs", self._watch.rate, self.info.counter_rate)] if self._watch.changes else []
-            )
+            info, sends = self.info, self.info.counter_rate / (account.step or 1)
+            sentences = [rate_words("it sends", sends, info.rate)] if account.changed else []
+            if self._watch.changes:
+                sentences.append(rate_words("its clock runs", self._watch.rate, info.counter_rate))
             return self.totals(
                 lost=account.lost,
                 repeated=account.repeated,
@@ -302,10 +302,6 @@ class NetFtTransducer(ThreadedTransducer):
         while self._unconfirmed and self._unconfirmed[0][0] < self._settings.confirmed_ns:
             self._unconfirmed.popleft()
         self._unconfirmed.append((received_ns, count))
-
-    def _rate_change(self) -> str:
-        """Return at which rate the box sends now."""
-        return rate_words("it sends", self.info.counter_rate / (self._account.step or 1), self.info.rate)
 
     def never_came(self, seconds: float) -> str:
         """Return why a start failed."""

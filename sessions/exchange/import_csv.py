@@ -1,9 +1,10 @@
 """A foreign CSV file becomes a session: its columns from header or statement, every reading, the file beside them."""
 
 import hashlib
+import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -251,7 +252,7 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
         layout = columns(header, stated.axes, stated.units, len(cells))
     except ColumnsUnknown as unknown:
         raise SettingsError(f"{path}, line {line}: {unknown}") from unknown
-    body = rest if header is not None else _with(first, rest)
+    body = rest if header is not None else itertools.chain([first], rest)
     used = {position: layout.names[position] for position in (*layout.axes, layout.time) if position is not None}
     rows: list[list[float]] = []
     lines: list[int] = []
@@ -261,11 +262,6 @@ def _table(path: Path, content: bytes, stated: ImportOptions) -> tuple[Columns, 
     if len(rows) < _FEWEST:
         raise ImportRefused(f"{path} holds {len(rows)} readings: give a file with at least {_FEWEST}")
     return layout, np.array(rows), lines
-
-
-def _with(first: tuple[int, list[str]], rest: Iterator[tuple[int, list[str]]]) -> Iterator[tuple[int, list[str]]]:
-    yield first
-    yield from rest
 
 
 def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int, str]) -> list[float]:

@@ -178,7 +178,8 @@ class _Run:
             if self.writer.must_end is not None:
                 return "disk", self.writer.must_end
             self._listen()
-            if isinstance(self._state, Resting) and self._rest_is_over():
+            over = self._rested_ns is not None and self.clock.now_ns() >= self._rested_ns
+            if over and isinstance(self._state, Resting):
                 self._take(RestOver())
             for event in self.operator.poll():
                 self._take(event)
@@ -234,9 +235,6 @@ class _Run:
         for command in commands:
             if isinstance(command, AskRest):
                 self._rested_ns = None if command.duration is None else at_ns + round(command.duration * 1e9)
-
-    def _rest_is_over(self) -> bool:
-        return self._rested_ns is not None and self.clock.now_ns() >= self._rested_ns
 
     def _carry_out(self, commands: Sequence[Command]) -> None:
         """Write commands down, make that safe, and only then let anybody see them."""
