@@ -8,7 +8,6 @@ from typing import ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from numpy.typing import NDArray
 
 from solver._kernels import elements as element_loops
 from solver._kernels.compiling import HELD_X, HELD_Y
@@ -392,16 +391,3 @@ class Patches:
         """Return every quantity averaged over each (q, r, ...) for displacements (nodes, 2, ...), even complex ones."""
         state = self.state(displacement)
         return np.stack([self.endings.means(quantity(state)) for quantity in self.quantities])
-
-
-def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
-    """Return the local coordinates (p, 2) of `points` (p, 2) in elements with nodes `corners` (p, 9, 2), by Newton."""
-    local: NDArray[np.float64] = start.copy()
-    for _ in range(8):
-        values, slopes = Q2P1.shape(local)
-        missing = points - (values[:, None] @ corners)[:, 0]
-        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), missing)
-        local += step
-        if np.abs(step).max(initial=0.0) < 1e-7:  # what is left is the square of this step
-            break
-    return local

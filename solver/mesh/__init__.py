@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.arrays import Array, Flags, Indices, determinant
+from solver.arrays import Array, Flags, Indices, determinant, inverse
 
 # Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
 GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
@@ -175,6 +175,19 @@ def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
         worst = mesh.nodes[mesh.elements[int(det.min(axis=1).argmin()), 8]]
         raise MeshError(f"an element of the mesh is folded, near x = {worst[0]:.3g}, y = {worst[1]:.3g} mm")
     return jacobian, det
+
+
+def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
+    """Return the local coordinates (p, 2) of `points` (p, 2) in elements with nodes `corners` (p, 9, 2), by Newton."""
+    local: NDArray[np.float64] = start.copy()
+    for _ in range(8):
+        values, slopes = Q2P1.shape(local)
+        missing = points - (values[:, None] @ corners)[:, 0]
+        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), missing)
+        local += step
+        if np.abs(step).max(initial=0.0) < 1e-7:  # what is left is the square of this step
+            break
+    return local
 
 
 def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool = True) -> Mesh:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver.arrays import Array, Indices
-from solver.body import Endings, Probes, local_coordinates
+from solver.body import Endings, Probes
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import Elastic
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
 from solver.failures import SolveFailure
-from solver.mesh import Q2P1, Mesh
+from solver.mesh import Q2P1, Mesh, local_coordinates
 from solver.mesh.mesher import Outline
 from solver.prediction import Prediction, Skin
 from solver.progress import Progress, report_part

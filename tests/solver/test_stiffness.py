@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from solver import Finger, Receptor
-from solver.body import Probes, local_coordinates
+from solver.body import Probes
 from solver.body.linear import Elastic, LinearBody
 from solver.constitutive import MATERIALS, Hooke
 from solver.linalg import Tree, places
-from solver.mesh import Q2P1, block
+from solver.mesh import Q2P1, block, local_coordinates
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle import linear as oracle
 from tests.solver.oracle.laws import hooke_energy, hooke_stress

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.body import Probes, local_coordinates
+from solver.body import Probes
 from solver.body.linear import LinearBody
 from solver.contact import OPEN, SLIP
 from solver.equilibrium import Newton
-from solver.mesh import Q2P1, Mesh, grid_mesh, with_middles
+from solver.mesh import Q2P1, Mesh, grid_mesh, local_coordinates, with_middles
 
 NONE: Indices = np.zeros(0, np.int64)
 
