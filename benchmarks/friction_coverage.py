@@ -22,8 +22,7 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes.analysis import Analysis, analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws, drag_direction
-from sessions.strokes.bootstrap_settings import BootstrapSettings
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
 from simulators.stroke import CONTACT_AREA, paper_surfaces
 from simulators.subject import SimulatedSubject

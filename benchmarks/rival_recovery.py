@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sessions.prediction.planted_strokes import AREA, StudyDesign, planted_strokes
+from sessions.prediction.surface_series import AREA, StudyDesign, planted_strokes
 from sessions.statistics.power import Judgement, preferred, study_weights, twins
 from solver.quantities import NAMES
 from solver.scene.published import STICKINESS

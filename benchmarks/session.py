@@ -12,8 +12,7 @@ from statistics import median
 
 from daq_app.cli.main import run
 from sessions.prediction import PredictionOptions, predict
-from sessions.prediction.side_by_side import with_alternatives
-from sessions.prediction.uncertainty import with_intervals
+from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.recording import Recording
 from sessions.run.replay import different_events, different_readings, replay
 from sessions.strokes import analyse

@@ -17,7 +17,7 @@ from statistics import median
 from daq_app.batch.pool import Shelf, visits
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
-from sessions.statistics.pooling.visit import VisitOptions
+from sessions.statistics.visit import VisitOptions
 
 REPEATS = 2
 

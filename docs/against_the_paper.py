@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from sessions.prediction.series_slopes import SERIES
-from sessions.statistics.scores import pearson
+from sessions.prediction.surface_series import SERIES
+from sessions.statistics.correlations import pearson
 from solver import Prediction, Solve, solve_many
 from solver.quantities import NAMES
 from solver.response.receptor_row import rough_responses

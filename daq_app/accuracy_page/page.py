@@ -13,7 +13,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, se
 from daq_app.accuracy_page.figures import plates
 from daq_app.console import number
 from sessions.report.figures.style import Plate
-from sessions.report.html import drawn, swap_in
+from sessions.report.pages import drawn, swap_in
 from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate

@@ -26,7 +26,7 @@ from sessions.recording.derived import revealed
 from sessions.recording.head import software_versions
 from sessions.report import findings
 from sessions.report.contents import Field, Report
-from sessions.report.predictions import field_of, finding_of
+from sessions.report.trials import field_of, finding_of
 from sessions.strokes import analyse
 from sessions.strokes.decisions import DecisionError, append, read
 from solver import Cancelled, Prediction, Scene, SceneError
@@ -221,7 +221,7 @@ class Work:
         return field_at(finding.experiment, finding.index, film.film, int(step))
 
     def _compared_panel(self) -> "Panel | None":
-        from sessions.report.figures.compared import compared_panel
+        from sessions.report.figures.relation import compared_panel
         from sessions.report.figures.style import look
 
         other = self._other
@@ -297,12 +297,12 @@ class Work:
             self.go_on()
         assert self._prediction is not None  # it was just made
         if request.what == "report":
-            from sessions.report import html
+            from sessions.report import pages
 
             progress = self.timed(tr("carrying the uncertainty of friction through"))
             with_them = replace(self._prediction, options=replace(self._prediction.options, intervals=True))
             self._prediction = with_intervals(self._analysis, with_them, progress=progress)
-            html.write_report(findings(self._recording, self._analysis, self._prediction), path)
+            pages.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}
         source = ExportSource(
@@ -318,7 +318,7 @@ class Work:
 
     def _write_picture(self, name: str, path: Path) -> str:
         from sessions.file_access import write_whole
-        from sessions.report.html import panel_csv, swap_in
+        from sessions.report.pages import panel_csv, swap_in
 
         self._say(m.Step(0.0, tr("writing {name}", name=path.name)))
         note = self._note(name)
@@ -363,7 +363,7 @@ def sentence_of(error: Exception) -> str:
         NothingToShow,
     )
     with suppress(ImportError):
-        from sessions.report.html import ReportError
+        from sessions.report.pages import ReportError
 
         known = (*known, ReportError)
     return str(error) if isinstance(error, known) else f"{type(error).__name__}: {error}"

@@ -11,9 +11,8 @@ from sessions.plan.plan import SessionPlan
 from sessions.plan.study import is_study
 from sessions.prediction import PredictionOptions, Progress, SessionPrediction, part_of, predict
 from sessions.prediction.afferent import AfferentSettings, firing_document
-from sessions.prediction.side_by_side import with_alternatives
 from sessions.prediction.stored import check_prediction, with_present_names
-from sessions.prediction.uncertainty import with_intervals
+from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import (
     checked_gain_error,
@@ -29,11 +28,11 @@ from sessions.recording.derived import (
 )
 from sessions.recording.head import software_versions
 from sessions.strokes import Analysis, AnalysisSettings, analyse
+from sessions.strokes.analysis import bootstrap_settings, check_analysis
 from sessions.strokes.bootstrap import intervals_document, stroke_intervals
-from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.decisions import Decisions
-from sessions.strokes.friction import AreaLaw
-from sessions.strokes.stored import bootstrap_settings, check_analysis
+from sessions.strokes.settings import BootstrapSettings
+from sessions.strokes.stroke import AreaLaw
 from sessions.toml_file import SettingsError, from_table
 
 ANALYSIS = "analysis.json"

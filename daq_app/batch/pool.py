@@ -25,7 +25,7 @@ from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import GAIN_ERROR, UNBLINDING
 from sessions.recording.head import software_versions
 from sessions.recording.schema import LIVE_FILE
-from sessions.statistics.pooling.visit import FORM, Visit, VisitOptions, visit_of
+from sessions.statistics.visit import FORM, Visit, VisitOptions, visit_of
 from sessions.strokes.decisions import DECISIONS
 
 LOOK = 0.1  # between two looks whether something is done [s]

@@ -1,6 +1,6 @@
 """On which fingers a response keeps the sign of its slope: single changes, a map, and fingers drawn at random.
 
-A finger's answer is `sessions.prediction.series_slopes`: how each quantity at the ending goes with the published
+A finger's answer is `sessions.prediction.surface_series`: how each quantity at the ending goes with the published
 surfaces. Fingers are computed side by side, and kept as they come where a file is given.
 """
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from daq_app.batch.pool import cluster_client, local_pool, refuse_other_workers
 from daq_app.batch.sensitivity import Index, sobol_indices
-from sessions.prediction.series_slopes import SERIES, Press, series_slopes
+from sessions.prediction.surface_series import SERIES, Press, series_slopes
 from sessions.recording.head import software_versions
 from solver import Friction, Loading, Receptor, Scene, Solve
 

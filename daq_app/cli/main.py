@@ -54,7 +54,7 @@ _FAILED = (
     "drivers.transducer.LinkLost",
     "drivers.transducer.SetupError",
     "sessions.exchange.ExportError",
-    "sessions.report.html.ReportError",
+    "sessions.report.pages.ReportError",
     "sessions.exchange.csv_text.ImportRefused",
     "sessions.plan.plan.Blinded",
     "sessions.prediction.press_model.FitError",

@@ -9,7 +9,7 @@ from pathlib import Path
 from daq_app.console import WrongValue
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
-from sessions.strokes.friction import FIXED, HERTZ, PLANNED_AT, AreaLaw
+from sessions.strokes.stroke import FIXED, HERTZ, PLANNED_AT, AreaLaw
 from solver.quantities import NAMES, SED
 
 LARGEST_SEED = 10_000_000  # of a study of simulated people, each of whom has a seed a hundred times as large

@@ -16,8 +16,8 @@ from daq_app.simulation.wiring import planted_surface
 from sessions.plan.plan import Block
 from sessions.plan.protocols import plan, protocol
 from sessions.prediction import PredictionOptions
-from sessions.prediction.solving import seds_at
-from sessions.strokes.friction import FIXED, AreaLaw
+from sessions.prediction.scenes import seds_at
+from sessions.strokes.stroke import FIXED, AreaLaw
 from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
 

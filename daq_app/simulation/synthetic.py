@@ -26,8 +26,8 @@ from sessions.report.contents import Planted
 from sessions.run import steps
 from sessions.run.resuming import RESUMABLE
 from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
-from sessions.statistics.pooling.ground_truth import Spoilt
-from sessions.statistics.pooling.visit import EXCLUSIONS
+from sessions.statistics.findings import Spoilt
+from sessions.statistics.visit import EXCLUSIONS
 from simulators.bench import Bench, BenchSettings, DirectTransducer, Hurt, PlantedStroke
 from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings

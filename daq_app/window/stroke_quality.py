@@ -14,8 +14,7 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.strokes import AnalysisSettings, FlawName, FrictionParameters
 from sessions.strokes.analysis import analyse_blocks
-from sessions.strokes.flaws import Flaw
-from sessions.strokes.stroke import Stroke
+from sessions.strokes.stroke import Flaw, Stroke
 
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 

@@ -13,8 +13,7 @@ from sessions.prediction import Scene, TrialPrediction
 from sessions.prediction.stored import Alternative, Variant
 from sessions.recording.log import OUTCOMES
 from sessions.strokes.bootstrap import NUMBERS
-from sessions.strokes.friction import FrictionParameters
-from sessions.strokes.stroke import Stroke, meanings
+from sessions.strokes.stroke import FrictionParameters, Stroke, meanings
 from sessions.toml_file import from_table, toml_text
 
 Cell = str | int | float | None

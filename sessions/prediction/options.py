@@ -39,7 +39,7 @@ class PredictionOptions:
     )
     variant_intervals: bool = False  # those of the variants at finite strain too, which takes longer
     variants: Literal["none", "small", "both"] = (
-        "none"  # also otherwise, see `sessions.prediction.side_by_side`; at which strain
+        "none"  # also otherwise, see `sessions.prediction.uncertainty`; at which strain
     )
 
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 from sessions.plan.plan import SessionPlan
 from sessions.prediction.options import PredictionOptions, template, with_own_finger
-from sessions.prediction.scenes import Prepared, opposite, prepared_cases
-from sessions.prediction.solving import Progress, quick
+from sessions.prediction.scenes import Prepared, Progress, opposite, prepared_cases, quick
 from sessions.prediction.stored import ERROR_NOT_KNOWN, SessionPrediction, TrialPrediction, known_error
 from sessions.strokes import Analysis
 from solver import Finger, Prediction, Scene, SolveFailure, solve_many

@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from sessions.prediction.solving import settled
+from sessions.prediction.scenes import settled
 from solver import Friction, Loading, Prediction, Scene, SceneError, Slide, Solve
 from solver.progress import Progress, report_part
 from solver.response.nearby import stiffness_shares

@@ -10,8 +10,7 @@ from sessions.file_access import complete, converted
 from sessions.plan.plan import Stimulus
 from sessions.prediction.options import PredictionOptions, template
 from sessions.strokes.decisions import Decision
-from sessions.strokes.friction import FIXED, AreaLaw
-from sessions.strokes.stroke import Meaning
+from sessions.strokes.stroke import FIXED, AreaLaw, Meaning
 from sessions.toml_file import from_table
 from solver import Prediction, Scene
 from solver.prediction import History, Response, Skin

@@ -1,9 +1,13 @@
-"""How uncertain a predicted SED is because its friction is: the draws of the friction's bootstrap through the solver.
+"""How far a prediction may differ: by how uncertain its friction is, and in other variants of the model.
 
-Derivatives from the solver's converged tangent carry all draws. Whether that suffices is seen from a few draws that are
-solved: those at both ends of the interval, and those at both ends of every direction in which the draws spread, for
-those of mu and tau_max hang together. Where it does not, the solver is run at draws themselves. Each interval says
-which. A trial predicted by the force measured has the uncertainty of that force in it too.
+The draws of the friction's bootstrap go through the solver. Derivatives from its converged tangent carry all of them.
+Whether that suffices is seen from a few draws that are solved: those at both ends of the interval, and those at both
+ends of every direction in which the draws spread, for those of mu and tau_max hang together. Where it does not, the
+solver is run at draws themselves. Each interval says which. A trial predicted by the force measured has the uncertainty
+of that force in it too.
+
+Each variant is solved for all trials together on a mesh of its own, so that the surfaces' differences within one are
+accurate; between two they are as good as each one's error estimate.
 """
 
 from collections.abc import Sequence
@@ -12,13 +16,31 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.prediction.options import tau_scale
-from sessions.prediction.scenes import with_loads
-from sessions.prediction.solving import Progress, derivatives_by, slides
-from sessions.prediction.stored import Ends, SedInterval, SessionPrediction, TrialPrediction
+from sessions.prediction.options import PredictionOptions, tau_scale
+from sessions.prediction.scenes import (
+    Progress,
+    derivatives_by,
+    doubt_of,
+    part_of,
+    scene_along,
+    slides,
+    solved,
+    traction_reached,
+    with_loads,
+)
+from sessions.prediction.stored import (
+    Alternative,
+    Ends,
+    SedInterval,
+    SessionPrediction,
+    TrialPrediction,
+    Variant,
+    known_error,
+    variants,
+)
 from sessions.strokes import Analysis
 from sessions.strokes.bootstrap import FrictionDraws, friction_draws
-from sessions.strokes.bootstrap_settings import BootstrapSettings
+from sessions.strokes.settings import BootstrapSettings
 from solver import Prediction, Scene
 from solver.response.nearby import Nearby
 
@@ -182,3 +204,119 @@ def _extremes(carried: Array, draws: Array) -> Indices:
     axes = np.linalg.svd(units, full_matrices=False)[2]
     ranks = [round(end * (len(draws) - 1)) for end in _QUANTILES]
     return np.unique([np.argsort(way, kind="stable")[ranks] for way in (carried, *(units @ axes.T).T)])
+
+
+def with_alternatives(
+    prediction: SessionPrediction, progress: Progress | None = None, analysis: Analysis | None = None
+) -> SessionPrediction:
+    """Return a prediction with every trial predicted in the variants that its options ask for (`variants`) as well.
+
+    Where the options ask for `intervals`, each at small strain has its own, and each at finite strain where they ask
+    for `variant_intervals`; `analysis` is what the friction came from.
+    Raises Cancelled where `progress`, called with the part done, returns False.
+    """
+    kinds, options = tuple(variants(prediction.options.variants)), prediction.options
+    drawn = draws_of(analysis, prediction) if kinds and analysis is not None and options.intervals else None
+
+    def drawn_of(variant: Variant) -> Sequence[Drawn] | None:
+        return drawn if variant.kinematics == "small" or options.variant_intervals else None
+
+    count = len(kinds)
+    along = [
+        _along(prediction, variant, drawn_of(variant), part_of(progress, n / count, (n + 1) / count))
+        for n, variant in enumerate(kinds)
+    ]
+    trials = tuple(
+        _with_depth(replace(row, alternatives=tuple(one[number] for one in along)), options)
+        for number, row in enumerate(prediction.trials)
+    )
+    return replace(prediction, trials=trials)
+
+
+def _with_depth(row: TrialPrediction, options: PredictionOptions) -> TrialPrediction:
+    """Return a row whose matching depth is that of its own solve under the measured force, where there is one.
+
+    The depth of `predict` is of a rough mesh; one question has one answer.
+    """
+    driven = Variant(options.kinematics, options.tau_reading, "force")
+    driven_row = next((one for one in row.alternatives if one.variant == driven and one.sed is not None), None)
+    if driven_row is None:
+        return row
+    reasons = {name: why for name, why in row.reasons.items() if name != "matching_depth"}
+    return replace(
+        row,
+        matching_depth=driven_row.indentation,
+        matching_depth_error=driven_row.indentation_error,
+        matching_depth_interval=None if driven_row.interval is None else driven_row.interval.indentation,
+        reasons=reasons,
+    )
+
+
+def _along(
+    prediction: SessionPrediction, variant: Variant, drawn: Sequence[Drawn] | None, progress: Progress | None
+) -> tuple[Alternative, ...]:
+    """Return what each trial gives in one variant, with intervals where draws of its friction are given."""
+    rows, options = prediction.trials, prediction.options
+    known = _known(prediction, variant)
+    answers = known or _solved(prediction, variant, part_of(progress, 0.0, 0.8))
+    out = [_alternative(row, variant, tau_max, one) for row, (tau_max, one) in zip(rows, answers, strict=True)]
+    if drawn is not None:
+        before = [row.interval if variant.driven == "depth" else row.opposite_interval for row in rows]
+        if known is not None and None not in before:  # they are those of the trials themselves
+            intervals: Sequence[SedInterval | None] = before
+        else:
+            scale = tau_scale(replace(options, tau_reading=variant.tau_reading))
+            intervals = intervals_of([one for _, one in answers], drawn, scale, part_of(progress, 0.8, 1.0))
+        out = [replace(one, interval=interval) for one, interval in zip(out, intervals, strict=True)]
+    return tuple(out)
+
+
+_Answers = list[
+    tuple[float | None, Prediction | str]
+]  # for each trial the tau_max [MPa] that the model got, and what of it
+
+
+def _known(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
+    """Return what was predicted anyway: at the planned depth, slid either way."""
+    options = prediction.options
+    if (variant.kinematics, variant.tau_reading) != (options.kinematics, options.tau_reading):
+        return None
+    if variant.driven == "depth":
+        return [(row.tau_max, row.prediction or row.reasons.get("sed", "")) for row in prediction.trials]
+    if variant.driven == "other way":
+        return [(row.tau_max, row.opposite or row.reasons.get("opposite_sed", "")) for row in prediction.trials]
+    return None
+
+
+def _solved(prediction: SessionPrediction, variant: Variant, progress: Progress | None) -> _Answers:
+    """Return the same of a variant that is solved now."""
+    scenes = [scene_along(row, variant, prediction.options) for row in prediction.trials]
+    answers = iter(solved([scene for scene in scenes if not isinstance(scene, str)], progress))
+    return [(None, scene) if isinstance(scene, str) else (scene.friction.tau_max, next(answers)) for scene in scenes]
+
+
+def _alternative(
+    row: TrialPrediction, variant: Variant, tau_max: float | None, answer: Prediction | str
+) -> Alternative:
+    if isinstance(answer, str):
+        return replace(_none(row, variant, answer), tau_max=tau_max)
+    width = answer.scene.finger.width
+    return Alternative(
+        variant,
+        tau_max,
+        answer.indentation,
+        answer.sed_ending,
+        known_error(answer, answer.error_estimate),
+        answer.normal_force * width,
+        answer.tangential_force * width,
+        traction=traction_reached(answer),
+        normal_force_error=known_error(answer, answer.normal_force_error),
+        tangential_force_error=known_error(answer, answer.tangential_force_error),
+        indentation_error=known_error(answer, answer.indentation_error),
+        doubt=doubt_of(answer),
+    )
+
+
+def _none(row: TrialPrediction, variant: Variant, reason: str) -> Alternative:
+    depth = None if variant.driven == "force" else row.indentation
+    return Alternative(variant, None, depth, None, None, None, None, reason)

@@ -1,24 +1,30 @@
 """The findings of a session as plain data, ready for any export."""
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sessions.prediction import SED, SessionPrediction
+import numpy as np
+
+from sessions.plan.plan import Block, SessionPlan
+from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
-from sessions.prediction.series_slopes import other_signs
+from sessions.prediction.surface_series import other_signs
 from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
-from sessions.report.contents import Fact, Planted, PredictionFinding, Report
-from sessions.report.experiments import experiments, quantities, with_psychometric
+from sessions.report.contents import Answers, Experiment, Fact, Planted, PredictionFinding, Report, StrokeFinding
 from sessions.report.facts import scene_file, session_commands
-from sessions.report.predictions import fields, left_out, model_in_short, modelled, predictions
-from sessions.report.strokes import course, flaws, strokes
-from sessions.statistics.multiverse import Values
-from sessions.statistics.scores import ScoreTable, joined, score_table
+from sessions.report.trials import course, fields, flaws, left_out, model_in_short, modelled, predictions, strokes
+from sessions.statistics.correlations import Relation, relation
+from sessions.statistics.multiverse import PathTrial, Values, path_findings
+from sessions.statistics.psychometric import Psychometric, comparison, function_of
+from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
+from sessions.statistics.scores import ScoreTable, joined, mean_scores, score_matrix, score_table
 from sessions.strokes import Analysis
+from sessions.strokes.stroke import FIXED, AreaLaw, rule_for
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,3 +115,126 @@ def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:
         return recording.simulated_sentence
     simulated = sum(table.simulated for table in tables)
     return f"SIMULATED: {simulated} of the sessions whose scores are used here are simulated" if simulated else ""
+
+
+Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` -> block and index -> number
+
+
+def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
+    """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
+    numbers_of: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in NAMES}
+    by_number = {stroke.number: stroke for stroke in strokes}
+    for one in predictions:
+        if one.index is not None:
+            stroke = by_number.get(one.stroke or 0)
+            numbers = {name: getattr(one if name == MODEL_MU else stroke, FIELDS[name], None) for name in FIELDS}
+            numbers |= {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
+            numbers[MODEL] = one.sed
+            for name, value in numbers.items():
+                if value is not None:
+                    numbers_of[name][one.experiment, one.index].append(value)
+    return {name: {key: float(np.mean(all_of)) for key, all_of in own.items()} for name, own in numbers_of.items()}
+
+
+def with_psychometric(
+    experiments: Sequence[Experiment], recording: Recording, analysis: Analysis
+) -> tuple[Experiment, ...]:
+    """Return the experiments, those of blocks with a standard with the subject's psychometric function."""
+    blocks = {block.name: block for block in recording.plan.blocks if block.standard is not None}
+    return tuple(
+        replace(one, psychometric=_psychometric(blocks[one.name], recording, analysis)) if one.name in blocks else one
+        for one in experiments
+    )
+
+
+def _psychometric(block: Block, recording: Recording, analysis: Analysis) -> Psychometric:
+    index = {trial.number: trial.stimulus.known_index for trial in block.trials}
+    standard = next(index[trial.number] for trial in block.trials if trial.standard)
+    friction: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for one in analysis.friction:
+        if one.trial in index and one.mu is not None and one.mu > 0.0:
+            friction["", index[one.trial]].append(one.mu)
+    answers = [
+        comparison("", standard, (index[first], index[record.trial.number]), record.choice)
+        for record in recording.trials
+        if record.choice is not None and record.trial.number in index
+        for first in [record.trial.compared_with]
+        if first is not None
+    ]
+    return function_of(answers, friction)
+
+
+def experiments(
+    plan: SessionPlan,
+    tables: Sequence[ScoreTable],
+    numbers: Quantities,
+    paths: Mapping[int, Values] | None = None,
+    law: AreaLaw = FIXED,
+    response: str = SED.name,
+) -> tuple[Experiment, ...]:
+    """Return one experiment a block; `numbers` are the `quantities` of its surfaces.
+
+    `response` names the quantity of the model that is held against scores and rivals. `paths` holds that of each
+    trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
+    number was given.
+    """
+    main = [block for block in plan.blocks if block.phase == "main"]
+    return tuple(_experiment(block, plan.subject, tables, numbers, paths or {}, law, response) for block in main)
+
+
+def _experiment(
+    block: Block,
+    subject: str,
+    tables: Sequence[ScoreTable],
+    numbers: Quantities,
+    paths: Mapping[int, Values],
+    law: AreaLaw,
+    response: str,
+) -> Experiment:
+    descriptor = block.trials[0].stimulus.descriptor
+    indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
+    means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
+    score_of = {mean.index: mean.mean for mean in means}
+    answers = score_matrix(tables, descriptor)
+    own = {index: score for index, score in answers.get(subject, {}).items() if len(answers) > 1 and index in indices}
+    series = {
+        name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
+        for name, values in numbers.items()
+    }
+    label = BY_NAME[response].label
+    predicted = series.get(label, {})
+    return Experiment(
+        name=block.name,
+        descriptor=descriptor,
+        instruction=block.instruction,
+        direction=block.direction,
+        indentation=block.indentation,
+        scale_ends=block.scale_ends,
+        indices=indices,
+        scores=means,
+        answers=tuple(Answers(subject, tuple(row.get(index) for index in indices)) for subject, row in answers.items()),
+        score_relation=_related(score_of, predicted),
+        index_relation=_related({index: float(index) for index in indices}, predicted),
+        own_relation=_related(own, predicted),
+        own_scores=own,
+        rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
+        response=response,
+        paths=path_findings(
+            [
+                PathTrial("", index, score_of.get(index), rule_for(trial), paths.get(trial.number, ()))
+                for trial in block.trials
+                for index in [trial.stimulus.known_index]
+            ],
+            "small",
+            law,
+            within=False,
+        ),
+    )
+
+
+def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:
+    """Return how responses go with x, over the indices that have both; None where there is none."""
+    shared = [index for index in sorted(x) if index in responses]
+    if not shared:
+        return None
+    return relation([x[index] for index in shared], [responses[index] for index in shared], shared)

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 from sessions.prediction import Response
 from sessions.prediction.stored import Alternative, Ends, SedInterval
+from sessions.statistics.correlations import Relation
 from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
-from sessions.statistics.scales.psychometric import Psychometric
-from sessions.statistics.scores import MeanScore, Relation
+from sessions.statistics.scores import MeanScore
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

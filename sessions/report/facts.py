@@ -20,8 +20,8 @@ from sessions.report.wording import stopped
 from sessions.statistics.multiverse import PATHS, Values
 from sessions.statistics.scores import ScoreTable, grading, reversed_subjects
 from sessions.strokes.analysis import Analysis
-from sessions.strokes.friction import PLANNED_AT, AreaLaw
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.stroke import PLANNED_AT, AreaLaw
 from sessions.toml_file import toml_text
 
 

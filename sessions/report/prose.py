@@ -7,7 +7,7 @@ from sessions.prediction.stored import Variant
 from sessions.report.contents import Experiment, PredictionFinding, Report
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import compared_with_standard, psychometric_sentences
-from sessions.report.tables.scores import paths_sentence
+from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import (
     ShownResponse,
     capital,
@@ -18,7 +18,7 @@ from sessions.report.wording import (
     shown_response,
     spread_share,
 )
-from sessions.statistics.scores import Relation, relation
+from sessions.statistics.correlations import Relation, relation
 
 REACH = 2.0  # of the places that are looked at, along the skin to both sides of the ending [mm]
 OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; 'daq-app sensitivity' tries 900 of them."

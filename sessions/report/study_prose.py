@@ -15,10 +15,10 @@ from sessions.report.facts import area_words, calibration_words, model_words
 from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import compared_in_study, psychometric_sentences, scale_sentences
-from sessions.report.tables.scores import paths_sentence
+from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import capital, correlation, digits, plural, significant, stopped
-from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.pooling.visit import Exclusion
+from sessions.statistics.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.visit import Exclusion
 
 _FEW = 12  # trials named one by one
 

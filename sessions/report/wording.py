@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from sessions.prediction import BY_NAME, SED, shown_unit
 from sessions.report.contents import Numbers, PredictionFinding
-from sessions.statistics.scores import Relation
+from sessions.statistics.correlations import Relation
 
 NONE = "–"
 

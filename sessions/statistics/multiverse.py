@@ -26,14 +26,14 @@ from sessions.prediction import (
     SessionPrediction,
     part_of,
 )
-from sessions.prediction.scenes import scenes_of
-from sessions.prediction.solving import settled, slides
+from sessions.prediction.scenes import scenes_of, settled, slides
 from sessions.recording import Recording
-from sessions.statistics.scores import pearson, surface_means
+from sessions.statistics.correlations import pearson
+from sessions.statistics.scores import surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
-from sessions.strokes.friction import FIXED, HERTZ, AreaLaw, Rule
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
+from sessions.strokes.stroke import FIXED, HERTZ, AreaLaw, Rule
 
 Pair = tuple[float, float]
 Kinematics = Literal["small", "finite"]

@@ -7,15 +7,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from sessions.prediction import BY_NAME, SED
-from sessions.statistics.dependent_correlations import (
+from sessions.statistics.correlations import (
+    CONFIDENCE,
     Contrast,
     cases_needed,
     contrast,
+    fisher_interval,
     left_out_error,
     partial_correlation,
+    pearson,
+    relation,
+    spearman,
 )
 from sessions.statistics.mixed_model import Array, akaike_weights, crossed_deviance
-from sessions.statistics.scores import CONFIDENCE, fisher_interval, pearson, relation, spearman, surface_means
+from sessions.statistics.scores import surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
 MODEL = SED.label  # the published quantity, to which the others are compared where no other is named

@@ -1,6 +1,5 @@
 """Scores of several subjects: means with their intervals, and how they go with a prediction."""
 
-import itertools
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -8,7 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from sessions.statistics.correlations import CONFIDENCE, pearson, t_quantile
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
@@ -16,10 +16,8 @@ from itertools import pairwise
 
 from sessions.recording.log import TrialRecord
 
-CONFIDENCE = 0.95
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
 _RESAMPLES = 10_000
-_EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
 
 
 def bounds(low: float | None, high: float | None) -> tuple[float, float] | None:
@@ -74,24 +72,6 @@ class MeanScore:
     low: float | None  # 95 % t interval of the mean
     high: float | None
     bootstrap: tuple[float, float] | None  # percentile interval over subjects, only where the t interval leaves 0..100
-    reason: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Relation:
-    """How y goes with x over n stimuli. A number is None where `reason` says why."""
-
-    n: int
-    pearson: float | None
-    low: float | None  # 95 % interval of pearson (Fisher's z)
-    high: float | None
-    spearman: float | None
-    spearman_low: float | None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
-    spearman_high: float | None
-    spearman_p: float | None  # exact, two-sided: the share of all orders at least as far from 0
-    slope: float | None  # least-squares line y = intercept + slope x
-    intercept: float | None
-    without: tuple[tuple[int, float | None], ...]  # (label, pearson over the others) for each stimulus left out
     reason: str | None
 
 
@@ -167,27 +147,6 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
     )
 
 
-def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
-    """Return how y goes with x; `labels` name the points (their stimulus' index).
-
-    Pearson's r with its 95 % interval by Fisher's z, which takes four points and |r| < 1; Spearman's rho with its
-    exact p up to seven points; the least-squares line of y on x.
-    """
-    n = len(x)
-    without = tuple((label, pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
-    r = pearson(x, y)
-    if r is None:
-        few = "1 point is" if n == 1 else f"{n} points are"
-        why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
-        return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
-    slope, intercept = np.polyfit(x, y, 1)
-    low, high = fisher_interval(r, n)
-    why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
-    rho = _rank_correlation(x, y)
-    ends = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
-    return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
-
-
 def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, float], ...]:
     """Return (subject, descriptor, r) of all whose scores fall as the index rises.
 
@@ -207,17 +166,6 @@ def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, 
         if score.descriptor == descriptor:
             rows[score.subject][score.index] = score.score
     return {subject: rows[subject] for subject in sorted(rows)}
-
-
-def t_quantile(dof: float) -> float:
-    """Return how many standard errors a 95 % t interval reaches to each side; of a normal law where `dof` is inf.
-
-    >>> round(t_quantile(9), 3), round(t_quantile(math.inf), 3)
-    (2.262, 1.96)
-    """
-    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
-
-    return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
 
 
 def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
@@ -240,18 +188,6 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
     return low, high
 
 
-def slope_interval(related: Relation) -> tuple[float, float] | None:
-    """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without one, or where r is 0 or 1.
-
-    Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
-    """
-    r, slope, n = related.pearson, related.slope, related.n
-    if r is None or slope is None or not r or n < 3 or abs(r) > 1 - 1e-12:
-        return None
-    half = t_quantile(n - 2) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
-    return slope - half, slope + half
-
-
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
     n, mean = len(values), float(np.mean(values))
     if n < 2:
@@ -266,59 +202,6 @@ def _bootstrap(values: Sequence[float]) -> tuple[float, float]:
     drawn = np.random.default_rng(0).choice(np.asarray(values), (_RESAMPLES, len(values)))
     low, high = np.quantile(drawn.mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
     return float(low), float(high)
-
-
-def _varies(values: Sequence[float]) -> bool:
-    """Say whether values differ by more than round-off."""
-    return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))
-
-
-def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
-    if len(x) < 3 or not _varies(x) or not _varies(y):
-        return None
-    return float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
-
-
-def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """Return Spearman's rho, None for fewer than three points or where one of the two does not vary."""
-    return None if pearson(x, y) is None else _rank_correlation(x, y)
-
-
-def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
-    return float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
-
-
-def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
-
-    None for fewer than four points, or where all points agree wholly or are each other's reverse.
-    """
-    if n < 4 or abs(r) > 1 - 1e-12:
-        return None, None
-    half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
-    return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
-
-
-def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
-    """Return the ranks from 1 on, the same for equal values: the middle of those they share.
-
-    >>> _ranks([3.0, 1.0, 3.0])
-    array([2.5, 1. , 2.5])
-    """
-    _, at, counts = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
-    return (np.cumsum(counts) - (counts - 1) / 2)[at]
-
-
-def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
-    """Return the share of all orders of y whose |rho| is at least |rho|; None where they are too many to count."""
-    n = len(x)
-    if n > _EXACT_UP_TO:
-        return None
-    rank_x, rank_y = _ranks(x) - (n + 1) / 2, _ranks(y) - (n + 1) / 2
-    orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
-    rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))
-    return float(np.mean(np.abs(rhos) >= abs(rho) - 1e-12))
 
 
 def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:

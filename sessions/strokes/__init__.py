@@ -1,10 +1,9 @@
 """From readings to strokes, their friction, and what is wrong with them."""
 
-from sessions.strokes.analysis import ZERO_SETTING, ZERO_STATED, Analysis, analyse
-from sessions.strokes.flaws import Flaw, FlawName
-from sessions.strokes.friction import FrictionParameters
+from sessions.strokes.analysis import Analysis, analyse
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.stroke import Stroke, StrokeCurve
+from sessions.strokes.stroke import Flaw, FlawName, FrictionParameters, Stroke, StrokeCurve
+from sessions.strokes.trial_analysis import ZERO_SETTING, ZERO_STATED
 
 __all__ = [
     "ZERO_SETTING",

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.event_uncertainty import break_away_draws, onset_draws, slide_onset_draws
-from sessions.strokes.friction import Rule
-from sessions.strokes.stroke import Interval, Stroke, StrokeCurve
+from sessions.strokes.settings import BootstrapSettings
+from sessions.strokes.stroke import Interval, Rule, Stroke, StrokeCurve
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]

@@ -10,8 +10,8 @@ speed, at which it is detected, that decides.
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.bootstrap_settings import BootstrapSettings
 from sessions.strokes.onset import onset_threshold
+from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stick import ClimbReadings, thin
 
 Array = NDArray[np.float64]

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
-from sessions.strokes.flaws import FlawName, Grade
 from sessions.strokes.invalid_readings import (
     ConstantRun,
     at_the_same_value,
@@ -20,6 +19,7 @@ from sessions.strokes.invalid_readings import (
     spikes,
 )
 from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.stroke import FlawName, Grade
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording

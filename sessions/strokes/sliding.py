@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import Frame
-from sessions.strokes.flaws import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.span import Span, Track, mean_vector
+from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

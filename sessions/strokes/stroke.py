@@ -1,11 +1,19 @@
-"""A stroke: the touching movement inside a trial, with its numbers and what is wrong with them."""
+"""A stroke, the touching movement inside a trial: its numbers, its flaws, and the friction that the model gets of it.
+
+Hertz: of a smooth elastic sphere on a plane the area grows as N^(2/3) (Johnson 1985, Contact Mechanics, section 4.2).
+A finger is neither; the exponent and the force at which the area is the planned one are assumed unless somebody gives
+them. No area is measured here.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, NamedTuple, get_origin, get_type_hints
+from enum import StrEnum
+from typing import Annotated, Any, Literal, NamedTuple, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
+
+from sessions.plan.plan import PROXIMAL_TO_DISTAL, Trial
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -103,3 +111,168 @@ def meanings(record: type) -> dict[str, Meaning]:
     """Return unit and meaning of each field of a record that has one, by its name, for those who read its tables."""
     hints = get_type_hints(record, include_extras=True)
     return {name: hint.__metadata__[0] for name, hint in hints.items() if get_origin(hint) is Annotated}
+
+
+Grade = Literal["note", "doubtful", "refused"]  # numbers stand; numbers stand but doubt them; numbers were withheld
+
+
+class FlawName(StrEnum):
+    """Every flaw there is."""
+
+    LOST_READINGS = "lost_readings"
+    SATURATED = "saturated"
+    DEVICE_FAULT = "device_fault"  # the device tells of a fault of its own
+    FROZEN = "frozen_sensor"
+    DEAD = "dead_sensor"
+    WILD = "wild_reading"
+    IRREGULAR_TIME = "irregular_time"
+    UNKNOWN_RATE = "unknown_rate"
+    RECORDING = "recording"  # what the recording itself says it lost
+    NO_UNLOADED_STRETCH = "no_unloaded_stretch"
+    ZERO_AFTER_CONTACT = "zero_after_contact"
+    DRIFT = "drift"
+    TILT_ASSUMED = "tilt_assumed"  # no press tells how the face leans
+    NORMAL_IMPLAUSIBLE = "normal_axis_implausible"
+    UNITS_IMPLAUSIBLE = "units_implausible"
+    NO_STROKE = "no_stroke"
+    SECOND_STROKE = "second_stroke"
+    LIGHT_TOUCH = "light_touch"
+    TAP = "tap"
+    NOT_LIFTED = "not_lifted_between"
+    TURNED = "turned_without_lift"
+    BEGINS_IN_CONTACT = "begins_in_contact"
+    ENDS_IN_CONTACT = "ends_in_contact"
+    SLOW_ONSET = "slow_onset"
+    TOO_LITTLE_FORCE = "too_little_force"
+    RATIO_ABOVE_ONE = "ratio_above_one_at_low_force"
+    RATIO_ABOVE_ONE_THROUGHOUT = "ratio_above_one"
+    STICK_SLIP = "stick_slip"
+    SIDE_LOAD = "side_load"
+    NO_STEADY_SLIDING = "no_steady_sliding"
+    ROLLED = "may_only_roll"
+    SPEED_NOT_MEASURABLE = "speed_not_measurable"
+    HEIGHT_UNKNOWN = "height_unknown"
+    DIRECTION_TURNS = "direction_turns"
+    DIRECTION_DISAGREES = "direction_disagrees"
+    WRONG_DIRECTION = "wrong_direction"
+    DECISION = "decision"  # what a person decided cannot be done, or cannot be read
+
+
+@dataclass(frozen=True, slots=True)
+class Flaw:
+    """One named defect, where it lies and what it costs."""
+
+    name: FlawName
+    sentence: str  # what was found, and what it does to the numbers
+    grade: Grade
+    trial: int | None = None  # None: the whole recording, or a recording without trials
+    stroke: int | None = None  # position in `Analysis.strokes`; None: not one stroke's
+
+
+COEFFICIENTS = ("mu_static", "mu_dynamic", "mu_dynamic_sd", "mu_dynamic_interval", "mu_max", "tau_max", "contact_area")
+LOADS = ("normal_force", "tangential_force", "peak_normal", "peak_tangential")
+PEAKS = ("mu_static", "mu_max", "tau_max", "contact_area", "peak_normal", "peak_tangential")
+SPEED = ("speed", "speed_error")
+DIRECTION = ("direction", "direction_from", "heading")
+EVERYTHING = (*COEFFICIENTS, *LOADS, *SPEED, *DIRECTION, "steady", "readings", "break_away", "slide_onset")
+
+
+@dataclass
+class Findings:
+    """Numbers and flaws of one stroke while they are gathered."""
+
+    numbers: dict[str, Any] = field(default_factory=dict[str, Any])
+    flaws: list[Flaw] = field(default_factory=list[Flaw])
+    reasons: dict[str, str] = field(default_factory=dict[str, str])
+
+    def flaw(self, name: FlawName, sentence: str, grade: Grade, withheld: tuple[str, ...] = ()) -> None:
+        """Name a flaw, and the numbers it forbids; the first to forbid a number is its reason."""
+        self.flaws.append(Flaw(name, sentence, grade))
+        for number in withheld:
+            self.reasons.setdefault(number, str(name))
+
+    def allowed(self, names: tuple[str, ...]) -> Mapping[str, Any]:
+        """Return the numbers under these names, None for those that are missing or forbidden."""
+        return {name: None if name in self.reasons else self.numbers.get(name) for name in names}
+
+
+HERTZ = 2.0 / 3.0
+PLANNED_AT = 2.0  # normal force at which an area that grows is the planned one, where nobody said another [N]
+
+
+@dataclass(frozen=True, slots=True)
+class AreaLaw:
+    """Contact area = planned area x (N / force)^exponent; `exponent` 0 is a fixed area."""
+
+    law: Literal["fixed", "hertz", "power"] = "fixed"
+    exponent: float = 0.0
+    force: float = PLANNED_AT  # [N]
+
+    def area(self, normal: Array, planned: float) -> Array:
+        """Return the contact area (n,) [mm2] under a normal force (n,) [N], > 0; `planned` [mm2].
+
+        >>> AreaLaw("power", 0.5, 1.0).area(np.array([1.0, 4.0]), 100.0)
+        array([100., 200.])
+        """
+        return planned * (normal / self.force) ** self.exponent
+
+    @property
+    def sentence(self) -> str:
+        """The law, for people, with what was assumed."""
+        if self.law == "fixed":
+            return "fixed, whatever the normal force"
+        assumed = ", assumed" if self.force == PLANNED_AT else ", set"
+        why = "Hertz, sphere on plane: Johnson 1985, section 4.2; assumed of a finger" if self.law == "hertz" else "set"
+        return f"grows as N^{self.exponent:.3g} ({why}), and is the planned one at {self.force:g} N{assumed}"
+
+
+FIXED = AreaLaw()
+
+
+Rule = Literal["maximum", "mean over steady window"]
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionParameters:
+    """What the model gets of one stroke. None where honesty allows no number."""
+
+    trial: Annotated[int | None, Meaning("", "number of the trial")]
+    stroke: Annotated[int, Meaning("", "position of the stroke, from 0")]
+    mu: Annotated[float | None, Meaning("", "coefficient of friction the model is given")]
+    mu_interval: tuple[float, float] | None  # the bootstrap's, of that very number; None before it is drawn
+    tau_max: Annotated[float | None, Meaning("MPa", "traction bound the model is given")]
+    contact_area: Annotated[float, Meaning("mm2", "for which tau_max was computed")]
+    speed: Annotated[float | None, Meaning("mm/s", "of the stroke")]
+    direction: Annotated[int | None, Meaning("", "+1 proximal to distal, -1 back, as measured")]
+    rule: Annotated[Rule, Meaning("", "which T/N mu is")]
+    flaws: Annotated[tuple[str, ...], Meaning("", "names of what is wrong with the stroke")]
+
+
+def rule_for(trial: Trial | None) -> Rule:
+    """Return the paper's choice (section 3): the maximum for stickiness, the mean over the steady range elsewhere.
+
+    A protocol with other descriptors is judged by direction: pushed forward the skin is blocked first, as in the
+    paper's stickiness, and the maximum is about the dynamic value. A recording without a plan gets the mean.
+    """
+    if trial is None or trial.stimulus.descriptor == "slipperiness":
+        return "mean over steady window"
+    if trial.stimulus.descriptor == "stickiness" or trial.direction == PROXIMAL_TO_DISTAL:
+        return "maximum"
+    return "mean over steady window"
+
+
+def friction_parameters(stroke: Stroke, at: int, trial: Trial | None, contact_area: float) -> FrictionParameters:
+    """Return what the model gets of the stroke at a position of `Analysis.strokes`."""
+    rule = rule_for(trial)
+    return FrictionParameters(
+        trial=stroke.trial,
+        stroke=at,
+        mu=stroke.mu_max if rule == "maximum" else stroke.mu_dynamic,
+        mu_interval=None,
+        tau_max=stroke.tau_max,
+        contact_area=stroke.contact_area or contact_area,
+        speed=stroke.speed,
+        direction=stroke.direction,
+        rule=rule,
+        flaws=stroke.flaws,
+    )

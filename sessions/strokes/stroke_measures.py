@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import StrokeDecisions
-from sessions.strokes.flaws import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings, Flaw, FlawName
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.sliding import slide
 from sessions.strokes.span import (
@@ -22,7 +21,7 @@ from sessions.strokes.span import (
     unfiltered_forces,
 )
 from sessions.strokes.stick import break_away, power_of_normal_force, stick_slip
-from sessions.strokes.stroke import Stroke
+from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, EVERYTHING, PEAKS, SPEED, Findings, Flaw, FlawName, Stroke
 
 Array = NDArray[np.float64]
 

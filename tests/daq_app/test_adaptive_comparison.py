@@ -17,11 +17,11 @@ from sessions.plan.protocols.protocol import FOLDER
 from sessions.plan.study import StudyError, create_study
 from sessions.recording import Recording
 from sessions.recording.archive import problems
-from sessions.report.experiments import experiments, with_psychometric
+from sessions.report import experiments, with_psychometric
 from sessions.run.resuming import resumption
 from sessions.run.states import Mounting
-from sessions.statistics.scales.psychometric import QUARTILE
-from sessions.strokes.friction import FIXED
+from sessions.statistics.psychometric import QUARTILE
+from sessions.strokes.stroke import FIXED
 from simulators.subject import SubjectSettings
 
 ADAPTIVE = protocol("adaptive-comparison")

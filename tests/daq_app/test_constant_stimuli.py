@@ -11,17 +11,17 @@ from daq_app.simulation.wiring import SimulatedPeople, planted_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording
-from sessions.report.experiments import experiments, with_psychometric
+from sessions.report import experiments, with_psychometric
 from sessions.report.tables.scales import (
     compared_in_study,
     compared_with_standard,
     psychometric_sentences,
     psychometric_table,
 )
-from sessions.statistics.pooling.answers import constant_stimuli
-from sessions.statistics.pooling.visit import VisitOptions, visit_of
-from sessions.statistics.scales.psychometric import QUARTILE
-from sessions.strokes.friction import FIXED
+from sessions.statistics.answers import constant_stimuli
+from sessions.statistics.psychometric import QUARTILE
+from sessions.statistics.visit import VisitOptions, visit_of
+from sessions.strokes.stroke import FIXED
 from simulators.subject import SubjectSettings
 
 

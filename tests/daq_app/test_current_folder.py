@@ -17,7 +17,7 @@ from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, Failed, Gone
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.take_watch import Judge
-from sessions.statistics.pooling.visit import VisitOptions
+from sessions.statistics.visit import VisitOptions
 from solver.verification import processes
 
 PROGRAM = Path(__file__).parents[2]

@@ -26,9 +26,9 @@ from sessions.recording import Recording
 from sessions.recording.archive import seal
 from sessions.recording.derived import gain_error_set
 from sessions.report import findings
-from sessions.statistics.pooling.visit import VisitOptions, visit_of
+from sessions.statistics.visit import VisitOptions, visit_of
 from sessions.strokes import AnalysisSettings, analyse
-from sessions.strokes.stored import bootstrap_settings, check_analysis
+from sessions.strokes.analysis import bootstrap_settings, check_analysis
 from sessions.toml_file import SettingsError
 
 ROOT = Path(__file__).parents[2]

@@ -17,7 +17,7 @@ from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import revealed
-from sessions.statistics.pooling.ground_truth import checked_planted, found_flaws, found_friction, recovered
+from sessions.statistics.findings import checked_planted, found_flaws, found_friction, recovered
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])

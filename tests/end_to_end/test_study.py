@@ -20,7 +20,7 @@ from sessions import file_access
 from sessions.prediction import PredictionOptions
 from sessions.recording import RecordingError
 from sessions.recording.head import software_versions
-from sessions.statistics.pooling.visit import Visit, VisitOptions
+from sessions.statistics.visit import Visit, VisitOptions
 
 STEADY = VisitOptions()
 QUICK = VisitOptions(PredictionOptions(course="steady"))

@@ -19,9 +19,10 @@ from sessions.report.contents import (
     StrokeFinding,
     Trace,
 )
+from sessions.statistics.correlations import relation
 from sessions.statistics.multiverse import PATHS, PathTrial, path_findings
 from sessions.statistics.rivals import rivals_of_means
-from sessions.statistics.scores import Score, ScoreTable, mean_scores, relation, score_matrix
+from sessions.statistics.scores import Score, ScoreTable, mean_scores, score_matrix
 
 # The published Tables 1 and 2, and SEDs of the small-strain reference where it has them, else between its neighbours.
 TABLES = {

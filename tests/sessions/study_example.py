@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from sessions.statistics.multiverse import PATHS
-from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import Exclusion, TrialRow, Visit, VisitOptions
+from sessions.statistics.pooled import pooled
+from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions
 
 INDICES = (0, 20, 50, 80, 100)
 MEASURED = {"tau_max": 0.02, "speed": 20.0, "normal_force": 2.5}

@@ -17,7 +17,7 @@ from sessions.prediction.afferent import (
     spike_times,
     usual_settings,
 )
-from sessions.report.predictions import afferent_facts
+from sessions.report.trials import afferent_facts
 from solver.quantities import NAMES
 
 USUAL = AfferentSettings()

@@ -7,7 +7,7 @@ import pytest
 from made_strokes import SETTINGS, T, analysed, block, felt, stroke, trial
 
 from sessions.strokes.bootstrap import BootstrapSettings, stroke_intervals
-from sessions.strokes.friction import FIXED, HERTZ, AreaLaw
+from sessions.strokes.stroke import FIXED, HERTZ, AreaLaw
 
 PRESSED = 6.0  # N, with a mu of 0.5: 3 N sideways
 GAINS_ALONE = BootstrapSettings(repeats=20000, gain_error=0.02, cross_talk=0.0, tilt_error=(0.0, 0.0))

@@ -18,9 +18,9 @@ from daq_app.simulation.ground_truth import relations
 from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes
 from daq_app.simulation.wiring import planted_surface
 from sessions.plan.protocols import plan, protocol
-from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, SED_TERM
-from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import TrialRow, Visit
+from sessions.statistics.findings import CARRY_OVER, DRIFT, SED_TERM
+from sessions.statistics.pooled import pooled
+from sessions.statistics.visit import TrialRow, Visit
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 

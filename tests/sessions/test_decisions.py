@@ -15,9 +15,8 @@ from recordings import ended
 from sessions.plan.plan import Frame
 from sessions.recording import Recording
 from sessions.recording.archive import problems, seal
-from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.analysis import analyse_blocks, with_present
 from sessions.strokes.bootstrap import stroke_intervals
-from sessions.strokes.decision_preview import with_present
 from sessions.strokes.decisions import DECISIONS, Decision, DecisionError, Decisions, append, parse, read
 
 WINDOW = Decision("E02", "the ramp was in it", "steady", 1, 1, (1.1, 2.9), (1.5, 2.5))

@@ -29,7 +29,7 @@ from drivers.transducer import StatusTable, bit
 from sessions.plan.plan import Frame
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.decisions import Decision, Decisions
-from sessions.strokes.flaws import Flaw, FlawName
+from sessions.strokes.stroke import Flaw, FlawName
 
 ALONG = 25.0 * (T - 2.0)
 HALF = 0.5 * np.ones_like(T)

@@ -8,8 +8,8 @@ import pytest
 from made_strokes import PLAIN, SETTINGS, N, T, analysed, block, felt, names, stroke, times, trapezium, trial, wrench
 
 from sessions.strokes import FlawName
-from sessions.strokes.friction import rule_for
 from sessions.strokes.settings import SystematicSettings
+from sessions.strokes.stroke import rule_for
 from sessions.strokes.stroke_measures import EVERYTHING
 
 

@@ -16,9 +16,9 @@ from report_example import TABLES, bare, example
 from study_example import study
 
 from sessions.report.figures import plates
-from sessions.report.html import page, study_page, write_figures
+from sessions.report.pages import page, study_page, write_figures
 from sessions.report.study_prose import remarks
-from sessions.report.tables import tables
+from sessions.report.tables.session import tables
 
 PDFTOTEXT = shutil.which("pdftotext")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -75,12 +75,12 @@ def drawn(drawing):
 @pytest.fixture
 def drawn_before(drawn, monkeypatch):
     """Let nothing be drawn anew."""
-    monkeypatch.setattr("sessions.report.html.plates", lambda _: drawn)
+    monkeypatch.setattr("sessions.report.pages.plates", lambda _: drawn)
 
 
 @pytest.fixture(scope="module")
 def made(report, drawn):
-    with patch("sessions.report.html.plates", lambda _: drawn):  # drawn once for all
+    with patch("sessions.report.pages.plates", lambda _: drawn):  # drawn once for all
         return page(report)
 
 

@@ -14,7 +14,7 @@ from study_example import study
 from sessions.exchange.csv_text import harmless, plain, write_rows
 from sessions.report.figures import plates
 from sessions.report.figures.style import look, sheet, svg
-from sessions.report.html import page, panel_csv, study_page
+from sessions.report.pages import page, panel_csv, study_page
 
 SCRIPT = 'q"><script>document.title="X"</script><g x="'
 SVG = re.compile(r"<svg.*?</svg>", re.DOTALL)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from sessions.statistics.scales.paired import Choice, consistence, paired_scale
+from sessions.statistics.scales import Choice, consistence, paired_scale
 
 # Games of the American League East in 1987: home team in the row, its wins and losses against the team of the column
 # (Agresti 2002, Categorical Data Analysis, 2nd ed., Table 10.11).

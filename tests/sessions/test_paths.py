@@ -6,8 +6,7 @@ import pytest
 from report_session import record
 
 from sessions.prediction import BY_NAME, PredictionOptions, predict
-from sessions.prediction.scenes import scenes_of
-from sessions.prediction.solving import settled
+from sessions.prediction.scenes import scenes_of, settled
 from sessions.recording import Recording
 from sessions.statistics.multiverse import (
     PATHS,

@@ -10,16 +10,15 @@ import pytest
 from study_example import INDICES, study, visit
 
 from sessions.prediction import BY_NAME, PredictionOptions
-from sessions.report.html import study_page
-from sessions.report.study_csv import trials_csv
+from sessions.report.pages import study_page, trials_csv
 from sessions.report.study_prose import command, excluded, remarks, summary
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_scores
+from sessions.statistics.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED_TERM, WITHIN
 from sessions.statistics.multiverse import PATHS
-from sessions.statistics.pooling.findings import CARRY_OVER, DRIFT, FRICTION, INDEX, SED_TERM, WITHIN
-from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import Exclusion, Visit, VisitOptions, exclusions_in
-from sessions.strokes.friction import HERTZ, AreaLaw
+from sessions.statistics.pooled import pooled
+from sessions.statistics.visit import Exclusion, Visit, VisitOptions, exclusions_in
+from sessions.strokes.stroke import HERTZ, AreaLaw
 from sessions.toml_file import SettingsError
 
 VISITS = [visit(number) for number in range(1, 11)]

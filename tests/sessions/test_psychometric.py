@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize, special, stats
 
-from sessions.statistics.scales.psychometric import QUARTILE, Level, psychometric
+from sessions.statistics.psychometric import QUARTILE, Level, psychometric
 
 # Brightness of a light by one of 35 units (Gegenfurtner 1992, Behav. Res. Methods 24, 560): level, presented, brighter.
 BRIGHTNESS = ((10, 49, 2), (20, 48, 3), (30, 48, 13), (40, 50, 31), (50, 47, 38), (60, 49, 48))

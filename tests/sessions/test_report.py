@@ -16,10 +16,10 @@ from sessions.recording import Recording, SessionWriter
 from sessions.report import Further, findings
 from sessions.report.contents import Planted
 from sessions.report.figures.relation import relation_panel
-from sessions.report.html import page
+from sessions.report.pages import page
 from sessions.report.prose import summary
-from sessions.report.strokes import _extremes
-from sessions.report.tables.scores import relation_table
+from sessions.report.tables.session import relation_table
+from sessions.report.trials import _extremes
 from sessions.report.wording import shown_response
 from sessions.statistics.scores import Score, ScoreTable, score_table
 from sessions.strokes.analysis import analyse

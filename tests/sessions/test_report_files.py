@@ -3,7 +3,7 @@
 import pytest
 from report_example import bare
 
-from sessions.report.html import ReportError, write_report
+from sessions.report.pages import ReportError, write_report
 
 
 def test_writing_replaces_an_older_page_and_leaves_nothing_beside_it(tmp_path):

@@ -10,12 +10,11 @@ from scipy import optimize, stats
 from study_example import study
 
 from sessions.report.figures import picture
-from sessions.report.html import study_page
+from sessions.report.pages import rivals_csv, study_page
 from sessions.report.prose import told_apart
-from sessions.report.study_csv import rivals_csv
-from sessions.report.tables import tables
 from sessions.report.tables.rivals import rivals_sentences
-from sessions.statistics.dependent_correlations import (
+from sessions.report.tables.session import tables
+from sessions.statistics.correlations import (
     cases_needed,
     contrast,
     left_out_error,

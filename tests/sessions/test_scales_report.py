@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from sessions.report.tables.scales import scale_sentences, scales_table
-from sessions.statistics.pooling.answers import choices, constant_stimuli, exponent
-from sessions.statistics.scales.paired import MODELS, Choice, consistence, paired_scale
+from sessions.statistics.answers import choices, constant_stimuli, exponent
+from sessions.statistics.scales import MODELS, Choice, consistence, paired_scale
 
 
 def descriptor(answered, found=None):

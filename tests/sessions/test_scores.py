@@ -8,13 +8,13 @@ from recordings import begun
 
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.recording import Recording
+from sessions.statistics.correlations import relation
 from sessions.statistics.scores import (
     Score,
     ScoreTable,
     grading,
     joined,
     mean_scores,
-    relation,
     reversed_subjects,
     score_matrix,
     score_table,

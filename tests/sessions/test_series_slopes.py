@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sessions.prediction.series_slopes import SERIES, Press, other_signs, series_slopes
+from sessions.prediction.surface_series import SERIES, Press, other_signs, series_slopes
 from solver import Finger, Friction, Loading, Scene, Solve, solve_many
 from solver.quantities import NAMES
 from solver.scene.published import scene

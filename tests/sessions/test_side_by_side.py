@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 
-from sessions.prediction import PredictionOptions, predict, side_by_side
-from sessions.prediction.side_by_side import with_alternatives
+from sessions.prediction import PredictionOptions, predict, uncertainty
 from sessions.prediction.stored import Variant
+from sessions.prediction.uncertainty import with_alternatives
 from solver import Friction, Loading, Scene, Solve, solve
 from solver.scene.published import STICKINESS
 
@@ -104,7 +104,7 @@ def test_where_a_strain_has_no_settled_slide_the_solver_s_sentence_stands_in_its
         asked.extend(scene.solve.kinematics for scene in scenes)
         return tuple("There is none." for _ in scenes)
 
-    monkeypatch.setattr(side_by_side, "solved", none)
+    monkeypatch.setattr(uncertainty, "solved", none)
     (row,) = with_alternatives(predict(*given((4,)), PredictionOptions(course="steady", variants="both"))).trials
     assert asked == ["small"] * 2 + ["finite"] * 4
     assert of(row, "computed", "depth", "finite").sed is None

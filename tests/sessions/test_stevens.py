@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sessions.statistics.scales.stevens import stevens_exponent
+from sessions.statistics.scales import stevens_exponent
 
 MU = np.array([0.24, 0.36, 0.44, 0.52, 0.62])
 

@@ -8,8 +8,8 @@ from dataclasses import fields
 import pytest
 from study_example import study
 
-from sessions.report.study_csv import _MEANING, columns_csv, paths_csv, trials_csv
-from sessions.statistics.pooling.visit import TrialRow
+from sessions.report.pages import _MEANING, columns_csv, paths_csv, trials_csv
+from sessions.statistics.visit import TrialRow
 
 RSCRIPT = shutil.which("Rscript")
 

@@ -10,7 +10,7 @@ from made_strokes import INFO, SETTINGS, analysed, block, felt, plan, stroke, ti
 from sessions.recording import Recording
 from sessions.strokes.analysis import analyse, analyse_blocks
 from sessions.strokes.bootstrap import SystematicDraws
-from sessions.strokes.tilt import tilt_of
+from sessions.strokes.trial_analysis import tilt_of
 
 T = times(12.0)
 LEAN = (2.0, -1.2)  # degrees, to +x and to +y

@@ -9,10 +9,8 @@ import test_planted_truth as planted_truth
 
 from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import PredictionOptions, predict, uncertainty
-from sessions.prediction.scenes import scene_along, with_loads
-from sessions.prediction.side_by_side import with_alternatives
-from sessions.prediction.solving import settled
-from sessions.prediction.uncertainty import with_intervals
+from sessions.prediction.scenes import scene_along, settled, with_loads
+from sessions.prediction.uncertainty import with_alternatives, with_intervals
 from sessions.strokes.bootstrap import BootstrapSettings, friction_draws, stroke_intervals
 from simulators.bench import BenchSettings
 from solver.response.nearby import By

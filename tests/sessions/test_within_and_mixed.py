@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from sessions.statistics.mixed_model import mixed_model, restricted_fit
-from sessions.statistics.variance_components import difference_of_squares, spreads
+from sessions.statistics.mixed_model import difference_of_squares, mixed_model, restricted_fit, spreads
 from sessions.statistics.within_subjects import (
     agreement,
     differences,

@@ -12,7 +12,7 @@ from daq_app.cli.options import add_analysis, add_number, add_session, area_law,
 from daq_app.console import DONE, FLAWED, Console, number, span, table
 from sessions.recording import Recording
 from sessions.strokes.bootstrap import StrokeIntervals
-from sessions.strokes.tilt import Tilt
+from sessions.strokes.trial_analysis import Tilt
 
 EXAMPLE = "daq-app analyse recordings/P07 --json"
 HEAD = ["trial", "onset [s]", "steady [s]", "mu static", "mu dynamic", "mu max", "tau_max [kPa]", "speed [mm/s]", "way"]

@@ -15,7 +15,7 @@ from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set
 from sessions.strokes import Analysis, Stroke, analyse
-from sessions.strokes.decision_preview import preview, with_present
+from sessions.strokes.analysis import preview, with_present
 from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     prediction = predict_session(recording, analysis, console, PredictionOptions(intervals=True, variants="small"))
     # Imported here: drawing is slow to load, and the session is on the disk by now.
     from sessions.report import findings
-    from sessions.report.html import plates, write_figures, write_report
+    from sessions.report.pages import plates, write_figures, write_report
     from sessions.statistics.scores import score_table
 
     console.progress(0.9, "writing the report")

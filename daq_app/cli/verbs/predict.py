@@ -36,8 +36,8 @@ from sessions.prediction import (
 )
 from sessions.prediction.afferent import AfferentSettings, firing_document, settings_with
 from sessions.prediction.sealed_predictions import SEAL, seal_prediction
-from sessions.prediction.series_slopes import other_signs
 from sessions.prediction.stored import Alternative, SedInterval
+from sessions.prediction.surface_series import other_signs
 
 EXAMPLE = "daq-app predict recordings/P07 --tau as-printed"
 

@@ -25,7 +25,7 @@ from sessions.prediction.afferent import AfferentSettings, session_firing, usual
 from sessions.recording import Recording
 from sessions.recording.derived import revealed, score_visits, store_page
 from sessions.report import Further
-from sessions.report.predictions import afferent_facts
+from sessions.report.trials import afferent_facts
 from sessions.statistics.multiverse import trial_paths
 
 PAGE = "report.html"
@@ -66,10 +66,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     for one in (recording, *score_only):
         if one.plan.blinded:
             raise Blinded(f"{one.folder} is blinded: a report tells scores by index; 'daq-app unblind' opens the key")
-    from sessions.report import html
+    from sessions.report import pages
 
     if options.out is not None:
-        html.leave_others_alone(options.out)
+        pages.leave_others_alone(options.out)
     analysis = analyse_session(recording, console, area_law(options), gain_error=calibration_error(options))
     afferent = stored_afferent(recording)
     if options.afferent and (afferent is None or afferent.quantity != options.quantity):
@@ -81,13 +81,13 @@ def run(options: argparse.Namespace, console: Console) -> int:
     further = _further(recording, prediction, afferent, options, console)
     report = findings(recording, analysis, prediction, [score_table(one) for one in score_only], further=further)
     console.progress(0.9, "drawing")
-    drawings = html.plates(report)
+    drawings = pages.plates(report)
     if options.out is None:  # beside the recording it is one more thing made of it, and listed in its manifest
-        page = store_page(recording.folder, PAGE, html.page(report, drawings))
+        page = store_page(recording.folder, PAGE, pages.page(report, drawings))
     else:
         page = options.out
-        html.write_report(report, page, drawings)
-    pictures = html.write_figures(report, options.figures, drawings) if options.figures else ()
+        pages.write_report(report, page, drawings)
+    pictures = pages.write_figures(report, options.figures, drawings) if options.figures else ()
     console.result({"page": str(page), "pictures": [str(path) for path in pictures], "flaws": len(report.flaws)})
     console.say(f"{page}{' (SIMULATED)' if report.simulated else ''}")
     return FLAWED if analysis.flawed else DONE

@@ -22,7 +22,7 @@ from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_kinematics, add_quantity, add_seed, add_workers
 from daq_app.console import DONE, Console, WrongValue, number, table
 from sessions.prediction import QUANTITIES, Quantity
-from sessions.prediction.series_slopes import SERIES
+from sessions.prediction.surface_series import SERIES
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
 

@@ -37,15 +37,14 @@ from daq_app.cli.options import (
 from daq_app.console import DONE, FLAWED, Console, WrongValue, table
 from sessions.file_access import json_text, read_limited
 from sessions.prediction import BY_NAME, SED, PredictionOptions
-from sessions.prediction.planted_strokes import StudyDesign, planted_strokes
+from sessions.prediction.surface_series import StudyDesign, planted_strokes
 from sessions.recording import RecordingError
 from sessions.recording.schema import LIVE_FILE
-from sessions.statistics.pooling.findings import UNITS, StudyFindings
-from sessions.statistics.pooling.ground_truth import checked_planted
-from sessions.statistics.pooling.pooled import pooled
-from sessions.statistics.pooling.visit import VisitOptions, exclusions_in
+from sessions.statistics.findings import UNITS, StudyFindings, checked_planted
+from sessions.statistics.pooled import pooled
 from sessions.statistics.power import TWIN, Judgement, Planted, Recovery, power, recovery
-from sessions.strokes.friction import FIXED
+from sessions.statistics.visit import VisitOptions, exclusions_in
+from sessions.strokes.stroke import FIXED
 
 SUBJECTS, SURFACES = (3, 5, 10, 15, 20, 30), (3, 5, 8, 12)  # of the designs whose power is simulated
 # Likewise of those that tell quantities apart, or do not: one such study takes a thousand times as long.
@@ -252,8 +251,16 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
     # Imported here: drawing is slow to load.
-    from sessions.report.html import study_page, swap_in
-    from sessions.report.study_csv import COLUMNS, TRIALS, columns_csv, paths_csv, rivals_csv, trials_csv
+    from sessions.report.pages import (
+        COLUMNS,
+        TRIALS,
+        columns_csv,
+        paths_csv,
+        rivals_csv,
+        study_page,
+        swap_in,
+        trials_csv,
+    )
 
     files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
     swap_in(files["page"], study_page(study, name))

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from sessions.report.contents import Answers, Experiment
 from sessions.report.figures.relation import PATHS_CAPTION, paths_panel
 from sessions.report.figures.style import GREEN, GREY, INK, PALE, Panel, Plate, Sheet, look, sheet, svg
-from sessions.report.predictions import model_in_short
 from sessions.report.tables.rivals import rival_words
+from sessions.report.trials import model_in_short
 from sessions.report.wording import ShownResponse, correlation, shown_response
-from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import MeanScore
 
 _LONG, _HIGH = 22.0, 6.0  # of the words along the line and across it [points of either axis]

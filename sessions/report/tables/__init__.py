@@ -1,42 +1,175 @@
-"""The tables of a report: cells as text, and for every number that is missing the reason."""
+"""Tables of a report: cells, columns and notes, of a session as of a study."""
 
-from sessions.prediction import BY_NAME
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass, field
+from typing import TypeVar
+
 from sessions.report.contents import Report
-from sessions.report.tables.cells import Cell, Column, Group, Table, sections_of
-from sessions.report.tables.predictions import (
-    afferent_table,
-    beside_forces_table,
-    beside_table,
-    direction_table,
-    force_table,
-    prediction_table,
-)
-from sessions.report.tables.rivals import responses_table, rivals_table
-from sessions.report.tables.scales import compared_with_standard, psychometric_table
-from sessions.report.tables.scores import answer_tables, paths_table, relation_table, score_table
-from sessions.report.tables.strokes import course_table, planted_table, stroke_table
+from sessions.report.wording import NONE, between
 
-__all__ = ["Cell", "Column", "Group", "Table", "tables"]
+Thing = TypeVar("Thing")
+CAPTION_WORDS = 60  # of a caption at most; what is more stands as a note under the table
 
 
-def tables(report: Report) -> dict[str, tuple[Table, ...]]:
-    """Return the tables a report has numbers for, by section, in their order."""
-    compared = [(e.name, e.rivals) for e in report.experiments]
-    quantity = BY_NAME[report.response].label
-    sections = {
-        "relation": (relation_table(report),),
-        "strokes": (stroke_table(report), course_table(report)),
-        "predictions": (
-            prediction_table(report),
-            force_table(report),
-            direction_table(report),
-            beside_table(report),
-            beside_forces_table(report),
-        ),
-        "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
-        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
-        "afferent": (afferent_table(report),),
-        "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
-        "planted": (planted_table(report),),
-    }
-    return sections_of(sections)
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What stands in one cell, the mark of the note that explains it, and under it the interval of its number."""
+
+    text: str
+    mark: str = ""
+    hover: str = ""
+    interval: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The head of a column."""
+
+    name: str
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Rows under a heading of their own, "" for none."""
+
+    name: str
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One table, with what must be read beside it."""
+
+    name: str  # its anchor on the page
+    caption: str
+    columns: tuple[Column, ...]
+    groups: tuple[Group, ...]
+    notes: tuple[tuple[str, str], ...]  # mark, sentence
+
+
+Row = tuple[Cell | str | int, ...]  # a text or a whole number stands for a cell of its own
+Rows = tuple[str, Iterable[Row]]  # the heading of a group, and its rows
+
+
+@dataclass(slots=True)
+class Notes:
+    """The reasons met so far, each with a letter."""
+
+    marks: dict[str, str] = field(default_factory=dict[str, str])
+
+    def mark(self, sentence: str) -> str:
+        """Return the letter of a note, a new one where it was not met before."""
+        n = len(self.marks)
+        letters = (chr(ord("a") + n // 26 - 1) if n >= 26 else "") + chr(ord("a") + n % 26)
+        return self.marks.setdefault(sentence, letters)
+
+    def number(self, value: float | None, shown: Callable[[float], str], reason: str | None) -> Cell:
+        """Return the number, or a dash with its reason."""
+        if value is not None:
+            return Cell(shown(value))
+        why = reason or "not determined"
+        return Cell(NONE, self.mark(why), why)
+
+    def estimate(
+        self,
+        value: float | None,
+        shown: Callable[[float], str],
+        reason: str | None,
+        ends: tuple[float, float] | None,
+        without: str | None = None,
+        *,
+        of_ends: Callable[[float], str] | None = None,
+        unit: float = 1.0,
+    ) -> Cell:
+        """Return the number over its interval, `without` which it has a note that says why; or a dash with its reason.
+
+        `of_ends` shows an end of the interval where `shown` shows more than a number; `unit` as for `wording.between`.
+        """
+        if value is None:
+            return self.number(None, shown, reason)
+        if ends is None:
+            why = f"no interval: {without or 'not computed'}"
+            return Cell(shown(value), self.mark(why), why)
+        return Cell(shown(value), interval=between(*ends, of_ends or shown, unit))
+
+    def interval(
+        self, low: float | None, high: float | None, shown: Callable[[float], str], reason: str | None
+    ) -> Cell:
+        """Return the interval as a cell of its own, or a dash with its reason."""
+        missing = low is None or high is None
+        return self.number(None, shown, reason) if missing else range_cell(low, high, shown)
+
+    def listed(self) -> tuple[tuple[str, str], ...]:
+        """Return every note with its letter."""
+        return tuple((mark, sentence) for sentence, mark in self.marks.items())
+
+
+def table(name: str, caption: str, columns: str, groups: Iterable[Rows], notes: Notes | None = None) -> Table | None:
+    """Return a table without its empty groups; None where no group has rows.
+
+    `columns` are its heads with their units, as in "index | SED [kPa]".
+    """
+    cells = ((name, tuple(tuple(map(_cell, row)) for row in rows)) for name, rows in groups)
+    kept = tuple(Group(name, rows) for name, rows in cells if rows)
+    if not kept:
+        return None
+    short, further = _in_short(caption)
+    heads = (head.strip().removesuffix("]").partition(" [") for head in columns.split("|"))
+    return Table(
+        name,
+        short,
+        tuple(Column(head, unit) for head, _, unit in heads),
+        kept,
+        (*further, *(notes.listed() if notes else ())),
+    )
+
+
+def _cell(content: Cell | str | int) -> Cell:
+    return content if isinstance(content, Cell) else Cell(str(content))
+
+
+def _in_short(caption: str) -> tuple[str, tuple[tuple[str, str], ...]]:
+    """Return a caption of at most `CAPTION_WORDS` words, and the sentences beyond as a note without a mark.
+
+    A sentence that names the model stays in the caption, wherever it stands.
+    """
+    sentences = re.split(r"(?<=[.;]) (?=\S)", caption)
+    if len(caption.split()) <= CAPTION_WORDS:
+        return caption, ()
+    kept = {n for n, sentence in enumerate(sentences) if "Model" in sentence or n == 0}
+    for n in range(len(sentences)):
+        words = sum(len(sentences[k].split()) for k in {*kept, n})
+        if words > CAPTION_WORDS and n not in kept:
+            break
+        kept.add(n)
+    short = " ".join(sentence for n, sentence in enumerate(sentences) if n in kept)
+    return short, (("", " ".join(sentence for n, sentence in enumerate(sentences) if n not in kept)),)
+
+
+def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tuple[Table, ...]]:
+    """Return the tables of each section that have rows."""
+    return {name: tuple(each for each in tables if each is not None) for name, tables in sections.items()}
+
+
+def parted(
+    sections: Mapping[str, tuple[Table, ...]], body: Set[str]
+) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
+    """Return the sections with those tables that are named in `body`, and all others, for the appendix."""
+    kept = {section: tuple(each for each in tables if each.name in body) for section, tables in sections.items()}
+    return kept, tuple(each for tables in sections.values() for each in tables if each.name not in body)
+
+
+def grouped(
+    report: Report, things: Sequence[Thing], experiment: Callable[[Thing], str], row: Callable[[Thing], Row]
+) -> list[Rows]:
+    """Return the rows of all things under the names of their experiments."""
+    names = [e.name for e in report.experiments]
+    groups: list[Rows] = [(name, [row(t) for t in things if experiment(t) == name]) for name in names]
+    return [*groups, ("", [row(t) for t in things if experiment(t) not in names])]
+
+
+def range_cell(low: float | None, high: float | None, shown: Callable[[float], str]) -> Cell:
+    """Return the cell of an interval, a dash where there is none."""
+    return Cell(NONE if low is None or high is None else f"{shown(low)} to {shown(high)}")

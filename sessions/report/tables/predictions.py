@@ -5,9 +5,8 @@ from dataclasses import replace
 
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
-from sessions.report.contents import PredictionFinding, Report
-from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, grouped, table
-from sessions.report.tables.strokes import model_mu
+from sessions.report.contents import PredictionFinding, Report, StrokeFinding
+from sessions.report.tables import Cell, Notes, Row, Rows, Table, grouped, table
 from sessions.report.wording import ShownResponse, direction, places, sed, shown_response, significant, tau, with_error
 
 
@@ -319,3 +318,10 @@ def _rows(report: Report, row: Callable[[PredictionFinding], Row]) -> list[Rows]
 
 def _depth(p: PredictionFinding, notes: Notes) -> Cell:
     return notes.number(p.indentation, lambda v: f"{v:g}", "no plan says how deep the model is pressed")
+
+
+def model_mu(stroke: StrokeFinding | None, prediction: PredictionFinding | None) -> tuple[str, float | None]:
+    """Return the mu that the model got, and the name of the stroke's number that it is."""
+    if prediction is not None and prediction.mu is not None:
+        return ("mu_max" if prediction.mu_rule == "maximum" else "mu_dynamic"), prediction.mu
+    return "mu_dynamic", None if stroke is None else stroke.mu_dynamic

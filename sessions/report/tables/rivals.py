@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from textwrap import fill
 
-from sessions.report.tables.cells import Cell, Notes, Row, Table, table
+from sessions.report.tables import Cell, Notes, Row, Table, table
 from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
-from sessions.statistics.dependent_correlations import POWER
+from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
 from sessions.statistics.scores import bounds
 

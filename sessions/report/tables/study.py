@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 
 from sessions.prediction import BY_NAME
-from sessions.report.predictions import model_in_short
-from sessions.report.tables.cells import Cell, Notes, Row, Rows, Table, range_cell, sections_of, table
+from sessions.report.tables import Cell, Notes, Row, Rows, Table, range_cell, sections_of, table
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import compared_in_study, latent_table, psychometric_table, scales_table
-from sessions.report.tables.scores import paths_table, rank_interval, score_cells, spread_cell
+from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
 from sessions.report.tables.study_models import flaws_table, models_table, planted_table, trials_table
+from sessions.report.trials import model_in_short
 from sessions.report.wording import (
     NONE,
     correlation,
@@ -20,10 +20,11 @@ from sessions.report.wording import (
     significant,
     three_figures,
 )
-from sessions.statistics.pooling.answers import Average
-from sessions.statistics.pooling.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.pooling.visit import Visit
-from sessions.statistics.scores import MeanScore, Relation, bounds
+from sessions.statistics.answers import Average
+from sessions.statistics.correlations import Relation
+from sessions.statistics.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.scores import MeanScore, bounds
+from sessions.statistics.visit import Visit
 from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
 
 

@@ -4,14 +4,14 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 
 from sessions.prediction import BY_NAME, Quantity, shown_unit
-from sessions.report.predictions import model_in_short
-from sessions.report.tables.cells import Cell, Notes, Row, Table, range_cell, table
+from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
+from sessions.report.trials import model_in_short
 from sessions.report.wording import NONE, digits, p_value, places, plural, sed, significant, tau, three_figures
+from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
 from sessions.statistics.mixed_model import INTERCEPT, MixedModel
-from sessions.statistics.pooling.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
-from sessions.statistics.pooling.pooled import response_term
-from sessions.statistics.pooling.visit import TrialRow, Visit, decided
+from sessions.statistics.pooled import response_term
 from sessions.statistics.scores import bounds
+from sessions.statistics.visit import TrialRow, Visit, decided
 
 
 def models_table(study: StudyFindings) -> Table | None:

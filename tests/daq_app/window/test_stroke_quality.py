@@ -9,7 +9,7 @@ from daq_app.window import stroke_quality
 from daq_app.window.view_trials import verdict
 from drivers.readings import ReadingBlock
 from sessions.strokes import FlawName
-from sessions.strokes.flaws import Flaw
+from sessions.strokes.stroke import Flaw
 from tests.daq_app.session_messages import INFO, PLAN
 
 

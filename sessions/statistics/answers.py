@@ -7,12 +7,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sessions.statistics.pooling.visit import TrialRow, Visit
-from sessions.statistics.scales.latent import Judgement, of_comparisons, of_judgements
-from sessions.statistics.scales.paired import Choice, PairedScale
-from sessions.statistics.scales.psychometric import Comparison, Psychometric, comparison, function_of
-from sessions.statistics.scales.stevens import Exponent, stevens_exponent
+from sessions.statistics.psychometric import Comparison, Psychometric, comparison, function_of
+from sessions.statistics.scales import (
+    Choice,
+    Exponent,
+    Judgement,
+    PairedScale,
+    of_comparisons,
+    of_judgements,
+    stevens_exponent,
+)
 from sessions.statistics.scores import IntervalEstimate, mean_interval
+from sessions.statistics.visit import TrialRow, Visit
 from sessions.statistics.within_subjects import RepeatedCorrelation, equal_moduli, repeated_correlation
 
 

@@ -23,7 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, special
 
-from sessions.statistics.scores import CONFIDENCE, IntervalEstimate
+from sessions.statistics.correlations import CONFIDENCE
+from sessions.statistics.scores import IntervalEstimate
 
 Array = NDArray[np.float64]
 

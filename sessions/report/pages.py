@@ -1,9 +1,10 @@
-"""The pages of a session and of a study, each self-contained, and figures as files with their numbers."""
+"""The pages of a session and of a study, each self-contained, with figures and trials as files of their own."""
 
 import base64
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -12,19 +13,23 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, Template, select
 from markupsafe import Markup
 
 from sessions.exchange.csv_text import write_rows
+from sessions.exchange.session_tables import heading
 from sessions.file_access import remedy, write_whole
+from sessions.prediction import QUANTITIES, SED
 from sessions.report import study_prose
-from sessions.report import tables as report_tables
 from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.scores import study_plates
 from sessions.report.prose import doubts, question, summary, told_apart
-from sessions.report.study_csv import columns_csv, trials_csv
-from sessions.report.tables import Table
-from sessions.report.tables.cells import parted
+from sessions.report.tables import Table, parted
+from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
-from sessions.statistics.pooling.findings import StudyFindings
+from sessions.statistics.findings import StudyFindings
+from sessions.statistics.multiverse import CHOICES
+from sessions.statistics.rivals import Rival
+from sessions.statistics.visit import TrialRow, decided
+from sessions.strokes.stroke import meanings
 
 
 def template(name: str) -> Template:
@@ -53,7 +58,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
     `drawings` are its `plates`, where they were drawn already.
     """
     figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
-    tables, further = parted(report_tables.tables(report), BODY)
+    tables, further = parted(session_tables(report), BODY)
     return template("report.html.jinja").render(
         report=report,
         question=question(report),
@@ -202,3 +207,93 @@ def study_page(study: StudyFindings, name: str) -> str:
         drawing=drawn,
         data_address=partial(data_address, head=study.simulated),
     )
+
+
+SIMULATED = "SIMULATED"
+TRIALS, COLUMNS = "trials.csv", "trials-columns.csv"  # as they lie beside the page
+_MEANING = meanings(TrialRow)  # of each column of the table of trials: all fields of a row but its paths
+_RESPONSES: Mapping[str, tuple[str, str]] = {
+    one.name: ("" if one.unit == "-" else one.unit, f"of the model, averaged over the ending: {one.meaning}")
+    for one in QUANTITIES
+    if one is not SED
+}
+_OWN: Mapping[str, str] = {
+    SIMULATED: "yes where transducer or subject were simulated",
+    "session": "folder of the session",
+    "subject": "code of the subject",
+    "excluded": "why the trial is left out of every number of the study; empty where it counts",
+}
+
+
+def _heading(name: str) -> str:
+    return heading(name, {**_MEANING, **_RESPONSES}[name][0])
+
+
+def columns_csv(study: StudyFindings) -> str:
+    """Return a row for each column of `trials_csv`: its name, its unit and its meaning."""
+    first = [name for name in _OWN if name != "excluded" and (study.simulated or name != SIMULATED)]
+    rows = [["column", "unit", "meaning"], *([name, "", _OWN[name]] for name in first)]
+    rows += [[_heading(name), *meaning] for name, meaning in {**_MEANING, **_RESPONSES}.items()]
+    return _csv([*rows, ["excluded", "", _OWN["excluded"]]])
+
+
+def paths_csv(study: StudyFindings) -> str:
+    """Return a row for each path and descriptor, for R and pandas as `trials_csv`."""
+    heads = ("usual", "surfaces", "trials", "r_of_means", "r_within_subjects", "low", "high")
+    rows: list[list[object]] = [["descriptor", *CHOICES, *heads]]
+    for one in study.descriptors:
+        for path in one.paths:
+            numbers = (path.surfaces, path.trials, path.r, path.within, path.low, path.high)
+            choices = (getattr(path.path, choice) for choice in CHOICES)
+            rows.append([one.descriptor, *choices, "yes" if path.usual else "no", *numbers])
+    return _csv(rows, simulated=bool(study.simulated))
+
+
+def rivals_csv(study: StudyFindings) -> str:
+    """Return a row for each quantity that may follow the scores, of means and within subjects, for R and pandas."""
+    names = [field.name for field in fields(Rival) if field.name not in ("contrast", "reasons")]
+    heads = ["difference", "difference_low", "difference_high", "steiger_z", "p"]
+    rows: list[list[object]] = [["descriptor", "kind", *names, *heads]]
+    for one in study.descriptors:
+        for kind, rivals in (("means", one.rivals_of_means), ("within", one.rivals)):
+            for rival in rivals:
+                less = [getattr(rival.contrast, name, None) for name in ("difference", "low", "high", "z", "p")]
+                numbers = [*(getattr(rival, name) for name in names), *less]
+                rows.append([one.descriptor, kind, *numbers])
+    return _csv(rows, simulated=bool(study.simulated))
+
+
+def trials_csv(study: StudyFindings) -> str:
+    """Return a row for each trial of each visit: one header line, a point in decimals, empty where there is no number.
+
+    R's read.csv and pandas' read_csv open it as it is. Of a simulated study the first column is called SIMULATED.
+    """
+    names = list(_MEANING)  # paths have a table of their own
+    heads = [_heading(name) for name in (*names, *_RESPONSES)]
+    mark = [SIMULATED] if study.simulated else []
+    rows: list[list[object]] = [[*mark, "session", "subject", *heads, "excluded"]]
+    copies = dict(study.copies)
+    for visit in study.visits:
+        for row in visit.rows:
+            decision = decided(study.excluded, visit.subject, row.descriptor)
+            why = "" if decision is None else decision.why
+            why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
+            cells = ["yes" if visit.simulated else "no"] if mark else []
+            numbers = [*(getattr(row, name) for name in names), *map(row.responses.get, _RESPONSES)]
+            rows.append([*cells, visit.session, visit.subject, *numbers, why])
+    return _csv(rows)
+
+
+def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
+    """Return rows as CSV; a first column says of each of a simulated study that it is."""
+    if simulated:
+        rows = [[SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
+    out = io.StringIO()
+    write_rows(out, [[_plain(value) for value in row] for row in rows])
+    return out.getvalue()
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, tuple):
+        return " ".join(str(one) for one in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+    return "" if value is None else value

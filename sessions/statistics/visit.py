@@ -21,8 +21,7 @@ from sessions.recording.schema import LIVE_FILE
 from sessions.statistics.multiverse import Values, trial_paths
 from sessions.statistics.scores import Score, ScoreTable
 from sessions.strokes import Analysis, AnalysisSettings, FrictionParameters, analyse
-from sessions.strokes.friction import FIXED, AreaLaw
-from sessions.strokes.stroke import Meaning
+from sessions.strokes.stroke import FIXED, AreaLaw, Meaning
 from sessions.toml_file import NotAllowed, load_toml
 
 EXCLUSIONS = "exclusions.toml"

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction import SED, Quantity, shown_unit
-from sessions.statistics.mixed_model import MixedModel, mixed_model
-from sessions.statistics.multiverse import PathTrial, path_findings
-from sessions.statistics.pooling.answers import (
+from sessions.statistics.answers import (
     Average,
     average,
     averages,
@@ -22,7 +20,8 @@ from sessions.statistics.pooling.answers import (
     exponent,
     latent_scales,
 )
-from sessions.statistics.pooling.findings import (
+from sessions.statistics.correlations import Relation, relation
+from sessions.statistics.findings import (
     CARRY_OVER,
     DRIFT,
     FRICTION,
@@ -31,21 +30,16 @@ from sessions.statistics.pooling.findings import (
     Normalised,
     StudyFindings,
     SurfaceMean,
+    found_flaws,
+    found_friction,
+    recovered,
 )
-from sessions.statistics.pooling.ground_truth import found_flaws, found_friction, recovered
-from sessions.statistics.pooling.visit import Exclusion, TrialRow, Visit, VisitOptions, decided, scores_of
+from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
+from sessions.statistics.multiverse import PathTrial, path_findings
 from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
-from sessions.statistics.scales.paired import MODELS, consistence, paired_scale
-from sessions.statistics.scores import (
-    Relation,
-    ScoreTable,
-    mean_scores,
-    relation,
-    reversed_subjects,
-    score_matrix,
-    surface_means,
-)
-from sessions.statistics.variance_components import Spread, spreads
+from sessions.statistics.scales import MODELS, consistence, paired_scale
+from sessions.statistics.scores import ScoreTable, mean_scores, reversed_subjects, score_matrix, surface_means
+from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, decided, scores_of
 from sessions.statistics.within_subjects import (
     agreement,
     differences,

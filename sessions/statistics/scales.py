@@ -1,22 +1,35 @@
-"""A scale from choices between two: Bradley and Terry's, and Thurstone's case V, with an advantage of the first.
+"""Scales of what subjects answered otherwise than on a line, and all their judgements on one latent scale.
 
-Both are generalised linear models of who was chosen: the difference of two values, and what coming first adds, go
-through a logistic or a normal distribution function (Bradley and Terry 1952, Biometrika 39, 324; Thurstone 1927,
-Psychol. Rev. 34, 273). Fitted by maximum likelihood, with Fisher's scoring.
+Choices between two have Bradley and Terry's scale, and Thurstone's case V, with an advantage of the first. Both are
+generalised linear models of who was chosen: the difference of two values, and what coming first adds, go through a
+logistic or a normal distribution function (Bradley and Terry 1952, Biometrika 39, 324; Thurstone 1927, Psychol. Rev.
+34, 273). Fitted by maximum likelihood, with Fisher's scoring.
+
+Magnitude estimates have the exponent of Stevens' law: log answer = level of the subject + exponent log magnitude (1957,
+Psychol. Rev. 64, 153). What was measured errs too, which makes a plain slope too flat; Deming's slope (1943) allows for
+both errors by the ratio of their variances.
+
+The latent scale has Thurstone's unit, the standard deviation of the difference of two judgements: in his case V a
+difference z of two surfaces is judged right in Φ(z) of choices. A score, or the logarithm of an estimate, is such a
+judgement. With levels of the subjects taken away, single ones scatter by s, and the unit is √2 s. A comparison with a
+standard has its unit in the just noticeable difference: from there to the standard it is 0.674.
 """
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse import csgraph
 
+from sessions.statistics.correlations import CONFIDENCE
+from sessions.statistics.mixed_model import Term, mixed_model
+from sessions.statistics.psychometric import QUARTILE
 from sessions.statistics.scores import IntervalEstimate
 
 Array = NDArray[np.float64]
@@ -219,3 +232,146 @@ def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
 def _x_log(count: Array, expected: Array) -> Array:
     """Return count times the logarithm of count by expected, 0 where nothing was counted."""
     return count * np.log(np.where(count > 0.0, count / expected, 1.0))
+
+
+NAME = "log magnitude"
+
+
+@dataclass(frozen=True, slots=True)
+class Exponent:
+    """Stevens' exponent, by two routes. None where `reason` says why."""
+
+    subjects: int
+    trials: int
+    plain: Term | None  # slope of the mixed model, the magnitude taken as exact
+    deming: tuple[float, float, float] | None = None  # Deming's slope through the surfaces, and its 95 % interval
+    error_ratio: float | None = None  # variance of a surface's log answer by that of its log magnitude [-]
+    reason: str = ""
+
+
+def stevens_exponent(
+    subjects: Sequence[str],
+    surfaces: Sequence[int],
+    answers: Sequence[float],
+    magnitudes: Sequence[float],
+    seed: int = 0,
+) -> Exponent:
+    """Return the exponent of answers (n,) by magnitudes (n,), both above 0, in trials of subjects and surfaces (n,).
+
+    The interval of Deming's slope is a bootstrap over subjects. Others must have left out what is not above 0.
+    """
+    y, x = np.log(np.asarray(answers, np.float64)), np.log(np.asarray(magnitudes, np.float64))
+    people = sorted(set(subjects))
+    if len(people) < LEAST_SUBJECTS or len(set(surfaces)) < LEAST_SUBJECTS:
+        why = f"it takes {LEAST_SUBJECTS} subjects and {LEAST_SUBJECTS} surfaces"
+        return Exponent(len(people), len(y), None, reason=why)
+    model = mixed_model(subjects, y.tolist(), {NAME: x.tolist()}, slopes_differ=True)
+    plain = None if isinstance(model, str) else model.term(NAME)
+    reason = model if isinstance(model, str) else ""
+    cells = _cells(subjects, surfaces, y, x)
+    if cells is None:
+        return Exponent(len(people), len(y), plain, reason=reason or "some subject missed a surface")
+    here = _deming(cells)
+    if here is None:
+        return Exponent(len(people), len(y), plain, reason=reason or "magnitudes or answers do not vary over surfaces")
+    rng = np.random.default_rng(seed)
+    drawn = [_deming(cells[rng.integers(0, len(cells), len(cells))]) for _ in range(RESAMPLES)]
+    slopes = [one[0] for one in drawn if one is not None]
+    low, high = np.quantile(slopes, [0.025, 0.975]).tolist()
+    return Exponent(len(people), len(y), plain, (here[0], low, high), here[1], reason)
+
+
+def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
+    """Return log answers and magnitudes (s, k, 2), each subject's mean taken away; None where a cell is empty."""
+    by_cell: defaultdict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
+    for subject, surface, one, other in zip(subjects, surfaces, y.tolist(), x.tolist(), strict=True):
+        by_cell[subject, surface].append((one, other))
+    people, indices = sorted(set(subjects)), sorted(set(surfaces))
+    if any((subject, index) not in by_cell for subject in people for index in indices):
+        return None
+    cells = np.array([[np.mean(by_cell[subject, index], axis=0) for index in indices] for subject in people])
+    return cells - cells.mean(axis=1, keepdims=True)
+
+
+def _deming(cells: Array) -> tuple[float, float] | None:
+    """Return Deming's slope through surfaces' means, and the ratio of error variances; None where nothing varies.
+
+    The errors are what subjects differ by on one surface, levels taken away.
+    """
+    means = cells.mean(axis=0)
+    rest = cells - means
+    error_y, error_x = np.sum(rest**2, axis=(0, 1)).tolist()
+    (yy, xy), (_, xx) = (means.T @ means).tolist()
+    if not (error_x > 0.0 and xy != 0.0):
+        return (xy / xx, math.inf) if xx > 0.0 and error_x == 0.0 else None
+    ratio = error_y / error_x
+    off = yy - ratio * xx
+    return (off + math.sqrt(off**2 + 4.0 * ratio * xy**2)) / (2.0 * xy), ratio
+
+
+Judgement = Literal["scores", "estimates", "choices", "comparisons"]
+JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparisons")
+
+
+def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Mapping[int, IntervalEstimate]:
+    """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
+
+    Intervals are expanded percentiles of a bootstrap over subjects (Hesterberg 2015, Am. Stat. 69, 371): of few
+    subjects plain ones are too narrow, as a normal quantile is in place of t's. Subjects who missed a surface that
+    another judged do not count. Nothing of fewer than three others, of fewer than two surfaces, and where nothing is
+    left to tell a unit from.
+    """
+    own: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for subject, index, value in points:
+        own[subject][index].append(value)
+    indices = sorted({index for _, index, _ in points})
+    whole = [[row[index] for index in indices] for row in own.values() if len(row) == len(indices)]
+    if len(whole) < LEAST_SUBJECTS or len(indices) < 2:
+        return {}
+    cells = np.array([[np.mean(cell) for cell in row] for row in whole])
+    answered = _Answered(
+        cells - cells.mean(axis=1, keepdims=True),
+        np.array([[float(len(cell)) for cell in row] for row in whole]),
+        np.array([sum(float(np.var(cell)) * len(cell) for cell in row) for row in whole]),
+    )
+    here = answered.values(np.arange(len(whole))[None])[0]
+    if not np.isfinite(here).all():
+        return {}
+    drawn = np.random.default_rng(seed).integers(0, len(whole), (RESAMPLES, len(whole)))
+    n = len(whole)
+    tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, (1.0 - CONFIDENCE) / 2.0)))
+    ends = np.nanquantile(answered.values(drawn), [tail, 1.0 - tail], axis=0).T.tolist()
+    return {i: IntervalEstimate(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
+
+
+def of_comparisons(mu: Mapping[int, float], log_jnd: tuple[float, float, float]) -> Mapping[int, IntervalEstimate]:
+    """Return the latent value of each surface, with mean 0, from its µ and the logarithm of the JND and of its ends.
+
+    The JND is a difference of log µ. The interval is the JND's: µ is taken as exact.
+    """
+    logs = {index: math.log(value) for index, value in mu.items()}
+    middle = sum(logs.values()) / max(len(logs), 1)
+    value, *ends = (QUARTILE / math.exp(one) for one in log_jnd)
+    out: dict[int, IntervalEstimate] = {}
+    for index, log_mu in logs.items():
+        low, high = sorted((log_mu - middle) * end for end in ends)
+        out[index] = IntervalEstimate((log_mu - middle) * value, low, high)
+    return out
+
+
+class _Answered(NamedTuple):
+    """The answers of s subjects to k surfaces."""
+
+    cells: Array  # (s, k) means of repeats, each subject's own mean taken away
+    counts: Array  # (s, k) repeats
+    within: Array  # (s,) sum of squares of repeats about their means
+
+    def values(self, who: NDArray[np.int64]) -> Array:
+        """Return means over the subjects `who` (b, s) by √2 s: (b, k); nan where nothing scatters about them."""
+        cells, counts = self.cells[who], self.counts[who]
+        means = cells.mean(axis=1)
+        left = (counts * (cells - means[:, None]) ** 2).sum(axis=(1, 2)) + self.within[who].sum(axis=1)
+        freedom = counts.sum(axis=(1, 2)) - cells.shape[1] - cells.shape[2] + 1
+        unit = np.sqrt(2.0 * left / freedom)[:, None]
+        scattered = unit > 1e-9 * np.abs(means).max(axis=1)[:, None]
+        return np.where(scattered, means, np.nan) / np.where(scattered, unit, 1.0)

@@ -1,0 +1,365 @@
+"""The tables of a session: strokes, scores, how predictions go with them, and what had been planted."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+from sessions.prediction import BY_NAME
+from sessions.report.contents import Planted, Report, StrokeFinding
+from sessions.report.tables import Cell, Column, Group, Notes, Row, Rows, Table, grouped, range_cell, sections_of, table
+from sessions.report.tables.predictions import (
+    afferent_table,
+    beside_forces_table,
+    beside_table,
+    direction_table,
+    force_table,
+    model_mu,
+    prediction_table,
+)
+from sessions.report.tables.rivals import responses_table, rivals_table
+from sessions.report.tables.scales import compared_with_standard, psychometric_table
+from sessions.report.wording import (
+    NONE,
+    capital,
+    correlation,
+    digits,
+    identifier,
+    places,
+    shown_response,
+    signed,
+    significant,
+    tau,
+)
+from sessions.statistics.correlations import Relation, slope_interval
+from sessions.statistics.multiverse import CHOICE_LABELS, SAME, PathFinding, Spread, by_choice, correlations, spread
+from sessions.statistics.scores import MeanScore, sd_interval
+
+Format = Callable[[float], str]
+
+_TOO_SHORT = "the stroke has too few readings"
+_WITHOUT = {
+    "onset": "the force had left its noise before, or too few readings measure its noise",
+    "break_away": "too few readings to fit the rise of T/N",
+    "slide_onset": "too few readings to measure the speed",
+}
+_MISSING = {
+    "break_away": "T/N does not rise before the slide, so there is no stick phase, or rises on while it slides",
+    "slide_onset": "the start of the slide cannot be determined",
+}
+_OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_onset"}
+
+
+def stroke_table(report: Report) -> Table | None:
+    """Return the strokes with their friction, speed and flaws, each number over its interval."""
+    if not report.strokes:
+        return None
+    notes = Notes()
+    columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
+
+    def row(stroke: StrokeFinding) -> Row:
+        def cell(name: str, shown: Format, ends: Format | None = None, unit: float = 1.0) -> Cell:
+            return _estimate(notes, stroke, name, shown, ends, unit)
+
+        return (
+            cell("mu_static", places(3)),
+            cell("mu_dynamic", places(3)),
+            cell("mu_max", places(3)),
+            cell("tau_max", tau, unit=1e3),
+            cell("speed", places(1)),
+            notes.number(
+                stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)], stroke.reasons.get("direction")
+            ),
+            ", ".join(name.replace("_", " ") for name in stroke.flaws) or "none",
+        )
+
+    kind = f" Under each number: {report.interval_kind}." if report.interval_kind else ""
+    caption = (
+        "Strokes. µ dynamic: mean over the steady window; µ static: height of the static peak; µ maximum: greatest "
+        "above the force floor; τ max: greatest tangential force over the contact area, which is taken as given; "
+        "speed: slope of the centre of pressure."
+        f"{kind}"
+    )
+    return _table(report, "table-strokes", caption, columns, row, notes)
+
+
+def course_table(report: Report) -> Table | None:
+    """Return each stroke's forces, direction and instants, each over its bootstrap interval."""
+    if not any(stroke.bootstrap for stroke in report.strokes):
+        return None
+    notes = Notes()
+    columns = (
+        "normal force [N] | tangential force [N] | heading [°] | agree [1] | "
+        "onset [s] | break-away [s] | slide onset [s]"
+    )
+
+    def row(stroke: StrokeFinding) -> Row:
+        def cell(name: str, shown: Format) -> Cell:
+            return _estimate(notes, stroke, name, shown)
+
+        why = stroke.reasons.get("direction") or _TOO_SHORT
+        return (
+            cell("normal_force", places(2)),
+            cell("tangential_force", places(2)),
+            cell("heading", places(1)),
+            notes.number(stroke.direction_agrees, places(3), why),
+            cell("onset", places(3)),
+            cell("break_away", places(3)),
+            cell("slide_onset", places(3)),
+        )
+
+    kinds = "; ".join(f"{name.replace('_', ' ')}: {what}" for name, what in report.interval_kinds.items())
+    caption = (
+        "Forces, direction and instants of the strokes, each over its interval from the same repeats. Forces: means "
+        "over the steady window. Heading: angle of the movement from +x (proximal to distal) towards +y; agree: share "
+        "of repeats with the reported direction. Onset: where N leaves its noise. Break-away: where T/N stops rising. "
+        "Slide onset: from when the centre of pressure keeps a fifth of its steady speed. What each interval holds: "
+        f"{kinds}."
+    )
+    return _table(report, "table-courses", caption, columns, row, notes)
+
+
+def _table(
+    report: Report, name: str, caption: str, columns: str, row: Callable[[StrokeFinding], Row], notes: Notes
+) -> Table | None:
+    """Return a table of strokes by experiment, each named with its trial and index where there are trials."""
+    planned = any(stroke.trial is not None for stroke in report.strokes)
+
+    def named(stroke: StrokeFinding) -> Row:
+        stimulus = (stroke.trial, stroke.index) if planned else ()
+        where = (notes.number(v, places(0), "no trial asks for it") for v in stimulus)
+        return (stroke.number, *where, *row(stroke))
+
+    groups = grouped(report, report.strokes, lambda s: s.experiment, named)
+    return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
+
+
+def _estimate(
+    notes: Notes, stroke: StrokeFinding, name: str, shown: Format, of_ends: Format | None = None, unit: float = 1.0
+) -> Cell:
+    """Return one number of a stroke over its bootstrap interval, or why it has none."""
+    without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
+    why = stroke.reasons.get(name) or _MISSING.get(name)
+    return notes.estimate(
+        getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, of_ends=of_ends, unit=unit
+    )
+
+
+def planted_table(report: Report) -> Table | None:
+    """Return what the simulator planted beside what the analysis found."""
+    if not report.planted:
+        return None
+    notes = Notes()
+    # Of several strokes in a trial the model gets the first.
+    strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
+    predictions = {prediction.trial: prediction for prediction in report.predictions}
+    columns = (
+        "trial | index | µ planted [1] | µ found [1] | off by [%] | τ max planted [kPa] | "
+        "τ max found [kPa] | off by [%] | speed planted [mm/s] | speed found [mm/s] | off by [%] | direction"
+    )
+
+    def row(p: Planted) -> Row:
+        stroke = strokes_by_trial.get(p.trial)
+        cells: list[Cell | str | int] = [p.trial, NONE if stroke is None or stroke.index is None else str(stroke.index)]
+        prediction = predictions.get(p.trial)
+        name, mu = model_mu(stroke, prediction)
+        quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
+            (name, p.mu, mu, places(3), 1.0),
+            ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
+            ("speed", p.speed, stroke.speed if stroke else None, places(1), 1.0),
+        )
+        for name, truth, value, shown, unit in quantities:
+            reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
+            ends = stroke.bootstrap.get(name) if stroke else None
+            found_cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
+            off = None if value is None else 100 * (value / truth - 1)
+            cells += [shown(truth), found_cell, notes.number(off, signed, reason)]
+        right = stroke is not None and stroke.direction == p.direction
+        cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
+        return tuple(cells)
+
+    names = {p.trial: s.experiment for p in report.planted if (s := strokes_by_trial.get(p.trial)) is not None}
+    groups = grouped(report, report.planted, lambda p: names.get(p.trial, ""), row)
+    caption = (
+        "Planted friction beside what the analysis found: the µ and τ max that the model gets, and the speed. The "
+        "analysis does not know what was planted. Under what was found: its 95 % bootstrap interval."
+    )
+    return table("table-planted", caption, columns, groups, notes)
+
+
+def score_table(report: Report) -> Table | None:
+    """Return mean scores with their intervals."""
+    notes = Notes()
+    groups = tuple((e.name, tuple(score_cells(m, notes) for m in e.scores)) for e in report.experiments)
+    columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
+    caption = (
+        "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
+        "standard deviation s: its 95 % interval by chi squared."
+    )
+    return table("table-scores", caption, columns, groups, notes)
+
+
+def score_cells(mean: MeanScore, notes: Notes) -> Row:
+    """Return index, subjects, mean score, its interval and standard deviation; of a session as of a study."""
+    interval = notes.interval(mean.low, mean.high, places(1), mean.reason)
+    if mean.bootstrap is not None:
+        why = (
+            "The t interval leaves the scale, where no score can be. Resampling the subjects gives instead, "
+            f"for index {mean.index} of {mean.descriptor}, {range_cell(*mean.bootstrap, places(1)).text}."
+        )
+        interval = Cell(interval.text, notes.mark(why), why)
+    return (
+        mean.index,
+        mean.n,
+        digits(mean.mean, 1),
+        interval,
+        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
+    )
+
+
+def spread_cell(
+    sd: float | None, n: int, shown: Callable[[float], str], reason: str | None, notes: Notes, unit: float = 1.0
+) -> Cell:
+    """Return the standard deviation of n values over its interval."""
+    ends = None if sd is None else sd_interval(sd, n)
+    return notes.estimate(sd, shown, reason, ends, unit=unit)
+
+
+def answer_tables(report: Report) -> tuple[Table | None, ...]:
+    """Return every subject's scores, a table an experiment."""
+    tables: list[Table | None] = []
+    for e in report.experiments:
+        if e.answers:
+            notes = Notes()
+            rows = tuple((a.subject, *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers)
+            columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
+            caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
+            tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
+    return tuple(tables)
+
+
+def relation_table(report: Report) -> Table | None:
+    """Return how the predicted quantity goes with mean scores and with the indices."""
+    shown = shown_response(report.response)
+    notes = Notes()
+    groups: list[Rows] = []
+    for e in report.experiments:
+        related = [("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation)]
+        groups.append((e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
+    columns = (
+        f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
+        f"exact p of rho | slope [{shown.step} a point] | r without one"
+    )
+    caption = (
+        f"Relation of the predicted {shown.label} ({report.model}) to scores and to the stimuli's indices. "
+        "The forces are those of one subject, whose scores are the own ones. Intervals: Fisher's z, for rho as by "
+        "Bonett and Wright (2000). p: two-sided, counted over all orders. Slope: of it on the score or index, over its "
+        "t interval. Last column: r when the stimulus of that index is left out."
+    )
+    return table("table-relation", caption, columns, groups, notes)
+
+
+def rank_interval(related: Relation, notes: Notes) -> Cell:
+    """Return the interval of Spearman's rho, or why it has none."""
+    alike = "no interval of a perfect rho" if related.n > 3 else f"no interval of rho from {related.n} points"
+    why = alike if related.spearman is not None else related.reason
+    return notes.interval(related.spearman_low, related.spearman_high, correlation, why)
+
+
+def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
+    left_out = ", ".join(
+        f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
+    )
+    return (
+        name,
+        related.n,
+        notes.number(related.pearson, correlation, related.reason),
+        notes.interval(related.low, related.high, correlation, related.reason),
+        notes.number(related.spearman, correlation, related.reason),
+        rank_interval(related, notes),
+        notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
+        notes.estimate(
+            related.slope,
+            lambda v: significant(1e6 * v, 3),
+            related.reason,
+            slope_interval(related),
+            "no line has one through two points, or through points wholly on it",
+            unit=1e6,
+        ),
+        left_out,
+    )
+
+
+Named = tuple[str, Sequence[PathFinding]]
+
+
+def paths_table(named: Iterable[Named]) -> Table | None:
+    """Return the distribution of the correlation over all paths and over those with each choice, by descriptor."""
+    groups = [(name, _rows(findings)) for name, findings in named if findings]
+    columns = (
+        "choice |  | usual | paths with r | different r | least | lower quartile | median | upper quartile | greatest"
+    )
+    caption = (
+        "The correlation of the predicted response with scores as a distribution over paths of the analysis: every "
+        "choice below crossed with every other at small strain; finite strain, where it was tried, with the other "
+        "choices as usual. "
+        "Contact is solved at every friction that was met, from the trial's own prediction on and on its mesh. All of "
+        "them are reasonable and none is a sample of others: quartiles describe, and are no intervals. Different r: "
+        "how many are left where those that agree within "
+        f"{SAME:g} count once. A path of which fewer than three surfaces have a prediction gives no r."
+    )
+    return table("table-paths", caption, columns, groups)
+
+
+def paths_sentence(name: str, findings: Sequence[PathFinding]) -> str:
+    """Return the distribution in a sentence."""
+    whole = spread(correlations(findings))
+    start = f"{capital(name)}: of {len(findings)} paths of the analysis"
+    if whole is None:
+        return f"{start} none gives a correlation."
+    return (
+        f"{start} {whole.correlated} give a correlation, from {correlation(whole.least)} to "
+        f"{correlation(whole.greatest)}, median {correlation(whole.median)}; "
+        f"{whole.distinct} of these differ by more than {SAME:g}."
+    )
+
+
+def _rows(findings: Sequence[PathFinding]) -> tuple[Row, ...]:
+    rows = [("all", "", "", *_spread(spread(correlations(findings)), len(findings)))]
+    before = ""
+    for choice, name, of, usual in by_choice(findings):
+        count = sum(getattr(one.path, choice) == name for one in findings)
+        label = CHOICE_LABELS[choice] if choice != before else ""
+        rows.append((label, name, "usual" if usual else "", *_spread(of, count)))
+        before = choice
+    return tuple(rows)
+
+
+def _spread(of: Spread | None, paths: int) -> Row:
+    if of is None:
+        return (f"0 of {paths}", *(NONE for _ in range(6)))
+    numbers = (of.least, of.lower, of.median, of.upper, of.greatest)
+    return (f"{of.correlated} of {paths}", of.distinct, *(correlation(value) for value in numbers))
+
+
+__all__ = ["Cell", "Column", "Group", "Table", "tables"]
+
+
+def tables(report: Report) -> dict[str, tuple[Table, ...]]:
+    """Return the tables a report has numbers for, by section, in their order."""
+    compared = [(e.name, e.rivals) for e in report.experiments]
+    quantity = BY_NAME[report.response].label
+    sections = {
+        "relation": (relation_table(report),),
+        "strokes": (stroke_table(report), course_table(report)),
+        "predictions": (
+            prediction_table(report),
+            force_table(report),
+            direction_table(report),
+            beside_table(report),
+            beside_forces_table(report),
+        ),
+        "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
+        "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
+        "afferent": (afferent_table(report),),
+        "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
+        "planted": (planted_table(report),),
+    }
+    return sections_of(sections)

@@ -1,0 +1,233 @@
+"""Correlations with their intervals, of one variable with two others compared, and given a third variable."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+CONFIDENCE = 0.95
+_EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
+
+POWER = 0.8  # with which a study should tell two correlations apart (Cohen 1988, p. 56)
+_PERFECT = 1.0 - 1e-12  # Fisher's z has no value at 1
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """How y goes with x over n stimuli. A number is None where `reason` says why."""
+
+    n: int
+    pearson: float | None
+    low: float | None  # 95 % interval of pearson (Fisher's z)
+    high: float | None
+    spearman: float | None
+    spearman_low: float | None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
+    spearman_high: float | None
+    spearman_p: float | None  # exact, two-sided: the share of all orders at least as far from 0
+    slope: float | None  # least-squares line y = intercept + slope x
+    intercept: float | None
+    without: tuple[tuple[int, float | None], ...]  # (label, pearson over the others) for each stimulus left out
+    reason: str | None
+
+
+def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
+    """Return how y goes with x; `labels` name the points (their stimulus' index).
+
+    Pearson's r with its 95 % interval by Fisher's z, which takes four points and |r| < 1; Spearman's rho with its
+    exact p up to seven points; the least-squares line of y on x.
+    """
+    n = len(x)
+    without = tuple((label, pearson([*x[:i], *x[i + 1 :]], [*y[:i], *y[i + 1 :]])) for i, label in enumerate(labels))
+    r = pearson(x, y)
+    if r is None:
+        few = "1 point is" if n == 1 else f"{n} points are"
+        why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
+        return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
+    slope, intercept = np.polyfit(x, y, 1)
+    low, high = fisher_interval(r, n)
+    why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
+    rho = _rank_correlation(x, y)
+    ends = fisher_interval(rho, n, 1 + rho * rho / 2)  # Bonett & Wright 2000, Psychometrika 65:23, equation 4
+    return Relation(n, r, low, high, rho, *ends, _exact_p(x, y, rho), float(slope), float(intercept), without, why)
+
+
+def slope_interval(related: Relation) -> tuple[float, float] | None:
+    """Return the 95 % t interval of the slope (n - 2 degrees of freedom); None without one, or where r is 0 or 1.
+
+    Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
+    """
+    r, slope, n = related.pearson, related.slope, related.n
+    if r is None or slope is None or not r or n < 3 or abs(r) > 1 - 1e-12:
+        return None
+    half = t_quantile(n - 2) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
+    return slope - half, slope + half
+
+
+def t_quantile(dof: float) -> float:
+    """Return how many standard errors a 95 % t interval reaches to each side; of a normal law where `dof` is inf.
+
+    >>> round(t_quantile(9), 3), round(t_quantile(math.inf), 3)
+    (2.262, 1.96)
+    """
+    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
+
+    return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
+
+
+def pearson(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return Pearson's r, None for fewer than three points or where one of the two does not vary."""
+    if len(x) < 3 or not _varies(x) or not _varies(y):
+        return None
+    return float(np.clip(np.corrcoef(x, y)[0, 1], -1.0, 1.0))
+
+
+def spearman(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return Spearman's rho, None for fewer than three points or where one of the two does not vary."""
+    return None if pearson(x, y) is None else _rank_correlation(x, y)
+
+
+def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | None, float | None]:
+    """Return the 95 % interval of a correlation by Fisher's z, its variance `inflated`.
+
+    None for fewer than four points, or where all points agree wholly or are each other's reverse.
+    """
+    if n < 4 or abs(r) > 1 - 1e-12:
+        return None, None
+    half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
+    return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
+
+
+def _varies(values: Sequence[float]) -> bool:
+    """Say whether values differ by more than round-off."""
+    return float(np.ptp(values)) > 1e-12 * float(np.max(np.abs(values)))
+
+
+def _rank_correlation(x: Sequence[float], y: Sequence[float]) -> float:
+    return float(np.corrcoef(_ranks(x), _ranks(y))[0, 1])
+
+
+def _ranks(values: Sequence[float]) -> NDArray[np.float64]:
+    """Return the ranks from 1 on, the same for equal values: the middle of those they share.
+
+    >>> _ranks([3.0, 1.0, 3.0])
+    array([2.5, 1. , 2.5])
+    """
+    _, at, counts = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
+    return (np.cumsum(counts) - (counts - 1) / 2)[at]
+
+
+def _exact_p(x: Sequence[float], y: Sequence[float], rho: float) -> float | None:
+    """Return the share of all orders of y whose |rho| is at least |rho|; None where they are too many to count."""
+    n = len(x)
+    if n > _EXACT_UP_TO:
+        return None
+    rank_x, rank_y = _ranks(x) - (n + 1) / 2, _ranks(y) - (n + 1) / 2
+    orders = rank_y[np.array(list(itertools.permutations(range(n))))]  # (n!, n)
+    rhos = orders @ rank_x / math.sqrt(float(rank_x @ rank_x) * float(rank_y @ rank_y))
+    return float(np.mean(np.abs(rhos) >= abs(rho) - 1e-12))
+
+
+@dataclass(frozen=True, slots=True)
+class Contrast:
+    """How much more closely one variable follows the scores than a rival, each turned so that its r is positive."""
+
+    n: int  # cases that have all three; within subjects, trials
+    difference: float  # of the two correlations
+    low: float | None  # its 95 % interval
+    high: float | None
+    z: float | None  # Steiger's; None where the interval comes from a bootstrap
+    p: float | None  # two-sided
+
+    def differs(self, alpha: float) -> bool:
+        """Say whether the two correlations differ: by p where there is one, else by the interval."""
+        if self.p is not None:
+            return self.p < alpha
+        return self.low is not None and self.high is not None and not self.low <= 0.0 <= self.high
+
+
+def steiger_z(first: float, second: float, mutual: float, n: int) -> float | None:
+    """Return Steiger's Z of two correlations with one variable; `mutual` is that of the other two with each other.
+
+    Steiger 1980 (Psychol. Bull. 87:245), equation 14 with pooled correlations. None for fewer than four cases, a
+    perfect correlation, or two variables that are the same but for scale.
+    """
+    error = _pooled_variance(first, second, mutual)
+    if n < 4 or error is None:
+        return None
+    return (math.atanh(first) - math.atanh(second)) * math.sqrt((n - 3) / error)
+
+
+def cases_needed(first: float, second: float, mutual: float) -> int | None:
+    """Return how many cases give Steiger's test at p < 0.05 its `POWER` where the correlations are these.
+
+    None where no number of cases would: the correlations are equal, or the test has no value.
+    """
+    from scipy.special import ndtri
+
+    error = _pooled_variance(first, second, mutual)
+    if error is None or abs(first - second) < 1e-9:
+        return None
+    step = math.atanh(first) - math.atanh(second)
+    return 3 + math.ceil(error * ((t_quantile(math.inf) + float(ndtri(POWER))) / step) ** 2)
+
+
+def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | None:
+    """Return the difference of two correlations with Zou's interval (2007, Psychol. Methods 12:399) and Steiger's Z.
+
+    Correlations as for `steiger_z`, which says when there is none; a negative one is turned round with its variable.
+    """
+    turned = math.copysign(1.0, first) * math.copysign(1.0, second)
+    first, second, mutual = abs(first), abs(second), turned * mutual
+    z = steiger_z(first, second, mutual, n)
+    if z is None:
+        return None
+    half = t_quantile(math.inf) / math.sqrt(n - 3)
+    (a, b), (c, d) = ((math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)) for r in (first, second))
+    shared = _covariance(first, second, mutual) / ((1 - first**2) * (1 - second**2))
+    difference = first - second
+    low = difference - math.sqrt((first - a) ** 2 + (d - second) ** 2 - 2 * shared * (first - a) * (d - second))
+    high = difference + math.sqrt((b - first) ** 2 + (second - c) ** 2 - 2 * shared * (b - first) * (second - c))
+    return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
+
+
+def partial_correlation(xy: float, xz: float, yz: float) -> float | None:
+    """Return the correlation of x and y given z, from their three correlations; None where z determines one of them."""
+    left = (1 - xz * xz) * (1 - yz * yz)
+    return None if left < 1e-12 else float(np.clip((xy - xz * yz) / math.sqrt(left), -1.0, 1.0))
+
+
+def left_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Return the root mean square error of each y by the least-squares line on x through the others [unit of y].
+
+    The residual over 1 less its leverage (Allen 1974, Technometrics 16:125). None where the others fix no line.
+    """
+    if len(x) < 3:
+        return None
+    centred = np.asarray(x, np.float64) - float(np.mean(x))
+    size = float(centred @ centred)
+    if size <= 1e-24 * float(np.max(np.abs(x))) ** 2:
+        return None
+    own = 1.0 - 1.0 / len(x) - centred**2 / size
+    if float(own.min()) < 1e-9:
+        return None
+    values = np.asarray(y, np.float64) - float(np.mean(y))
+    errors = (values - centred * float(centred @ values) / size) / own
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _pooled_variance(first: float, second: float, mutual: float) -> float | None:
+    """Return n - 3 times the variance of the difference of two Fisher's z; None where there is no such difference."""
+    if max(abs(first), abs(second), abs(mutual)) > _PERFECT:
+        return None
+    pooled = (first + second) / 2
+    variance = 2 - 2 * _covariance(pooled, pooled, mutual) / (1 - pooled**2) ** 2
+    return variance if variance > 0.0 else None
+
+
+def _covariance(first: float, second: float, mutual: float) -> float:
+    """Return n times the covariance of two correlations with one variable (Steiger 1980, equation 3)."""
+    rest = 1 - first**2 - second**2
+    return mutual * rest - first * second * (rest - mutual**2) / 2

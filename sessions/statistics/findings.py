@@ -1,0 +1,333 @@
+"""What a study finds, as plain data, and what was planted in a simulated one beside what is found of it."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+
+from sessions.prediction import SED
+from sessions.statistics.answers import Average, ConstantStimuli, Estimates
+from sessions.statistics.correlations import Relation
+from sessions.statistics.mixed_model import MixedModel, Spread
+from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.rivals import Rival
+from sessions.statistics.scales import Consistence, Exponent, Judgement, PairedScale
+from sessions.statistics.scores import IntervalEstimate, MeanScore, reversed_subjects
+from sessions.statistics.visit import Exclusion, Visit, VisitOptions, scores_of
+from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
+
+SED_TERM = "SED [kPa]"
+INDEX = "index − 50"
+FRICTION = "µ"
+DRIFT = "trials before in the block"
+CARRY_OVER = "index stroked before − 50"
+LEVELS = "spread of subjects' levels"
+SLOPES = "spread of subjects' slopes on the index"
+NOISE = "noise of single scores"
+FINGERS = "spread of log µ between fingers and transducers"
+WITHIN = "r of score and SED within subjects"
+UNITS = {
+    INDEX: "points per index",
+    FRICTION: "points per unit of µ",
+    SED_TERM: "points per kPa",
+    DRIFT: "points per trial",
+    CARRY_OVER: "points per index",
+    LEVELS: "points",
+    SLOPES: "points per index",
+    NOISE: "points",
+    FINGERS: "1",
+    WITHIN: "1",
+}  # of effects on the score, and of the spreads
+
+
+@dataclass(frozen=True, slots=True)
+class Normalised:
+    """Statistics of scores when each subject's use of the scale is taken away: own mean 0, own spread 1."""
+
+    means: Mapping[int, Average]  # by index
+    mean_relation: Relation | None
+    repeated: RepeatedCorrelation | None
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceMean:
+    """Means over subjects of one surface; None where there is no subject's number."""
+
+    index: int
+    subjects: int  # whose stroke gave a response
+    mu: Average | None
+    response: Average | None  # the quantity of the model that is held against scores [MPa or -]
+    normal_force: Average | None  # measured [N]
+    model_normal_force: Average | None  # of the model, pressed to its depth [N]
+    matching_depth: Average | None  # at which the model would press as hard as the subject did [mm]
+
+
+@dataclass(frozen=True, slots=True)
+class DescriptorFindings:
+    """All that a study says of one descriptor."""
+
+    descriptor: str
+    indices: tuple[int, ...]
+    scores: tuple[MeanScore, ...]
+    within: tuple[WithinMean, ...]
+    agreement: Agreement | None
+    surfaces: tuple[SurfaceMean, ...]
+    answers: Mapping[str, tuple[float | None, ...]]  # subject -> score of each index
+    points: tuple[tuple[str, int, float, float], ...]  # subject, index, response, score: all of its own strokes
+    mean_relation: Relation | None  # mean response against mean score
+    repeated: RepeatedCorrelation | None  # of a subject's scores with the responses to its own strokes
+    repeated_holm: float | None  # its p, allowing for as many descriptors as have one
+    rivals: tuple[Rival, ...]  # within subjects: the response, and what else follows a subject's scores
+    rivals_of_means: tuple[Rival, ...]  # likewise of the means over subjects
+    without_subject: tuple[tuple[str, float], ...]  # subject left out, r within the others
+    normalised: Normalised
+    differences: tuple[Difference, ...]
+    estimates: Estimates | None
+    exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
+    scales: tuple[PairedScale, ...]  # of choices between two, by both models; () where nobody chose
+    consistence: Mapping[str, Consistence]  # of each subject who chose in every pair
+    on_response: (
+        MixedModel | str
+    )  # score on the response as people read it [kPa or 1], drift and carry-over; or why there is no model
+    on_index: MixedModel | str  # score on the maker's index, drift and carry-over
+    on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
+    fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
+    paths: tuple[PathFinding, ...]  # () where they were not asked for
+    constant_stimuli: ConstantStimuli | None = None  # None where nobody compared with a standard
+    latent: Mapping[Judgement, Mapping[int, IntervalEstimate]] = field(
+        default_factory=dict[Judgement, Mapping[int, IntervalEstimate]]
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """One planted effect beside what the study found."""
+
+    descriptor: str
+    effect: str
+    planted: float
+    estimate: float
+    low: float
+    high: float
+
+    @property
+    def covered(self) -> bool:
+        """Say whether the interval holds what was planted."""
+        return self.low <= self.planted <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFriction:
+    """How friction of all strokes was recovered."""
+
+    strokes: int  # with a planted and a found mu
+    median_error: float  # of mu, relative [-]
+    worst_error: float
+    intervals: int  # of mu that are given
+    covered: int  # of them hold what was planted
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFlaw:
+    """What was spoilt in one session, and whether the study says so."""
+
+    session: str
+    expected: str  # for people
+    detected: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StudyFindings:
+    """The result of a study."""
+
+    simulated: str
+    options: VisitOptions
+    visits: tuple[Visit, ...]  # all that were read, those left out too
+    failed: tuple[tuple[str, str], ...]  # folder, why it could not be read
+    copies: tuple[tuple[str, str], ...]  # session that counts nothing, and the one whose recording it holds again
+    excluded: tuple[Exclusion, ...]
+    reversed: tuple[tuple[str, str, float], ...]  # subject, descriptor, r of score with index: still counted
+    descriptors: tuple[DescriptorFindings, ...]
+    effects: tuple[Recovered, ...]  # planted, where the study is synthetic
+    friction: PlantedFriction | None
+    flaws: tuple[PlantedFlaw, ...] = ()  # planted, where the study is synthetic
+    synthetic: int | None = None  # the seed, where it is
+    response: str = SED.name  # the quantity of the model that is held against scores
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data."""
+        document: dict[str, Any] = {**({"simulated": self.simulated} if self.simulated else {}), **asdict(self)}
+        # Names until 2026-11-26, which stay for one release
+        for effect in document["effects"]:
+            effect["found"] = effect["estimate"]
+        for flaw in document["flaws"]:
+            flaw["found"] = flaw["detected"]
+        for exponent in filter(None, (one["exponent"] for one in document["descriptors"])):
+            exponent["both"] = exponent["deming"]
+        return document
+
+
+class _Score(msgspec.Struct):
+    gain: float
+    drift: float
+    carry_over: float
+    friction: dict[str, float] = {}
+
+
+class _People(msgspec.Struct):
+    gain_spread: float
+    offset_spread: float
+    judgement_noise: float
+    moisture: float
+    friction_weight: float = 0.0
+
+
+class _Relation(msgspec.Struct):
+    r: float
+    slope: float
+
+
+class _Stroke(msgspec.Struct):
+    subject: str
+    trial: int
+    mu: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spoilt:
+    """What goes wrong in one subject's visit, by number of the trial; 0: nowhere."""
+
+    lost: int = 0
+    frozen: int = 0
+    light: int = 0
+    unanswered: int = 0
+    aborted: int = 0
+    reversed: bool = False
+    expected: str  # what the analysis should say
+
+
+class _Planted(msgspec.Struct):
+    score: _Score
+    people: _People
+    strokes: list[_Stroke]
+    calibration_sd: float = 0.0
+    relation: dict[str, _Relation] = {}
+    spoilt: dict[str, Spoilt] = {}
+    seed: int | None = None
+
+
+def checked_planted(planted: object) -> dict[str, Any]:
+    """Return what was planted in a study, as its file holds it. Raises ValueError where it is nothing of the kind."""
+    msgspec.convert(planted, _Planted)
+    return cast("dict[str, Any]", planted)
+
+
+def recovered(descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
+    """Return the planted effects on the score, and spreads, beside what the study finds of them.
+
+    `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
+    """
+    rows: list[Recovered] = []
+    for one in descriptors:
+        rows += [*_slopes(one, planted["score"]), *_with_sed(one, planted), *_spreads(one, planted)]
+    return tuple(rows)
+
+
+def _slopes(one: DescriptorFindings, score: Mapping[str, Any]) -> list[Recovered]:
+    slopes = {
+        INDEX: score["gain"],
+        FRICTION: score.get("friction", {}).get(one.descriptor, 0.0),
+        DRIFT: score["drift"],
+        CARRY_OVER: score["carry_over"],
+    }
+    terms = () if isinstance(one.on_friction, str) else one.on_friction.terms
+    return [
+        Recovered(one.descriptor, t.name, slopes[t.name], t.estimate, t.low, t.high) for t in terms if t.name in slopes
+    ]
+
+
+def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
+    people = planted.get("people")
+    if not people:
+        return []
+    rows: list[Recovered] = []
+    if not isinstance(one.on_friction, str) and (differ := one.on_friction.spreads) is not None:
+        by_index = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
+        rows += [
+            _spread(one, name, sd, spread)
+            for name, sd, spread in (
+                (LEVELS, people["offset_spread"], differ.level),
+                (SLOPES, by_index, differ.slope),
+                (NOISE, people["judgement_noise"], differ.left),
+            )
+            if spread is not None
+        ]
+    if one.fingers is not None:
+        # A transducer's gains, of drag and of press, differ between visits as fingers do.
+        sd = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
+        rows.append(_spread(one, FINGERS, sd, one.fingers))
+    return rows
+
+
+def _spread(one: DescriptorFindings, name: str, planted: float, spread: Spread) -> Recovered:
+    return Recovered(one.descriptor, name, planted, spread.sd, spread.low, spread.high)
+
+
+def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
+    """Return how scores go with SEDs among people at large on these surfaces, beside the intervals for such people."""
+    relation = planted.get("relation", {}).get(one.descriptor)
+    if relation is None or one.repeated is None or one.repeated.people is None:
+        return []
+    rows = [Recovered(one.descriptor, WITHIN, relation["r"], one.repeated.r, *one.repeated.people)]
+    if not isinstance(one.on_response, str):
+        term = one.on_response.term(SED_TERM)
+        rows.append(Recovered(one.descriptor, SED_TERM, relation["slope"], term.estimate, term.low, term.high))
+    return rows
+
+
+_FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
+
+
+def found_flaws(
+    visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
+) -> tuple[PlantedFlaw, ...]:
+    """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
+    named = {visit.session: visit for visit in visits}
+    backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
+    rows_found: list[PlantedFlaw] = []
+    for session, faults in spoilt.items():
+        visit = named.get(session)
+        if visit is None:
+            rows_found.append(PlantedFlaw(session, faults["expected"], session in failed))
+            continue
+        rows = {row.trial: row for row in visit.rows}
+        if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
+            rows_found.append(
+                PlantedFlaw(session, faults["expected"], detected=False)
+            )  # a trial that the session does not have
+            continue
+        seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
+        seen += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []
+        seen += [rows[faults["aborted"]].outcome == "open" and not visit.complete] if faults.get("aborted") else []
+        seen += [visit.subject in backwards] if faults.get("reversed") else []
+        rows_found.append(PlantedFlaw(session, faults["expected"], bool(seen) and all(seen)))
+    return tuple(rows_found)
+
+
+def found_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
+    """Return how the planted µ of the strokes was recovered; None where no stroke has both."""
+    truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
+    rows = [
+        (row, truth[visit.subject, row.trial])
+        for visit in visits
+        for row in visit.rows
+        if row.mu is not None and (visit.subject, row.trial) in truth
+    ]
+    if not rows:
+        return None
+    errors = [abs((row.mu or 0.0) / mu - 1.0) for row, mu in rows]
+    holds = [row.mu_low <= mu <= row.mu_high for row, mu in rows if row.mu_low is not None and row.mu_high is not None]
+    return PlantedFriction(len(rows), float(np.median(errors)), max(errors), len(holds), sum(holds))

@@ -1,0 +1,318 @@
+"""What the readings of one trial say: its strokes, and its presses, from which the tilt of the face is estimated.
+
+Whoever presses along the face's normal n with the force N exerts -N n: what stands sideways over N is how far n leans.
+A press that pushes sideways by itself looks the same. Presses of one hand lean alike, so only several presses, or a
+weight in place of a finger, tell the face from the hand.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.plan import Frame, SessionPlan, Trial
+from sessions.strokes.contacts import Contact, find_contacts, split_at_reversals, split_at_valleys
+from sessions.strokes.decisions import Decisions, StrokeDecisions
+from sessions.strokes.onset import Baseline, onset_threshold
+from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.signal_quality import signal_quality
+from sessions.strokes.sliding import block_means, displacement
+from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_for
+from sessions.strokes.stroke import Flaw, FlawName, Stroke
+from sessions.strokes.stroke_measures import measure_stroke
+
+if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
+    pass
+
+ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
+ZERO_STATED = "as recorded, stated to be true"
+RAW_WRENCH = "N, N mm"  # raw unit of readings that came as a wrench
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Pair = tuple[float, float]
+
+
+class TrialContext(NamedTuple):
+    """What all trials of an analysis share."""
+
+    plan: SessionPlan
+    info: TransducerInfo
+    settings: AnalysisSettings
+    decisions: Decisions
+
+    @property
+    def zero_is_stated(self) -> bool:
+        """Say whether somebody stated that the recording's own zero is true."""
+        return self.info.settings.get(ZERO_SETTING) == ZERO_STATED
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """A contact that pressed and did not slide."""
+
+    trial: int | None
+    start: float  # of the hold [s, device clock]
+    stop: float
+    lean: Pair  # of the face's normal towards +x and +y [degrees], if it pressed straight down
+    error: Pair  # standard uncertainty from noise and zero [degrees]
+
+
+@dataclass(frozen=True, slots=True)
+class Tilt:
+    """How far the face's normal leans from the transducer's axis towards +x and +y."""
+
+    lean: Pair  # [degrees]
+    x_interval: Pair  # [degrees]
+    y_interval: Pair
+    presses: tuple[Press, ...]
+    kind: str  # what the intervals hold, for people
+
+    @property
+    def error(self) -> Pair:
+        """The standard uncertainty [degrees] of the mean of two presses or more, from how they scatter."""
+        return _mean_error(self.presses)
+
+
+class TrialAnalysis(NamedTuple):
+    """What one trial's readings say; `stroke` of a flaw counts within the trial."""
+
+    strokes: tuple[Stroke, ...] = ()
+    flaws: tuple[Flaw, ...] = ()
+    presses: tuple[Press, ...] = ()
+    filtered: str = ""
+
+
+def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContext) -> TrialAnalysis:
+    """Find and measure the strokes in the readings of a trial, and the presses among them."""
+    settings = context.settings
+    if len(block) < settings.detector.baseline_readings:
+        sentence = f"Only {len(block)} readings: too few for a stroke."
+        return TrialAnalysis(flaws=(Flaw(FlawName.NO_STROKE, sentence, "refused"),))
+    quality = signal_quality(block, context.info, settings)
+    flaws = [Flaw(name, sentence, grade) for name, sentence, grade in quality.flaws]
+    if quality.refused:
+        return TrialAnalysis(flaws=tuple(flaws))
+    span = span_of(block, quality, context.info.calibration, context.plan.frame, settings)
+    zero = _common_zero(span, context)
+    if zero is None:
+        sentence = "No stretch is unloaded: without a zero the readings of this transducer show no contact."
+        return TrialAnalysis(
+            flaws=(*flaws, Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused")), filtered=span.filtered
+        )
+    pull = _pull(span, zero, context)
+    if pull is not None:
+        return TrialAnalysis(flaws=(*flaws, pull), filtered=span.filtered)
+    pieces, idle, more = _pieces(span, zero, context)
+    part = _measure(pieces, idle, span, zero, trial, context)
+    flaws += [*more, *part.flaws, *_stroke_count(part.strokes, trial, context)]
+    return part._replace(flaws=tuple(flaws))
+
+
+def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
+    """Return the zero by which contacts are found; None where nothing tells one."""
+    if context.zero_is_stated:
+        return recorded_zero(span, stated=True)
+    first = span.windows.after(-np.inf, context.settings.zero.zero_stretch)
+    if first is not None:
+        return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error, "", None, (0.0, 0.0), None)
+    return recorded_zero(span, stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None
+
+
+def _pull(span: Span, zero: StrokeZero, context: TrialContext) -> Flaw | None:
+    """Return the flaw of a normal axis along which the recording pulls rather than presses."""
+    axis, settings = context.plan.frame.normal, context.settings
+    low, high = np.percentile(zero.level[2] - span.wrench[:, 2], [0.5, 99.5])
+    if -low <= max(settings.contact.pull_share * high, onset_threshold(float(zero.noise[2]), settings.detector)):
+        return None
+    sentence = (
+        f"Along {axis} the recording reaches {high:.3g} N pressing but {-low:.3g} N pulling, and a finger does not "
+        "pull: the normal axis is another one, or there is none; no stroke is reported."
+    )
+    return Flaw(FlawName.NORMAL_IMPLAUSIBLE, sentence, "refused")
+
+
+def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[Contact], Mask, list[Flaw]]:
+    """Return the contacts worth measuring, cut into strokes; readings (n,) in which nothing touches; and flaws."""
+    settings = context.settings
+    normal, smooth = zero.level[2] - span.wrench[:, 2], zero.level[2] - span.smooth[:, 2]
+    noise = float(zero.noise[2])
+    if zero.flaw is FlawName.NO_UNLOADED_STRETCH:
+        threshold = settings.contact.light_share * float(np.percentile(normal, 99.9))
+        noise = threshold / settings.detector.onset_noise
+    idle = np.ones(len(span.time), np.bool_)
+    pieces: list[Contact] = []
+    for contact in find_contacts(span.time, normal, Baseline(0.0, noise), settings):
+        idle[contact.start : contact.stop] = False
+        pieces += split_at_valleys(contact, span.time, smooth, settings)
+    strokes: list[Contact] = []
+    for piece in pieces:
+        own = zero if context.zero_is_stated else zero_for(span, piece, idle, settings)
+        strokes += (
+            (piece,)
+            if own is None
+            else split_at_reversals(piece, span.time, span.smooth - own.level, own.unsure[0], settings)
+        )
+    kept, flaws = _worth_measuring(strokes, span, smooth, settings)
+    return kept, idle, flaws
+
+
+def _worth_measuring(
+    pieces: list[Contact], span: Span, smooth: Array, settings: AnalysisSettings
+) -> tuple[list[Contact], list[Flaw]]:
+    """Return the contacts without taps and light touches, and a flaw for each of these."""
+    peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
+    greatest = max(peaks, default=0.0)
+    near = settings.contact.gap_beside / span.rate
+    kept: list[Contact] = []
+    flaws: list[Flaw] = []
+    for piece, peak in zip(pieces, peaks, strict=True):
+        start, stop = span.time[piece.start], span.time[piece.stop - 1]
+        tapped = stop - start < settings.contact.shortest_stroke
+        if not tapped and peak >= settings.contact.light_share * greatest:
+            kept.append(piece)
+            continue
+        gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
+        if gaps:
+            sentence = (
+                f"The contact from {start:.2f} to {stop:.2f} s goes on into readings that are not sound "
+                f"({gaps[0].cause}): its length is not known, so it is not measured."
+            )
+            flaws.append(Flaw(gaps[0].cause, sentence, "doubtful"))
+        else:
+            what, name = ("tap", FlawName.TAP) if tapped else ("light touch", FlawName.LIGHT_TOUCH)
+            sentence = f"A {what} from {start:.2f} to {stop:.2f} s, up to {peak:.2g} N, is not a stroke."
+            flaws.append(Flaw(name, sentence, "note"))
+    return kept, flaws
+
+
+def _measure(
+    pieces: list[Contact], idle: Mask, span: Span, zero: StrokeZero, trial: Trial | None, context: TrialContext
+) -> TrialAnalysis:
+    """Measure contacts as they were found or decided, each from its own zero unless one was stated."""
+    settings, plan = context.settings, context.plan
+    number = None if trial is None else trial.number
+    decided = [context.decisions.of_stroke(number, at) for at in range(1, len(pieces) + 1)]
+    flaws: list[Flaw] = []
+    idle = idle.copy()
+    for at, decisions in enumerate(decided):
+        pieces[at], empty = _with_decided_ends(pieces[at], decisions, span)
+        flaws += [] if empty is None else [replace(empty, stroke=at)]
+        idle[pieces[at].start : pieces[at].stop] = False
+    strokes: list[Stroke] = []
+    presses: list[Press] = []
+    for at, (piece, decisions) in enumerate(zip(pieces, decided, strict=True)):
+        own = zero
+        if not context.zero_is_stated:
+            own = zero_for(span, piece, idle, settings) or recorded_zero(span, stated=False)
+        stroke, more = measure_stroke(span, piece, own, plan, settings, trial, at + 1, decisions)
+        flaws += [replace(flaw, stroke=at) for flaw in more]
+        strokes.append(stroke)
+        if stroke.mu_dynamic is None and own.flaw is not FlawName.NO_UNLOADED_STRETCH:
+            press = press_of(span, piece, own, plan.frame, number, settings)
+            presses += [] if press is None else [press]
+    return TrialAnalysis(tuple(strokes), tuple(flaws), tuple(presses), span.filtered)
+
+
+def _with_decided_ends(piece: Contact, decisions: StrokeDecisions, span: Span) -> tuple[Contact, Flaw | None]:
+    """Return a contact with the onset and lift that were decided; as it is, with a flaw, where nothing is between."""
+    onset, lift = decisions.instant("onset"), decisions.instant("lift")
+    start = piece.start if onset is None else int(np.searchsorted(span.time, onset))
+    stop = piece.stop if lift is None else int(np.searchsorted(span.time, lift))
+    if stop - start < 2:
+        sentence = "No readings lie between the onset and the lift that were decided: they stay as they were found."
+        return piece, Flaw(FlawName.DECISION, sentence, "doubtful")
+    ends = piece.onset if onset is None else onset, piece.lift if lift is None else lift
+    return replace(piece, start=start, stop=stop, onset=ends[0], lift=ends[1]), None
+
+
+def _stroke_count(strokes: tuple[Stroke, ...], trial: Trial | None, context: TrialContext) -> Iterable[Flaw]:
+    """Yield a flaw where there is no stroke, or more than the trial asks for."""
+    if not strokes:
+        yield Flaw(FlawName.NO_STROKE, "No contact is a stroke.", "refused")
+    if trial is None or len(strokes) <= (allowed := context.plan.strokes_allowed(trial)):
+        return
+    task = "one" if allowed == 1 else f"up to {allowed}"
+    model = next((stroke.number for stroke in strokes_for_model(strokes, trial, context.decisions)), None)
+    gets = "none, as was decided" if model is None else "the first" if model == 1 else f"the one numbered {model}"
+    turned = any(FlawName.TURNED in stroke.flaws for stroke in strokes)
+    ways = " (each way of a finger that turned without lifting is one)" if turned else ""
+    sentence = f"{len(strokes)} strokes{ways} in a trial that asks for {task}: the model uses {gets}."
+    yield Flaw(FlawName.SECOND_STROKE, sentence, "doubtful")
+
+
+def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decisions: Decisions) -> tuple[Stroke, ...]:
+    """Return the strokes of a part that the model gets: of a trial the one decided, or else the first that is kept."""
+    kept = tuple(stroke for stroke in strokes if stroke.kept)
+    if trial is None:
+        return kept
+    choice = decisions.choice(trial.number)
+    return tuple(one for one in kept if choice is not None and one.number == choice.new) or kept[:1]
+
+
+def press_of(
+    span: Span, contact: Contact, zero: StrokeZero, frame: Frame, trial: int | None, settings: AnalysisSettings
+) -> Press | None:
+    """Return the press in a contact; None where it slides, is short, or drags more than a press does."""
+    track = track_of(span, contact, zero, frame.height, settings)
+    peak = float(np.nanmax(track.normal, initial=0.0))
+    if peak < settings.ratio.force_floor:
+        return None
+    with np.errstate(invalid="ignore"):
+        pressed = np.flatnonzero(track.normal >= settings.press.press_held * peak)
+    hold = slice(int(pressed[0]), int(pressed[-1]) + 1)
+    lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
+    distance = displacement(track.position[hold])
+    if lasted < settings.press.press_shortest or not distance <= settings.press.press_moves:
+        return None
+    values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
+    blocks = block_means(values, track.rate, settings)
+    if len(blocks) < settings.press.press_fewest:
+        return None
+    ratio = -blocks[:, :2] / blocks[:, 2:]
+    if np.hypot(*ratio.mean(axis=0)) > settings.press.press_ratio:
+        return None
+    scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
+    error = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean())))
+    lean = np.degrees(np.arctan(ratio.mean(axis=0)))
+    start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
+    # What was levelled before counts too: the lean is that against the transducer.
+    return Press(
+        trial,
+        start,
+        stop,
+        (float(lean[0]) + settings.tilt[0], float(lean[1]) + settings.tilt[1]),
+        (float(error[0]), float(error[1])),
+    )
+
+
+def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:
+    """Return the tilt that presses tell, with intervals; None without any."""
+    if not presses:
+        return None
+    from scipy.special import stdtrit  # slow to load, and neither window nor recorder has need of it
+
+    leans = np.array([press.lean for press in presses])
+    mean = leans.mean(axis=0)
+    per_cent = f"{100 * settings.confidence:g} %"
+    if len(presses) >= settings.press.press_fewest:
+        half = stdtrit(len(presses) - 1, 0.5 + settings.confidence / 2) * np.array(_mean_error(presses))
+        kind = f"{per_cent} t interval of the mean of {len(presses)} presses"
+    else:
+        errors = np.array([press.error for press in presses])
+        half = stdtrit(np.inf, 0.5 + settings.confidence / 2) * np.sqrt((errors**2).sum(axis=0)) / len(presses)
+        kind = (
+            f"{per_cent} interval from noise and zero of {len(presses)} press{'es' if len(presses) > 1 else ''} alone: "
+            "what the hand itself pushed sideways is not in it"
+        )
+    (x, y), (low_x, low_y), (high_x, high_y) = mean.tolist(), (mean - half).tolist(), (mean + half).tolist()
+    return Tilt((x, y), (low_x, high_x), (low_y, high_y), tuple(presses), kind)
+
+
+def _mean_error(presses: Sequence[Press]) -> Pair:
+    x, y = np.array([press.lean for press in presses]).std(axis=0, ddof=1) / np.sqrt(len(presses))
+    return float(x), float(y)
