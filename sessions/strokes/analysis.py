@@ -206,7 +206,8 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
         return replace(decision, old=None if position is None else analysis.strokes[position].number)
     for stroke in strokes:
         if stroke.number == decision.stroke:
-            return replace(decision, old=_stands(stroke, decision.what))
+            stick = None if None in (stroke.onset, stroke.break_away) else (stroke.onset, stroke.break_away)
+            return replace(decision, old=stick if decision.what == "stick" else getattr(stroke, decision.what))
     there = f"it has {len(strokes)}" if strokes else "none was found in it"
     raise DecisionError(f"there is no {decision.of}: {there}")
 
@@ -216,22 +217,13 @@ def preview(recording: Recording, decision: Decision, before: Decisions, now: An
 
     Raises DecisionError where the decision cannot be, or would change nothing.
     """
-    after = analyse(
-        recording,
-        AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error),
-        before.with_line(decision),
-    )
-    before_sentences = {flaw.sentence for flaw in now.flaws}
+    settings = AnalysisSettings(area=now.settings.area, gain_error=now.settings.gain_error)
+    after = analyse(recording, settings, before.with_line(decision))
+    known = {flaw.sentence for flaw in now.flaws}
     for flaw in after.flaws:
-        if flaw.name is FlawName.DECISION and flaw.sentence not in before_sentences and decision.undoes is None:
+        if flaw.name is FlawName.DECISION and flaw.sentence not in known and decision.undoes is None:
             raise DecisionError(flaw.sentence)
     return after
-
-
-def _stands(stroke: Stroke, what: str) -> Value:
-    if what == "stick":
-        return None if stroke.onset is None or stroke.break_away is None else (stroke.onset, stroke.break_away)
-    return getattr(stroke, what)
 
 
 # What documents of older programs lack: before 2026-11-23 the first four were not drawn, before 2026-11-25 the others

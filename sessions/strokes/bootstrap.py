@@ -62,9 +62,6 @@ def drag_direction(force: Array) -> Array:
     return np.array([x, y]) / length if length > 0.0 else np.array([1.0, 0.0])
 
 
-_RANGES = ("onset", "slide_onset")
-
-
 @dataclass(frozen=True, slots=True)
 class StrokeIntervals:
     """Intervals of one stroke's numbers, None for each number that is withheld or has too few readings."""
@@ -106,11 +103,14 @@ def stroke_intervals(stroke: Stroke, number: int, settings: BootstrapSettings | 
         low, high = np.quantile(repeats[name], ends).tolist()
         # An instant found at the end of the stretch in which it may lie, as by the first reading after it, is one too.
         # A lean that is known and was not levelled moves the truth off the reported number: it lies within as well.
-        within = name in _RANGES or settings.tilt != (0.0, 0.0)
+        within = name in ("onset", "slide_onset") or settings.tilt != (0.0, 0.0)
         return (min(low, value), max(high, value)) if within else (low, high)
 
+    agrees = None
+    if stroke.direction is not None and "heading" in repeats:  # where it lies within 60 degrees of that reported
+        agrees = float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))
     intervals = {name: interval(name) for name in NUMBERS}
-    return StrokeIntervals(number, stroke.trial, **intervals, direction_agrees=_agreement(stroke, repeats))
+    return StrokeIntervals(number, stroke.trial, **intervals, direction_agrees=agrees)
 
 
 def intervals_document(settings: BootstrapSettings, intervals: Iterable[StrokeIntervals]) -> dict[str, Any]:
@@ -124,13 +124,6 @@ def _repeats(stroke: Stroke, number: int, settings: BootstrapSettings) -> Mappin
     if stroke.curve is None or len(stroke.curve.time) < 3:
         return {}
     return _Repeats(stroke, stroke.curve, settings, np.random.default_rng([settings.seed, number])).all()
-
-
-def _agreement(stroke: Stroke, repeats: Mapping[str, Array]) -> float | None:
-    """Return the share of repeats whose heading lies within 60 degrees of the reported direction."""
-    if stroke.direction is None or "heading" not in repeats:
-        return None
-    return float(np.mean(stroke.direction * np.cos(np.radians(repeats["heading"])) >= 0.5))
 
 
 class FrictionDraws(NamedTuple):
@@ -211,9 +204,7 @@ class _Repeats:
             value = getattr(self._stroke, name)
             if value is not None:
                 numbers[name] = self._single(value)
-        window = self._window()
-        if window is not None:
-            numbers |= window
+        numbers |= self._window()
         if self._stroke.peak_normal is not None:
             top = self._top(self._curve.normal, self._noise_n)
             at = int(np.nanargmax(self._curve.normal))
@@ -250,13 +241,13 @@ class _Repeats:
         scatter = noise * self._draw.standard_normal(len(self._gain_t))
         return self._shared.ratio(value, along) + from_zero + scatter
 
-    def _window(self) -> dict[str, Array] | None:
+    def _window(self) -> dict[str, Array]:
         """Return dynamic friction and speed (repeats,) from blocks of the steady window drawn again."""
         steady, settings = self._stroke.steady, self._settings
         if steady is None or self._stroke.mu_dynamic is None:
-            return None
-        inside = (self._curve.time >= steady[0]) & (self._curve.time <= steady[1]) & np.isfinite(self._curve.ratio)
+            return {}
         curve = self._curve
+        inside = (curve.time >= steady[0]) & (curve.time <= steady[1]) & np.isfinite(curve.ratio)
         columns = np.column_stack(
             [curve.ratio, 1.0 / curve.normal, curve.time, curve.position, curve.normal, curve.tangential, curve.force]
         )
@@ -264,7 +255,7 @@ class _Repeats:
         window = columns[inside]
         count = len(window) // length
         if count < settings.fewest_blocks:
-            return None
+            return {}
         blocks = window[: count * length].reshape(count, length, columns.shape[1]).mean(axis=1)
         positions, weight, own = self._sample(count)
         sample = blocks[positions]  # (repeats, blocks, 9)

@@ -57,13 +57,12 @@ def split_at_valleys(contact: Contact, time: Array, normal: Array, settings: Ana
     standing = standing[force[standing] >= settings.contact.light_share * force.max(initial=0.0)]
     between = [(a, b, int(a + np.argmin(force[a:b]))) for a, b in pairwise(standing)]
     # Peaks of exactly the same height stand out of everything but one another.
-    valleys = [
-        contact.start + at for a, b, at in between if force[at] < settings.contact.valley * min(force[a], force[b])
-    ]
+    deep = settings.contact.valley
+    valleys = [contact.start + at for a, b, at in between if force[at] < deep * min(force[a], force[b])]
     if not valleys:
         return (contact,)
     bounds = [contact.start, *valleys, contact.stop]
-    return tuple(_piece(contact, bounds[i], bounds[i + 1], time, normal, settings) for i in range(len(bounds) - 1))
+    return tuple(_piece(contact, start, stop, time, normal, settings) for start, stop in pairwise(bounds))
 
 
 def _bridged(time: Array, force: Array, longest: float) -> Array:
@@ -140,49 +139,41 @@ def split_at_reversals(
 
 def _drag_runs(wrench: Array, time: Array, unsure: float, settings: AnalysisSettings) -> list[_DragRun]:
     """Return the ways of the drag in a wrench (n, 6); those that are too short or too weak are left out."""
-    normal = -wrench[:, 2]
+    cut, normal = settings.contact, -wrench[:, 2]
     floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * float(np.nanmax(normal, initial=0.0)))
-    with np.errstate(invalid="ignore"):
-        at = np.flatnonzero(normal >= floor)
+    at = np.flatnonzero(normal >= floor)
     if len(at) < 2:
         return []
-    block_number = np.floor((time[at] - time[at[0]]) / settings.contact.turn_block)
+    block_number = np.floor((time[at] - time[at[0]]) / cut.turn_block)
     firsts = np.flatnonzero(np.diff(block_number, prepend=-1.0))
     counts = np.diff(np.append(firsts, len(at)))
     force, pressed = (np.add.reduceat(column[at], firsts, axis=0).T / counts for column in (wrench[:, :2], normal))
     drag = np.hypot(*force)
     if unsure > settings.zero.drift_refused * float(np.median(drag)):  # the drag gives no number
         return []
-    strong = np.flatnonzero(
-        (drag >= settings.contact.turn_share * float(np.median(drag / pressed)) * pressed)
-        & (drag > settings.contact.turn_unsure * unsure)
-    )
+    least = cut.turn_share * float(np.median(drag / pressed)) * pressed
+    strong = np.flatnonzero((drag >= least) & (drag > cut.turn_unsure * unsure))
     lasts = at[np.append(firsts[1:], len(at)) - 1]
     runs: list[list[int]] = []  # of blocks
     for block in strong.tolist():
-        if runs and float(force[:, runs[-1][-settings.contact.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
+        if runs and float(force[:, runs[-1][-cut.turn_recent :]].sum(axis=1) @ force[:, block]) >= 0.0:
             runs[-1].append(block)
         else:
             runs.append([block])
-    every_run = [
-        _DragRun(int(at[firsts[run[0]]]), int(lasts[run[-1]]), force[:, run].sum(axis=1), len(run)) for run in runs
-    ]
+    ends = [(int(at[firsts[run[0]]]), int(lasts[run[-1]])) for run in runs]
+    every_run = [_DragRun(*two, force[:, run].sum(axis=1), len(run)) for two, run in zip(ends, runs, strict=True)]
     greatest = max((way.drag for way in every_run), default=0.0)
     longest = max((float(time[way.last] - time[way.first]) for way in every_run), default=0.0)
-    shortest = max(
-        settings.contact.shortest_stroke - settings.contact.turn_block, settings.contact.turn_shortest * longest
-    )
+    shortest = max(cut.shortest_stroke - cut.turn_block, cut.turn_shortest * longest)
     ways: list[_DragRun] = []
     dropped = False  # since the last way
     for way in every_run:
-        if time[way.last] - time[way.first] < shortest or way.drag < settings.contact.light_share * greatest:
-            dropped = True
-        elif ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
+        short = bool(time[way.last] - time[way.first] < shortest or way.drag < cut.light_share * greatest)
+        if not short and ways and dropped and float(ways[-1].push @ way.push) >= 0.0:
             ways[-1] = _DragRun(ways[-1].first, way.last, ways[-1].push + way.push, ways[-1].blocks + way.blocks)
-            dropped = False
-        else:
+        elif not short:
             ways.append(way)
-            dropped = False
+        dropped = short
     return ways
 
 
@@ -191,6 +182,4 @@ def _reversal(wrench: Array, one: _DragRun, other: _DragRun) -> int:
     across = other.push / np.hypot(*other.push) - one.push / np.hypot(*one.push)
     between = wrench[one.first : other.last + 1, :2] @ across
     until = between[: other.first - one.first + 1]
-    with np.errstate(invalid="ignore"):
-        before = np.flatnonzero(until < 0.0)
-    return one.first + int(before[-1]) + 1
+    return one.first + int(np.flatnonzero(until < 0.0)[-1]) + 1

@@ -139,25 +139,18 @@ class StrokeDecisions:
 
     of: Mapping[str, Decision]  # by what
 
+    def value(self, what: str) -> Any:  # noqa: ANN401 - of the kind that `OF_STROKE` names
+        """Return what was decided, None where nothing was."""
+        return self.of[what].new if what in self.of else None
+
     def instant(self, what: str) -> float | None:
         """Return an instant [s] that was decided."""
-        decision = self.of.get(what)
-        return None if decision is None else float(cast("float", decision.new))
-
-    def span(self, what: str) -> Span | None:
-        """Return two instants [s] that were decided."""
-        decision = self.of.get(what)
-        return None if decision is None else cast("Span", decision.new)
-
-    @property
-    def direction(self) -> int | None:
-        """Return the direction that was decided."""
-        return None if "direction" not in self.of else cast("int", self.of["direction"].new)
+        return float(self.value(what)) if what in self.of else None
 
     @property
     def kept(self) -> bool:
         """Say whether the stroke stays in: so unless it was decided otherwise."""
-        return "kept" not in self.of or bool(self.of["kept"].new)
+        return self.value("kept") is not False
 
     @property
     def sentences(self) -> dict[str, str]:
@@ -203,15 +196,12 @@ class Decisions:
 
     def choice(self, trial: int | None) -> Decision | None:
         """Return the decision which stroke of a trial the model gets, None where nobody decided."""
-        choices = (one for one in self.in_force if one.trial == trial and one.what == "choice")
-        return next(choices, None)
+        return next((one for one in self.in_force if one.trial == trial and one.what == "choice"), None)
 
     @property
     def tilt(self) -> Span | None:
         """Return how far the face leans to +x and to +y [degrees], where that was decided."""
-        tilts = (one for one in self.in_force if one.what == "tilt")
-        decision = next(tilts, None)
-        return None if decision is None else cast("Span", decision.new)
+        return next((cast("Span", one.new) for one in self.in_force if one.what == "tilt"), None)
 
     def with_line(self, decision: Decision) -> "Decisions":
         """Return them with one more that is not recorded, as to see what it would do.

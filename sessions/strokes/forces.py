@@ -161,8 +161,7 @@ def centre_of_pressure(wrench: Array, height: float) -> Array:
     array([[4., 3.]])
     """
     normal = -wrench[:, 2]
-    with np.errstate(invalid="ignore"):
-        pressing = np.where(normal > 0.0, normal, np.nan)
+    pressing = np.where(normal > 0.0, normal, np.nan)
     x = (wrench[:, 4] - height * wrench[:, 0]) / pressing
     y = -(wrench[:, 3] + height * wrench[:, 1]) / pressing
     return np.column_stack([x, y])
@@ -171,6 +170,5 @@ def centre_of_pressure(wrench: Array, height: float) -> Array:
 def friction_ratio(wrench: Array, floor: float) -> Array:
     """Return T/N (n,) [-] of a zeroed wrench (n, 6) in the face frame; nan where N is below `floor` [N]."""
     normal = -wrench[:, 2]
-    with np.errstate(invalid="ignore"):
-        pressing = np.where(normal >= floor, normal, np.nan)
+    pressing = np.where(normal >= floor, normal, np.nan)
     return np.hypot(wrench[:, 0], wrench[:, 1]) / pressing

@@ -23,10 +23,8 @@ def spikes(raw: Array, settings: SignalSettings) -> Mask:
         moving = steps[steps > 0.0]
         if not len(moving):
             continue
-        floor = max(
-            settings.wild_noise * NORMAL_STEP * float(np.median(steps)),
-            settings.wild_coarse * float(moving.min()),
-        )
+        noise = NORMAL_STEP * float(np.median(steps))
+        floor = max(settings.wild_noise * noise, settings.wild_coarse * float(moving.min()))
         spikes_found = [
             (at, w)
             for w in range(1, settings.wild_widest + 1)
@@ -172,17 +170,11 @@ def repeated_readings(block: ReadingBlock, settings: SignalSettings) -> Mask:
         ):
             jumped = not len(jumps) or bool(jumps[max(start - 1, 0) : start].any() or jumps[last : last + 1].any())
             ends = last == len(block) - 1
-            frozen[start + 1 : last + 1] = jumped or (
-                ends and _off_every_rest(block.raw, start, rests, settings.frozen_off)
-            )
+            off = np.abs(block.raw[rests] - block.raw[start]) > settings.frozen_off * np.ptp(block.raw, axis=0)
+            # Where some axis lies far from where it lay in each rest before it is pressed, or was.
+            frozen[start + 1 : last + 1] = jumped or (ends and bool(rests) and bool(off.any(axis=1).all()))
             rests += [] if frozen[last] else [start]
     return frozen
-
-
-def _off_every_rest(raw: Array, at: int, rests: list[int], far: float) -> bool:
-    """Say whether some axis of a reading lies far from where it lay in each rest before: it is pressed, or was."""
-    off = np.abs(raw[rests] - raw[at]) > far * np.ptp(raw, axis=0)
-    return bool(rests) and bool(off.any(axis=1).all())
 
 
 def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
@@ -196,16 +188,13 @@ def _jumps_of_coarse(raw: Array, settings: SignalSettings) -> Mask:
     moving = [each for each in changes if len(each)]
     if not moving or any(float(np.median(each)) > settings.coarse_steps * float(each.min()) for each in moving):
         return np.zeros(0, np.bool_)
-    large = np.array(
-        [settings.coarse_jump * float(np.percentile(each, 95)) if len(each) else np.inf for each in changes]
-    )
-    return np.asarray((steps > large).any(axis=1), np.bool_)
+    usual = np.array([float(np.percentile(each, 95)) if len(each) else np.inf for each in changes])
+    return np.asarray((steps > settings.coarse_jump * usual).any(axis=1), np.bool_)
 
 
 def saturated_readings(block: ReadingBlock, info: TransducerInfo) -> Mask:
     """Mark readings the device called invalid, and those outside the rated range, where one is stated."""
     calibration = info.calibration
     wrench = calibration.own(calibration.wrench(block.raw, np.zeros(6)))
-    with np.errstate(invalid="ignore"):
-        beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
+    beyond = (np.abs(wrench) > calibration.rated).any(axis=1)
     return info.status.doubtful(block.status) | beyond

@@ -89,16 +89,11 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     )
     missing = np.diff(block.sequence) - 1
     lost = int(missing[missing > 0].sum())
-    flaws = [
-        *_loss_flaws(lost, len(block)),
-        *_frozen_flaws(repeated, frozen, block.time, settings),
-        *_fault_flaws(block, info.status),
-        *_saturation_flaws(beyond & ~info.status.faulty(block.status), block.time),
-        *_stuck_flaws(stuck, block.time),
-        *_wild_flaws(wild_axes, block.time),
-        *_dead_flaws(dead),
-        *_time_flaws(step, even, int(stalled.sum())),
-    ]
+    flaws = (
+        *_flaws_of_readings(block, lost, repeated, frozen, beyond, info.status, settings.signal.frozen_refused),
+        *_flaws_of_axes(stuck, wild_axes, dead, block.time),
+        *_flaws_of_time(step, even, int(stalled.sum())),
+    )
     return SignalQuality(
         1.0 / step if step > 0 else np.nan,
         even,
@@ -107,7 +102,7 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
         tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(segments)),
         segments,
         dead,
-        tuple(flaws),
+        flaws,
     )
 
 
@@ -133,114 +128,89 @@ def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask
     return Gap(float(time[before.stop - 1]), float(time[after.start]), cause)
 
 
-_FlawParts = list[tuple[FlawName, str, Grade]]
+_FlawParts = Iterator[tuple[FlawName, str, Grade]]
 
 
-def _loss_flaws(lost: int, arrived: int) -> _FlawParts:
-    if not lost:
-        return []
-    share = 100 * lost / (lost + arrived)
-    sentence = f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
-    return [(FlawName.LOST_READINGS, sentence, "note")]
-
-
-def _frozen_flaws(repeated: Mask, frozen: Mask, time: Array, settings: AnalysisSettings) -> _FlawParts:
-    """Name readings that repeat all six numbers; from a share of frozen ones on, of any axis, refuse the rest too."""
-    refused = float(frozen.mean()) >= settings.signal.frozen_refused
-    flaws: _FlawParts = []
+def _flaws_of_readings(
+    block: ReadingBlock, lost: int, repeated: Mask, frozen: Mask, saturated: Mask, table: StatusTable, refusal: float
+) -> _FlawParts:
+    """Yield what is wrong with readings (n,) as a whole; from a share of frozen ones on all are refused."""
+    if lost:
+        share = 100 * lost / (lost + len(block))
+        sentence = (
+            f"{lost} readings were lost ({share:.2g} %); nothing was filled in and no filter reaches across a gap."
+        )
+        yield FlawName.LOST_READINGS, sentence, "note"
+    refused = float(frozen.mean()) >= refusal
     if repeated.any():
         sentence = (
             f"{100 * float(repeated.mean()):.0f} % of the readings repeat the six numbers before them, first at "
-            f"{time[repeated][0]:.2f} s: the sensor was frozen"
+            f"{block.time[repeated][0]:.2f} s: the sensor was frozen"
         )
         rest = ", and nothing is analysed." if refused else " there, and these readings are left out."
-        flaws.append((FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"))
+        yield FlawName.FROZEN, sentence + rest, "refused" if refused else "doubtful"
     elif refused:
         share = 100 * float(frozen.mean())
         sentence = f"One axis or another was frozen in {share:.0f} % of the readings: nothing is analysed."
-        flaws.append((FlawName.FROZEN, sentence, "refused"))
-    return flaws
+        yield FlawName.FROZEN, sentence, "refused"
+    faulty = table.faulty(block.status)
+    if faulty.any():
+        count = StatusCount(table)
+        count.take(block.status[faulty])
+        sentence = (
+            f"{int(faulty.sum())} readings came while the device reported a fault, first at "
+            f"{block.time[faulty][0]:.2f} s: {flagged_words(count.flagged)}; they are doubtful and left out."
+        )
+        yield FlawName.DEVICE_FAULT, sentence, "doubtful"
+    saturated = saturated & ~faulty
+    if saturated.any():
+        sentence = (
+            f"{int(saturated.sum())} readings are saturated or marked invalid by the device, first at "
+            f"{block.time[saturated][0]:.2f} s; they are left out, and a peak that they may hide is not given."
+        )
+        yield FlawName.SATURATED, sentence, "doubtful"
 
 
-def _stuck_flaws(stuck: tuple[ConstantRun, ...], time: Array) -> _FlawParts:
-    """Name each axis that was clipped or frozen by the first run that shows it."""
-    flaws: _FlawParts = []
+def _flaws_of_axes(stuck: tuple[ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array) -> _FlawParts:
+    """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]
         lasting = sum(float(time[one.last] - time[one.first]) for one in runs)
+        what = (
+            "never goes beyond it: clipped. These readings are left out, and peaks that they may hide are not given."
+            if clipped
+            else "moves before or after: frozen there. These readings are left out."
+        )
         sentence = (
             f"{_AXIS_NAMES[axis]} keeps one value bit for bit while other axes move, for {lasting:.2g} s in all, first "
-            f"at {time[runs[0].first]:.2f} s, "
+            f"at {time[runs[0].first]:.2f} s, and {what}"
         )
-        if clipped:
-            sentence += (
-                "and never goes beyond it: clipped. These readings are left out, and peaks that they may hide are not "
-                "given."
-            )
-            flaws.append((FlawName.SATURATED, sentence, "doubtful"))
-        else:
-            sentence += "and moves before or after: frozen there. These readings are left out."
-            flaws.append((FlawName.FROZEN, sentence, "doubtful"))
-    return flaws
+        yield FlawName.SATURATED if clipped else FlawName.FROZEN, sentence, "doubtful"
+    if wild.any():
+        at = wild.any(axis=1)
+        axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
+        stand = "reading stands" if at.sum() == 1 else "readings stand"
+        sentence = (
+            f"{at.sum()} {stand} far beyond everything around on {axes}, first at {time[at][0]:.3f} s: spikes, which "
+            "are left out before filtering."
+        )
+        yield FlawName.WILD, sentence, "doubtful"
+    if dead:
+        force = any(name.startswith("F") for name in dead)
+        cost = "a dead sensor, and nothing is analysed" if force else "no centre of pressure, hence no speed"
+        yield FlawName.DEAD, f"{', '.join(dead)} never changed: {cost}.", "refused" if force else "doubtful"
 
 
-def _wild_flaws(wild: Mask, time: Array) -> _FlawParts:
-    """Name the readings (n, 6) that stand far beyond all around them."""
-    if not wild.any():
-        return []
-    at: Mask = np.asarray(wild.any(axis=1), np.bool_)
-    axes = ", ".join(name for name, marked in zip(_AXIS_NAMES, wild.T, strict=True) if marked.any())
-    count = int(at.sum())
-    sentence = (
-        f"{count} {'reading stands' if count == 1 else 'readings stand'} far beyond everything around on {axes}, first "
-        f"at {time[at][0]:.3f} s: spikes, which are left out before filtering."
-    )
-    return [(FlawName.WILD, sentence, "doubtful")]
-
-
-def _fault_flaws(block: ReadingBlock, table: StatusTable) -> _FlawParts:
-    faulty = table.faulty(block.status)
-    if not faulty.any():
-        return []
-    count = StatusCount(table)
-    count.take(block.status[faulty])
-    sentence = (
-        f"{int(faulty.sum())} readings came while the device reported a fault, first at {block.time[faulty][0]:.2f} s: "
-        f"{flagged_words(count.flagged)}; they are doubtful and left out."
-    )
-    return [(FlawName.DEVICE_FAULT, sentence, "doubtful")]
-
-
-def _saturation_flaws(saturated: Mask, time: Array) -> _FlawParts:
-    if not saturated.any():
-        return []
-    sentence = (
-        f"{int(saturated.sum())} readings are saturated or marked invalid by the device, first at "
-        f"{time[saturated][0]:.2f} s; they are left out, and a peak that they may hide is not given."
-    )
-    return [(FlawName.SATURATED, sentence, "doubtful")]
-
-
-def _dead_flaws(dead: tuple[str, ...]) -> _FlawParts:
-    if not dead:
-        return []
-    names = ", ".join(dead)
-    if any(name.startswith("F") for name in dead):
-        return [(FlawName.DEAD, f"{names} never changed: a dead sensor, and nothing is analysed.", "refused")]
-    return [(FlawName.DEAD, f"{names} never changed: no centre of pressure, hence no speed.", "doubtful")]
-
-
-def _time_flaws(step: float, even: bool, stalled: int) -> _FlawParts:
+def _flaws_of_time(step: float, even: bool, stalled: int) -> _FlawParts:
     if not step > 0.0:
-        return [(FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused")]
-    flaws: _FlawParts = []
+        yield FlawName.UNKNOWN_RATE, "The device's time does not advance: nothing can be timed.", "refused"
+        return
     if stalled:
         sentence = f"At {stalled} readings the device's time did not advance; they are left out."
-        flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
+        yield FlawName.IRREGULAR_TIME, sentence, "doubtful"
     if not even:
         sentence = f"The time steps are uneven about {1000 * step:.3g} ms: forces are not filtered."
-        flaws.append((FlawName.IRREGULAR_TIME, sentence, "doubtful"))
-    return flaws
+        yield FlawName.IRREGULAR_TIME, sentence, "doubtful"
 
 
 def doubtful_readings(recording: "Recording") -> Iterator[str]:

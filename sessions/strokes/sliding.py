@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sessions.plan.plan import Frame
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import AnalysisSettings, SteadySettings
 from sessions.strokes.span import Span, Track, mean_vector
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
 
@@ -27,34 +27,31 @@ def steady_window(ratio: Array, rate: float, readings: int, settings: AnalysisSe
     that of least variance is taken as it is ("least variance"), or widened to the longest steady stretch that holds it
     ("widened"). "middle half" and "whole slide" ask for no steadiness.
     """
-    shortest = max(
-        settings.steady.steady_share * readings,
-        settings.steady.steady_shortest * rate,
-        settings.steady.steady_readings,
-    )
-    first, last, variance, steady = _stretches(ratio, shortest, settings)
+    rule = settings.steady
+    shortest = max(rule.steady_share * readings, rule.steady_shortest * rate, rule.steady_readings)
+    first, last, variance, steady = _stretches(ratio, shortest, rule)
     if not len(first):
         return None
     length = last - first
-    if settings.steady.steady_rule in ("middle half", "whole slide"):
+    if rule.steady_rule in ("middle half", "whole slide"):
         most = int(np.argmax(length))
         sliding = first[most] + np.flatnonzero(np.isfinite(ratio[first[most] : last[most]]))
-        aside = len(sliding) // 4 if settings.steady.steady_rule == "middle half" else 0
+        aside = len(sliding) // 4 if rule.steady_rule == "middle half" else 0
         return slice(int(sliding[aside]), int(sliding[-1 - aside]) + 1)
     if not steady.any():
         return None
-    seed = max(settings.steady.steady_seed * np.isfinite(ratio).sum(), shortest)
-    best = _least(length, variance, steady, seed, len(ratio) / (settings.steady.steady_edges - 1))
-    if settings.steady.steady_rule == "least variance":
+    seed = max(rule.steady_seed * np.isfinite(ratio).sum(), shortest)
+    best = _least(length, variance, steady, seed, len(ratio) / (rule.steady_edges - 1))
+    if rule.steady_rule == "least variance":
         return slice(int(first[best]), int(last[best]))
     around = np.flatnonzero(steady & (first <= first[best]) & (last >= last[best]))
     best = around[np.lexsort((variance[around], -length[around]))[0]]
     return _trimmed(ratio, slice(int(first[best]), int(last[best])), settings)
 
 
-def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tuple[Places, Places, Array, Mask]:
+def _stretches(ratio: Array, shortest: float, rule: SteadySettings) -> tuple[Places, Places, Array, Mask]:
     """Return where each sliding stretch of a grid begins and ends, the variance of T/N in it, and if it is steady."""
-    edges = np.unique(np.linspace(0, len(ratio), settings.steady.steady_edges).round().astype(int))
+    edges = np.unique(np.linspace(0, len(ratio), rule.steady_edges).round().astype(int))
     finite = np.isfinite(ratio)
     value = np.where(finite, ratio, 0.0)
     count, total, squares = (np.concatenate([[0.0], np.cumsum(each)]) for each in (finite, value, value**2))
@@ -62,14 +59,13 @@ def _stretches(ratio: Array, shortest: float, settings: AnalysisSettings) -> tup
     long_enough = last - first >= shortest
     first, last = first[long_enough], last[long_enough]
     n = count[last] - count[first]
-    full = n >= settings.steady.steady_held * (last - first)
+    full = n >= rule.steady_held * (last - first)
     first, last, n = first[full], last[full], n[full]
     mean = (total[last] - total[first]) / n
     variance = np.maximum((squares[last] - squares[first]) / n - mean**2, 0.0)
-    allowed = settings.steady.steady_trend * mean + 2.0 * np.sqrt(_QUARTERS * variance / n) * (
-        n < _QUARTERS * settings.steady.steady_readings
-    )
-    steady = np.sqrt(variance) < settings.steady.steady_spread * mean
+    scatter = np.where(n < _QUARTERS * rule.steady_readings, np.sqrt(_QUARTERS * variance / n), 0.0)
+    allowed = rule.steady_trend * mean + 2.0 * scatter
+    steady = np.sqrt(variance) < rule.steady_spread * mean
     for quarter in range(_QUARTERS):
         a = first + (last - first) * quarter // _QUARTERS
         b = first + (last - first) * (quarter + 1) // _QUARTERS
@@ -94,8 +90,7 @@ def _trimmed(ratio: Array, window: slice, settings: AnalysisSettings) -> slice:
     part = ratio[window]
     level = float(np.nanmedian(part))
     scatter = 1.4826 * float(np.nanmedian(np.abs(part - level)))
-    with np.errstate(invalid="ignore"):
-        inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
+    inside = np.flatnonzero(np.abs(part - level) <= max(settings.steady.steady_trend * level, 2.0 * scatter))
     return slice(window.start + int(inside[0]), window.start + int(inside[-1]) + 1)
 
 
@@ -167,8 +162,7 @@ def slide(
         window = _decided_window(track, decided, settings.steady.steady_readings)
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
-        with np.errstate(invalid="ignore"):
-            sliding = np.where(track.speed >= limit, track.ratio, np.nan)
+        sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
     motion, trouble = _speed(span, track, window, frame, settings)
     if trouble is not None and decided is None:  # the centre of pressure does not tell when the finger slides
@@ -176,9 +170,8 @@ def slide(
         motion, trouble = _speed(span, track, window, frame, settings)
     at_rest = _rest(span, track, track if uncut is None else uncut, window, settings)
     if window is not None and at_rest is not None and decided is not None:
-        findings.flaw(
-            at_rest[0], f"{at_rest[1]} The window was decided by a person: its numbers are given.", "doubtful"
-        )
+        sentence = f"{at_rest[1]} The window was decided by a person: its numbers are given."
+        findings.flaw(at_rest[0], sentence, "doubtful")
         at_rest = None
     if window is None or at_rest is not None:
         name, sentence = at_rest or (
@@ -239,8 +232,7 @@ def _rolled(track: Track, uncut: Track, level: float, settings: AnalysisSettings
     It counts over the `uncut` contact, turns included, and only where T/N lies about its `level` in the steady window:
     a contact slips nowhere below that.
     """
-    with np.errstate(invalid="ignore"):
-        at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
+    at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
     places = block_means(np.where(at_level[:, None], uncut.position, np.nan), track.rate, settings)
     way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
     if way > settings.slide.roll:
@@ -254,49 +246,45 @@ def _rolled(track: Track, uncut: Track, level: float, settings: AnalysisSettings
 def _speed(
     span: Span, track: Track, window: slice | None, frame: Frame, settings: AnalysisSettings
 ) -> tuple[Movement | None, tuple[FlawName, str] | None]:
-    """Return the movement over a window, and what forbids taking it for a speed."""
-    if window is None:
-        return None, (FlawName.SPEED_NOT_MEASURABLE, "")
-    motion = movement(track.time[window], track.position[window], track.rate, settings)
-    return motion, _speed_trouble(span, track, window, motion, frame, settings)
-
-
-def _speed_trouble(
-    span: Span, track: Track, window: slice, motion: Movement | None, frame: Frame, settings: AnalysisSettings
-) -> tuple[FlawName, str] | None:
-    """Say why the centre of pressure gives no speed over a window, or None where it does."""
+    """Return the movement over a window, and why it gives no speed, None where it does."""
     name = FlawName.SPEED_NOT_MEASURABLE
+    if window is None:
+        return None, (name, "")
+    time, limits = track.time[window], settings.slide
+    motion = movement(time, track.position[window], track.rate, settings)
     if motion is None:
-        return name, "The centre of pressure is known at too few instants of the steady window for a speed."
-    way = motion.speed * float(track.time[window.stop - 1] - track.time[window.start])
+        return None, (name, "The centre of pressure is known at too few instants of the steady window for a speed.")
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    if step > settings.slide.speed_step * way:
-        return name, f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is given."
-    if motion.error > settings.slide.speed_error * motion.speed:
-        return name, f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s: no speed is given."
-    if motion.explained < settings.slide.speed_line:
-        share = 100 * motion.explained
-        return name, f"A straight line explains {share:.0f} % of the centre of pressure's movement: no speed is given."
-    if frame.height_origin == "default":
-        lever = movement(
-            track.time[window], -track.wrench[window, :2] / track.normal[window, None], track.rate, settings
+    what = f"moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s"
+    if step > limits.speed_step * (motion.speed * float(time[-1] - time[0])):
+        sentence = f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is given."
+        return motion, (name, sentence)
+    if motion.error > limits.speed_error * motion.speed:
+        return motion, (name, f"The centre of pressure {what}: no speed is given.")
+    if motion.explained < limits.speed_line:
+        share = f"{100 * motion.explained:.0f} %"
+        return motion, (
+            name,
+            f"A straight line explains {share} of the centre of pressure's movement: no speed is given.",
         )
-        wrong = settings.slide.height_doubt * (lever.speed if lever else 0.0)
-        if wrong > settings.slide.speed_error * motion.speed:
-            return FlawName.HEIGHT_UNKNOWN, (
-                f"Nobody stated the face's height: were it wrong by {settings.slide.height_doubt:g} mm the speed of "
-                f"{motion.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given."
+    if frame.height_origin == "default":
+        arm = -track.wrench[window, :2] / track.normal[window, None]
+        lever = movement(time, arm, track.rate, settings)
+        wrong = limits.height_doubt * (lever.speed if lever else 0.0)
+        if wrong > limits.speed_error * motion.speed:
+            return motion, (
+                FlawName.HEIGHT_UNKNOWN,
+                f"Nobody stated the face's height: were it wrong by {limits.height_doubt:g} mm the speed of "
+                f"{motion.speed:.3g} mm/s would change by {wrong:.2g} mm/s, so none is given.",
             )
-    return None
+    return motion, None
 
 
 def _slide_onset(findings: Findings, track: Track, motion: Movement, settings: AnalysisSettings) -> None:
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(findings.numbers["steady"][0])))
-    with np.errstate(invalid="ignore"):
-        slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * motion.speed)
-    last_slow = np.flatnonzero(slow)
-    first = int(last_slow[-1]) + 1 if len(last_slow) else 0
+    slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * motion.speed)
+    first = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
     if first <= start:
         findings.numbers["slide_onset"] = float(track.time[first])
 

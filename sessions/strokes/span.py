@@ -17,9 +17,6 @@ from sessions.strokes.stroke import FlawName, StrokeCurve
 
 Array = NDArray[np.float64]
 
-_FORCES = slice(0, 3)
-_TORQUES = slice(3, 5)  # about x and y: those that tell the centre of pressure
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Zero:
@@ -72,29 +69,23 @@ class QuietWindows:
 def quiet_windows(time: Array, wrench: Array, rate: float, settings: AnalysisSettings) -> QuietWindows:
     """Return where a wrench (n, 6) [N, N mm; face frame] at `time` (n,) [s] is unloaded."""
     length = max(settings.detector.baseline_readings, round(settings.detector.baseline * rate))
-    bounds = _quiet(time, wrench, length, rate, settings)
-    return QuietWindows(time, wrench, bounds)
-
-
-def _quiet(time: Array, wrench: Array, length: int, rate: float, settings: AnalysisSettings) -> NDArray[np.int64]:
-    """Return the bounds (k, 2) of the quiet, unloaded windows of so many readings."""
     if len(wrench) < length:
-        return np.empty((0, 2), np.int64)
+        return QuietWindows(time, wrench, np.empty((0, 2), np.int64))
     starts = np.arange(0, len(wrench) - length + 1, max(1, length // settings.zero.quiet_hops))
-    spread, noise = _spread(wrench[:, _FORCES], starts, length)
+    spread, noise = _spread(wrench[:, :3], starts, length)
     low, high = np.percentile(-wrench[:, 2], [0.5, 99.5])
     floor = max(settings.detector.quiet_floor, settings.zero.quiet_share * float(high - low))
     quiet = (spread <= np.maximum(settings.detector.quiet_noise * noise, floor)).all(axis=1)
     # A finger that slides with a steady force moves the centre of pressure, and with it the torques alone.
-    turned, shaking = _spread(wrench[:, _TORQUES], starts, length)
+    turned, shaking = _spread(wrench[:, 3:5], starts, length)
     still = settings.zero.quiet_moves * float(high - low)
     quiet &= (turned <= np.maximum(settings.detector.quiet_noise * shaking, still)).all(axis=1)
     level = np.lib.stride_tricks.sliding_window_view(-wrench[:, 2], length)[starts].mean(axis=1)
     threshold = onset_threshold(float(np.median(noise[:, 2])), settings.detector)
     unloaded = level - low <= max(settings.zero.unloaded_share * (high - low), threshold)
     unbroken = time[starts + length - 1] - time[starts] <= settings.zero.quiet_gap * length / rate
-    unloaded_starts = starts[quiet & unloaded & unbroken]
-    return np.column_stack([unloaded_starts, unloaded_starts + length]).astype(np.int64)
+    firsts = starts[quiet & unloaded & unbroken]
+    return QuietWindows(time, wrench, np.column_stack([firsts, firsts + length]).astype(np.int64))
 
 
 def _spread(axes: Array, starts: NDArray[np.int64], length: int) -> tuple[Array, Array]:
@@ -204,13 +195,9 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
     else:
         origin, flaw = f"unloaded after contact, {zero.when}", FlawName.ZERO_AFTER_CONTACT
     unsure = _unsure(span, contact, idle, level, drift, settings)
-    return StrokeZero(level, zero.noise, *_filtered(span, zero), error, origin, drift, unsure, flaw)
-
-
-def _filtered(span: Span, zero: Zero) -> tuple[Array, float]:
-    """Return the noise (3,) of filtered forces [N] where nothing pressed, and how long that was seen [s]."""
     part = (span.time >= zero.start) & (span.time <= zero.stop)
-    return np.nanstd(span.smooth[part, :3], axis=0), zero.stop - zero.start
+    filtered = np.nanstd(span.smooth[part, :3], axis=0)
+    return StrokeZero(level, zero.noise, filtered, zero.stop - zero.start, error, origin, drift, unsure, flaw)
 
 
 def _unsure(

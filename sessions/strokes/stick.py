@@ -38,9 +38,8 @@ class Climb(NamedTuple):
         lasts = self.meets - self.begins
         left = np.clip((self.meets - time) / lasts, 0.0, 1.0)
         inside = (left > 0.0) & (left < 1.0)
-        by_left = np.zeros_like(time)
+        by_left, by_bend = np.zeros_like(time), np.zeros_like(time)
         by_left[inside] = -self.bend * left[inside] ** (self.bend - 1.0) / lasts
-        by_bend = np.zeros_like(time)
         by_bend[inside] = -(left[inside] ** self.bend) * np.log(left[inside])
         done, above = _parts(self, time).T
         share = np.full_like(time, self.rise) if self.fall == 0.0 else self.rise + self.peak * _peak_decay(self, time)
@@ -196,11 +195,10 @@ def stick_slip(time: Array, ratio: Array, noise: float, settings: AnalysisSettin
         return None
     change = ratio[lag:] - ratio[:-lag]
     sudden = max(limits.slip_share * float(np.nanmedian(ratio)), limits.slip_noise * np.sqrt(2.0) * noise)
-    with np.errstate(invalid="ignore"):
-        drops = _beginnings(change < -sudden)
-        # A slow climb grows by up to a third of a drop in the same time, so half of one is sudden.
-        depth = -float(np.median(np.fmin.reduceat(change, drops))) if len(drops) else 0.0
-        climbs = _beginnings(change > max(sudden, 0.5 * depth))
+    drops = _beginnings(change < -sudden)
+    # A slow climb grows by up to a third of a drop in the same time, so half of one is sudden.
+    depth = -float(np.median(np.fmin.reduceat(change, drops))) if len(drops) else 0.0
+    climbs = _beginnings(change > max(sudden, 0.5 * depth))
     if len(drops) < limits.slips_fewest or len(climbs) > limits.slips_upwards * len(drops):
         return None
     steps = np.diff(ratio)
@@ -218,8 +216,7 @@ def power_of_normal_force(normal: Array, ratio: Array, length: int, settings: An
     Means of `length` readings are fitted, and two standard errors are allowed. Never above 0.
     """
     steepest = settings.ratio.law_steepest
-    with np.errstate(invalid="ignore"):
-        valid = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
+    valid = np.isfinite(ratio) & (ratio > 0.0) & (normal > 0.0)
     blocks = np.count_nonzero(valid) // length
     if blocks < settings.ratio.law_fewest:
         return steepest

@@ -56,8 +56,9 @@ def measure_stroke(
         if contact.uncut is not None:
             first, last = contact.uncut
             uncut = track_of(span, replace(contact, start=first, stop=last), zero, frame.height, settings)
-        window = slide(findings, span, track, frame, settings, decided.span("steady"), uncut)
-        _take_slide_onset(findings, decided)
+        window = slide(findings, span, track, frame, settings, decided.value("steady"), uncut)
+        if (onset := decided.instant("slide_onset")) is not None:
+            findings.numbers["slide_onset"] = onset
         if window is not None:
             missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area, settings)
             _friction(findings, track, window)
@@ -66,9 +67,11 @@ def measure_stroke(
             _judge_way(findings, track, window, settings)
         _take_decided(findings, track, decided)
         _judge_drift(findings, zero, settings)
-    if trial is not None:
-        _judge_task(findings, trial)
     numbers = dict(findings.allowed(EVERYTHING))
+    if trial is not None and numbers["direction"] not in (None, trial.direction):
+        way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
+        sentence = f"The finger moved the other way than the trial asks ({way})."
+        findings.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
     stroke = Stroke(
         trial=None if trial is None else trial.number,
         onset=contact.onset if "onset" not in findings.reasons else decided.instant("onset"),
@@ -111,8 +114,8 @@ def _judge_ends(findings: Findings, contact: Contact, track: Track, settings: An
     crept = float(track.time[pressed[0]]) - contact.onset if contact.onset is not None and len(pressed) else 0.0
     if crept > settings.contact.slow_onset:
         sentence = (
-            f"The force crept for {crept:.2f} s from leaving its zero to a fifth of its "
-            "peak: the onset marks where it left, which may not be the touch."
+            f"The force crept for {crept:.2f} s from leaving its zero to a fifth of its peak: the onset marks where it "
+            "left, which may not be the touch."
         )
         findings.flaw(FlawName.SLOW_ONSET, sentence, "doubtful")
 
@@ -146,9 +149,8 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact, settings: Anal
         findings.flaw(widest.cause, sentence, "doubtful", PEAKS)
     wild = [gap for gap in inside if gap.cause is FlawName.WILD]
     if wild:
-        sentence = (
-            f"A wild reading at {wild[0].start:.2f} s of this stroke was left out: compare its numbers with its curve."
-        )
+        at = f"at {wild[0].start:.2f} s of this stroke"
+        sentence = f"A wild reading {at} was left out: compare its numbers with its curve."
         findings.flaw(FlawName.WILD, sentence, "doubtful")
 
 
@@ -157,12 +159,7 @@ def _judge_loads(findings: Findings, track: Track, contact_area: float, settings
     peak = float(np.nanmax(track.normal, initial=0.0))
     greatest = float(np.nanmax(track.tangential, initial=0.0))
     traction, area = _greatest_traction(track, track.tangential, contact_area, settings)
-    findings.numbers |= {
-        "peak_normal": peak,
-        "peak_tangential": greatest,
-        "tau_max": traction,
-        "contact_area": area,
-    }
+    findings.numbers |= {"peak_normal": peak, "peak_tangential": greatest, "tau_max": traction, "contact_area": area}
     findings.numbers["mu_max"] = _greatest_ratio(track, track.floor, settings)
     if peak < settings.ratio.force_floor:
         sentence = (
@@ -173,9 +170,8 @@ def _judge_loads(findings: Findings, track: Track, contact_area: float, settings
         sentence = f"The normal force reaches {peak:.3g} N, more than a finger presses: check the units of the forces."
         findings.flaw(FlawName.UNITS_IMPLAUSIBLE, sentence, "doubtful")
     half = settings.ratio.light_half * peak
-    with np.errstate(invalid="ignore"):
-        light = (track.ratio > 1.0) & (track.normal < half)
-        pressed = track.ratio[track.normal >= half]
+    light = (track.ratio > 1.0) & (track.normal < half)
+    pressed = track.ratio[track.normal >= half]
     if light.any() and np.isfinite(pressed).any() and np.nanmedian(pressed) < 1.0:
         sentence = (
             f"T/N exceeds 1 while N is below half its peak ({peak:.3g} N), and not above: drift or a side load makes "
@@ -191,8 +187,7 @@ def _greatest_traction(
     """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
     if settings.area.law == "fixed":
         return float(np.nanmax(tangential, initial=0.0)) / planned, planned
-    with np.errstate(invalid="ignore"):
-        pressed = np.flatnonzero(track.normal >= track.floor)
+    pressed = np.flatnonzero(track.normal >= track.floor)
     if not len(pressed):
         return None, None
     areas = settings.area.area(track.normal[pressed], planned)
@@ -209,16 +204,11 @@ def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> f
     length = max(1, round(settings.filter.smoothing * track.rate))
     if len(track.time) < length:
         return None
-    with np.errstate(invalid="ignore"):
-        pressed = track.normal >= floor
-    normal = np.where(pressed, track.normal, np.nan)
+    normal = np.where(track.normal >= floor, track.normal, np.nan)
     box = np.ones(length) / length
     means = np.convolve(track.tangential, box, "valid") / np.convolve(normal, box, "valid")
-    unbroken = (
-        track.time[length - 1 :] - track.time[: len(track.time) - length + 1]
-        < settings.zero.quiet_gap * length / track.rate
-    )
-    means = means[np.isfinite(means) & unbroken]
+    lasting = track.time[length - 1 :] - track.time[: len(track.time) - length + 1]
+    means = means[np.isfinite(means) & (lasting < settings.zero.quiet_gap * length / track.rate)]
     return float(means.max()) if len(means) else None
 
 
@@ -253,8 +243,7 @@ def _stick_slip(
 ) -> float | None:
     """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
     dragging, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
-    with np.errstate(invalid="ignore"):
-        ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
+    ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
     level, pressing = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
     slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, pressing), settings)
     if slips is None:
@@ -288,14 +277,6 @@ def _judge_drift(findings: Findings, zero: StrokeZero, settings: AnalysisSetting
         f"{', so no force, friction or speed is given' if refused else ''}."
     )
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
-
-
-def _judge_task(findings: Findings, trial: Trial) -> None:
-    direction = findings.allowed(("direction",))["direction"]
-    if direction is not None and direction != trial.direction:
-        way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
-        sentence = f"The finger moved the other way than the trial asks ({way})."
-        findings.flaw(FlawName.WRONG_DIRECTION, sentence, "doubtful")
 
 
 def _static_peak(
@@ -341,16 +322,9 @@ def _break_away(findings: Findings, track: Track, window: slice, settings: Analy
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
-def _take_slide_onset(findings: Findings, decided: StrokeDecisions) -> None:
-    """Give the instant from which the contact slides, where a person decided it."""
-    onset = decided.instant("slide_onset")
-    if onset is not None:
-        findings.numbers["slide_onset"] = onset
-
-
 def _take_decided(findings: Findings, track: Track, decided: StrokeDecisions) -> None:
     """Give the stick phase and the direction that a person decided."""
-    stick = decided.span("stick")
+    stick = decided.value("stick")
     if stick is not None:
         inside = track.ratio[(track.time >= stick[0]) & (track.time <= stick[1])]
         inside = inside[np.isfinite(inside)]
@@ -361,8 +335,8 @@ def _take_decided(findings: Findings, track: Track, decided: StrokeDecisions) ->
         else:
             sentence = "The stick phase that was decided holds no T/N: the force is too low there, or nothing touches."
             findings.flaw(FlawName.DECISION, sentence, "doubtful", ("mu_static",))
-    if decided.direction is not None:
-        findings.numbers |= {"direction": decided.direction, "direction_from": "decision"}
+    if (direction := decided.value("direction")) is not None:
+        findings.numbers |= {"direction": direction, "direction_from": "decision"}
         for name in DIRECTION:
             findings.reasons.pop(name, None)
 

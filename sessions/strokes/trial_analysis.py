@@ -262,8 +262,7 @@ def press_of(
     peak = float(np.nanmax(track.normal, initial=0.0))
     if peak < settings.ratio.force_floor:
         return None
-    with np.errstate(invalid="ignore"):
-        pressed = np.flatnonzero(track.normal >= settings.press.press_held * peak)
+    pressed = np.flatnonzero(track.normal >= settings.press.press_held * peak)
     hold = slice(int(pressed[0]), int(pressed[-1]) + 1)
     lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
     distance = displacement(track.position[hold])
@@ -281,13 +280,9 @@ def press_of(
     lean = np.degrees(np.arctan(ratio.mean(axis=0)))
     start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
     # What was levelled before counts too: the lean is that against the transducer.
-    return Press(
-        trial,
-        start,
-        stop,
-        (float(lean[0]) + settings.tilt[0], float(lean[1]) + settings.tilt[1]),
-        (float(error[0]), float(error[1])),
-    )
+    x, y = lean.tolist()
+    error_x, error_y = error.tolist()
+    return Press(trial, start, stop, (x + settings.tilt[0], y + settings.tilt[1]), (error_x, error_y))
 
 
 def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:
