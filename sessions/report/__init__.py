@@ -52,7 +52,7 @@ def findings(
     scores are always among them. `planted` is what a simulator planted, trial by trial; None for real sessions.
     `further` is what took more solves, or was asked for.
     """
-    tables = joined((score_table(recording), *(scores or ())))
+    plan, tables = recording.plan, joined((score_table(recording), *(scores or ())))
     stroke_findings = strokes(recording, analysis)
     more = further or Further()
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
@@ -60,9 +60,9 @@ def findings(
     head = _head(recording, tables)
     other_sessions = [Path(table.session).name for table in tables[1:]]
     numbers = quantities(predicted, stroke_findings)
-    judged = experiments(recording.plan, tables, numbers, more.paths, analysis.settings.area, more.response)
+    judged = experiments(plan, tables, numbers, more.paths, analysis.settings.area, more.response)
     return Report(
-        title=_title(recording),
+        title=f"{plan.protocol}, subject {plan.subject}" if plan.blocks else f"Recording {recording.folder.name}",
         session=recording.folder.name,
         simulated=bool(head),
         head=head,
@@ -101,12 +101,6 @@ def _sealed(recording: Recording, tables: Sequence[ScoreTable], predicted: Seque
     if not predicted or not any(table.scores for table in tables):
         return ""
     return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in predicted])
-
-
-def _title(recording: Recording) -> str:
-    if not recording.plan.blocks:
-        return f"Recording {recording.folder.name}"
-    return f"{recording.plan.protocol}, subject {recording.plan.subject}"
 
 
 def _head(recording: Recording, tables: Sequence[ScoreTable]) -> str:

@@ -11,7 +11,6 @@ from sessions.plan.plan import PROXIMAL_TO_DISTAL, Block, Origin
 from sessions.prediction import SED, PredictionOptions, SessionPrediction, with_own_finger
 from sessions.prediction.afferent import AfferentSettings, usual_settings
 from sessions.recording.head import calibration_hash
-from sessions.recording.log import TrialRecord
 from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
@@ -128,21 +127,14 @@ def people(recording: Recording, tables: Sequence[ScoreTable]) -> tuple[Fact, ..
     facts = [Fact("subject", plan.subject)] if plan.subject else []
     if scored:
         sessions = sum(bool(table.scores) for table in tables)
-        facts.append(
-            Fact(
-                "subjects who scored",
-                f"{len(scored)}: {', '.join(scored)}",
-                "in one session" if sessions == 1 else f"in {sessions} sessions",
-            )
-        )
+        where = "in one session" if sessions == 1 else f"in {sessions} sessions"
+        facts.append(Fact("subjects who scored", f"{len(scored)}: {', '.join(scored)}", where))
     if plan.blocks:
         facts.append(Fact("protocol", plan.protocol))
         facts.append(Fact("stimulus order", plan.order_rule, f"seed {plan.seed}"))
     facts += [Fact(block.name, _block(block)) for block in plan.blocks]
     own = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
-    facts += [
-        Fact(f"the subject's finger: {name}", f"{value:g} mm", "measured") for name, value in own.items() if value
-    ]
+    facts += [Fact(f"the subject's finger: {name}", f"{mm:g} mm", "measured") for name, mm in own.items() if mm]
     if plan.contact_angle_origin == "measured":
         facts.append(Fact("contact angle", f"{plan.contact_angle:g}°", "measured"))
     graded = grading(recording.trials)
@@ -169,17 +161,14 @@ def apparatus(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         return (Fact("transducer", "none: a visit for scores only"),)
     rate = "unknown" if math.isnan(info.rate) else f"{info.rate:g} readings a second"
     clock: Mapping[str, Any] = recording.provenance.get("clock", {})
+    area = f"{plan.contact_area:g} mm², {analysis.settings.area.sentence}"
     facts = [
         Fact("transducer", f"{info.model}, serial number {info.serial}", f"driver {info.driver}"),
         Fact("rate", rate),
         Fact("calibration", info.calibration.source, f"readings in {info.calibration.raw_unit}"),
         Fact("normal axis", f"pressing is positive along {plan.frame.normal}", _ORIGIN[plan.frame.normal_origin]),
         Fact("height of the face", f"{plan.frame.height:g} mm above the origin", _ORIGIN[plan.frame.height_origin]),
-        Fact(
-            "contact area",
-            f"{plan.contact_area:g} mm², {analysis.settings.area.sentence}",
-            _ORIGIN[plan.contact_area_origin],
-        ),
+        Fact("contact area", area, _ORIGIN[plan.contact_area_origin]),
         Fact("tilt of the face", *_tilt(analysis)),
         Fact("filter", analysis.filtered),
         Fact("interval of µ", analysis.bootstrap.kind),
@@ -207,25 +196,25 @@ def excluded(
     recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
 ) -> tuple[str, ...]:
     """Return what was kept out of the results, by whom and why, a sentence each."""
-    out = [one for one in analysis.decisions if one.leaves_out]
-    sentences = [stopped(f"By {one.sentence}") for one in out]
+    sentences = [stopped(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
-        sentences += _trial(record)
-    for number, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
-        without = [str(stroke.number) for stroke in strokes if getattr(stroke, number) is None]
+        number = record.trial.number
+        for take in record.other_takes:
+            why = f"discarded: {take.discarded}" if take.discarded is not None else "the recording ended in it"
+            sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
+        sentences += [f"Trial {number} was skipped."] if record.outcome == "skipped" else []
+    for name, words in (("mu_dynamic", "dynamic friction"), ("speed", "speed")):
+        without = ", ".join(str(stroke.number) for stroke in strokes if getattr(stroke, name) is None)
         if without:
-            sentences.append(
-                f"No {words} is given for stroke {', '.join(without)}: the flaws below and the tables say why."
-            )
+            sentences.append(f"No {words} is given for stroke {without}: the flaws below and the tables say why.")
     return tuple(sentences)
 
 
 def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTable]) -> tuple[str, ...]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
-    kept = [one for one in analysis.decisions if not one.leaves_out]
-    sentences += [stopped(f"By {one.sentence}") for one in kept]
+    sentences += [stopped(f"By {one.sentence}") for one in analysis.decisions if not one.leaves_out]
     for record in recording.trials:
         number = record.trial.number
         if record.outcome == "not answered":
@@ -240,18 +229,6 @@ def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTabl
     return tuple(sentences)
 
 
-def _trial(record: TrialRecord) -> list[str]:
-    """Return what was set aside in one trial."""
-    number = record.trial.number
-    sentences: list[str] = []
-    for take in record.other_takes:
-        why = f"discarded: {take.discarded}" if take.discarded is not None else "the recording ended in it"
-        sentences.append(f"Take {take.number} of trial {number} does not count ({why}); its readings are kept.")
-    if record.outcome == "skipped":
-        sentences.append(f"Trial {number} was skipped.")
-    return sentences
-
-
 def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
     """Return all that shaped the numbers; values nobody set are marked."""
     provenance, info = recording.provenance, recording.info
@@ -263,9 +240,8 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         Fact("machine", ", ".join(f"{name} {value}" for name, value in provenance.get("machine", {}).items())),
     ]
     if recording.plan.blocks:
-        facts.append(
-            Fact("plan", f"{recording.plan.protocol}, seed {recording.plan.seed}", "all of it in session.json")
-        )
+        plan = f"{recording.plan.protocol}, seed {recording.plan.seed}"
+        facts.append(Fact("plan", plan, "all of it in session.json"))
     if info is not None:
         facts.append(Fact("transducer's address", info.uri))
         facts.append(Fact("calibration matrix", f"SHA-256 {calibration_hash(info.calibration)}"))
@@ -276,24 +252,18 @@ def again(recording: Recording, analysis: Analysis) -> tuple[Fact, ...]:
         for name, words in settings.items()
     ]
     if info is not None:
-        facts.append(Fact("analysis", _settings(analysis.settings)))
+        facts.append(Fact("analysis", "; ".join(_listed(analysis.settings, AnalysisSettings()))))
     return tuple(fact for fact in facts if fact.value)
 
 
-def _settings(settings: AnalysisSettings) -> str:
-    """Return every setting with its value; those that differ from the defaults are marked."""
-    return "; ".join(_listed(settings, AnalysisSettings()))
-
-
 def _listed(chosen: Any, usual: Any, prefix: str = "") -> list[str]:  # noqa: ANN401 - any settings dataclass
+    """Return every setting with its value; those that differ from the usual ones are marked."""
     words: list[str] = []
     for field in fields(chosen):
         value, default = getattr(chosen, field.name), getattr(usual, field.name)
         if is_dataclass(value):
             words += _listed(value, default, f"{prefix}{field.name}.")
         else:
-            words.append(
-                f"{prefix}{field.name} {value:g}" if isinstance(value, float) else f"{prefix}{field.name} {value}"
-            )
-            words[-1] += "" if value == default else " (set)"
+            shown = f"{value:g}" if isinstance(value, float) else str(value)
+            words.append(f"{prefix}{field.name} {shown}{'' if value == default else ' (set)'}")
     return words

@@ -1,6 +1,7 @@
 """What a report says in sentences: its question, its answer in short, and what would change the sign of r."""
 
 from collections.abc import Callable, Mapping
+from itertools import takewhile
 from typing import Literal
 
 from sessions.prediction.stored import Variant
@@ -55,36 +56,34 @@ def _in_variant(report: Report, variant: Variant, opening: str, untried: str) ->
 
     tried = {p.experiment for p in report.predictions if any(one.variant == variant for one in p.alternatives)}
     parts = [
-        f"{experiment.name} {_words(related)}, n = {related.n} {'stimulus' if related.n == 1 else 'stimuli'}"
+        f"{experiment.name} {words}, n = {plural(related.n, 'stimulus', 'stimuli')}"
         for experiment in report.experiments
         if experiment.name in tried
         for related in [_related(report, experiment, sed)]
+        for r in [related.pearson]
+        for words in [related.reason if r is None else f"r = {correlation(r)}{ends_of(related)}"]
     ]
     return f"{opening}: {'; '.join(parts)}." if parts else untried
 
 
-def _words(related: Relation) -> str:
-    return str(related.reason) if related.pearson is None else f"r = {correlation(related.pearson)}{ends_of(related)}"
-
-
 def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
     means = {mean.index: mean.mean for mean in experiment.scores}
-    points = [
-        (p.index, means[p.index], number)
-        for p in report.predictions
-        if p.experiment == experiment.name and p.index in means
-        for number in [value(p)]
-        if number is not None
-    ]
-    return relation([point[2] for point in points], [point[1] for point in points], [point[0] for point in points])
+    scored = [(p.index, value(p)) for p in report.predictions if p.experiment == experiment.name and p.index in means]
+    known = [(index, number) for index, number in scored if number is not None]
+    return relation(
+        [number for _, number in known], [means[index] for index, _ in known], [index for index, _ in known]
+    )
 
 
 def _by_place(report: Report) -> str:
     """Return how far along the skin the ending may lie without another sign of r."""
     ranges: list[str] = []
     for experiment in report.experiments:
-        by_place = {arc: _related(report, experiment, _at(arc)).pearson for arc in _places(report, experiment)}
-        known = {arc: r for arc, r in by_place.items() if r is not None}
+        rows = [dict(p.row) for p in report.predictions if p.experiment == experiment.name and p.row]
+        arcs = rows[0] if rows else {}
+        places = sorted(arc for arc in arcs if abs(arc) <= REACH and all(arc in row for row in rows))
+        by_place = {arc: _related(report, experiment, _at(arc)) for arc in places}
+        known = {arc: related.pearson for arc, related in by_place.items() if related.pearson is not None}
         if 0.0 in known:
             low, high = _alike(known)
             ranges.append(f"{experiment.name} from {digits(low, 2)} to {digits(high, 2)} mm")
@@ -100,27 +99,16 @@ def _at(arc: float) -> _Value:
     return lambda one: dict(one.row).get(arc)
 
 
-def _places(report: Report, experiment: Experiment) -> list[float]:
-    """Return the places [mm] that every prediction of an experiment has an SED of."""
-    rows = [dict(p.row) for p in report.predictions if p.experiment == experiment.name and p.row]
-    return sorted(arc for arc in rows[0] if abs(arc) <= REACH and all(arc in row for row in rows)) if rows else []
-
-
 def _alike(known: Mapping[float, float]) -> tuple[float, float]:
     """Return the ends of the stretch about 0 in which the sign is that at 0.
 
     >>> _alike({-0.5: -0.9, -0.25: 0.3, 0.0: 0.9, 0.25: 0.8})
     (-0.25, 0.25)
     """
-    ends = [0.0, 0.0]
-    for side, places in (
-        (0, sorted((a for a in known if a < 0.0), reverse=True)),
-        (1, sorted(a for a in known if a > 0.0)),
-    ):
-        for arc in places:
-            if known[arc] * known[0.0] <= 0.0:
-                break
-            ends[side] = arc
+    ends: list[float] = []
+    for side in (-1.0, 1.0):
+        outwards = sorted((arc for arc in known if side * arc >= 0.0), key=abs)
+        ends.append(list(takewhile(lambda arc: known[arc] * known[0.0] > 0.0, outwards))[-1])
     return ends[0], ends[1]
 
 

@@ -53,9 +53,12 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:
     """Return every flaw with its sentence, its grade and where it lies."""
-    return tuple(
-        Fact(flaw.name.replace("_", " "), flaw.sentence, f"{_place(flaw)}: {flaw.grade}") for flaw in analysis.flaws
-    )
+    facts: list[Fact] = []
+    for flaw in analysis.flaws:
+        where = "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
+        where = where if flaw.stroke is None else f"stroke {flaw.stroke + 1}"
+        facts.append(Fact(flaw.name.replace("_", " "), flaw.sentence, f"{where}: {flaw.grade}"))
+    return tuple(facts)
 
 
 def course(recording: Recording) -> Course | None:
@@ -67,9 +70,8 @@ def course(recording: Recording) -> Course | None:
         return None
     wrench = in_face_frame(recording.info.calibration.wrench(block.raw, np.zeros(6)), recording.plan.frame)
     kept = _extremes(-wrench[:, 2])
-    return Course(
-        _numbers(block.time[kept]), _numbers(-wrench[kept, 2]), _numbers(np.hypot(wrench[kept, 0], wrench[kept, 1]))
-    )
+    drag = np.hypot(wrench[kept, 0], wrench[kept, 1])
+    return Course(_numbers(block.time[kept]), _numbers(-wrench[kept, 2]), _numbers(drag))
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:
@@ -122,12 +124,6 @@ def _extremes(values: Array) -> NDArray[np.int64]:
         if not np.isnan(piece).all():
             kept |= {start + int(np.nanargmin(piece)), start + int(np.nanargmax(piece))}
     return np.array(sorted(kept))
-
-
-def _place(flaw: Flaw) -> str:
-    if flaw.stroke is not None:
-        return f"stroke {flaw.stroke + 1}"
-    return "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
 
 
 def _numbers(values: Array) -> tuple[float, ...]:
@@ -185,8 +181,7 @@ def fields(prediction: SessionPrediction | None) -> tuple[Field, ...]:
             before = chosen.get(row.block)
             if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
                 chosen[row.block] = row
-    drawn = [field_of(name, row) for name, row in chosen.items()]
-    return tuple(field for field in drawn if field is not None)
+    return tuple(field for name, row in chosen.items() if (field := field_of(name, row)) is not None)
 
 
 def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
@@ -224,17 +219,14 @@ def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
 def finding_of(row: TrialPrediction) -> PredictionFinding:
     """Return the finding of one trial."""
     history = row.history
-    reasons = dict(row.reasons)
-    for name, other in _FROM_ROW.items():
-        if other in reasons:
-            reasons.setdefault(name, reasons[other])
+    reasons = {name: row.reasons[other] for name, other in _FROM_ROW.items() if other in row.reasons}
     numbers: dict[str, Any] = {
         "stroke": None if row.stroke is None else row.stroke + 1,
         "experiment": row.block or "",
         "index": None if row.stimulus is None else row.stimulus.index,
         "code": "" if row.stimulus is None else row.stimulus.code,
         "history": None if history is None else History(_numbers(history.time), _numbers(history.sed_ending)),
-        "reasons": reasons,
+        "reasons": {**reasons, **row.reasons},
         "responses": row.responses,
         "row": _row(row),
         "doubt": "" if row.prediction is None else doubt_of(row.prediction),
@@ -298,8 +290,7 @@ def _share(entries: Sequence[Mapping[str, Any]]) -> str:
     known = [100 * entry["estimate"] for entry in entries if entry["estimate"] is not None]
     if not known:
         return "no estimate"
-    low, high = min(known), max(known)
-    ends = dict.fromkeys((_plain(low), _plain(high)))
+    ends = dict.fromkeys((_plain(min(known)), _plain(max(known))))
     return f"{' to '.join(ends)} % of the SED"
 
 

@@ -5,7 +5,7 @@
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
 
@@ -38,7 +38,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
         (lower, course.tangential, VERMILLION, "tangential force"),
     ):
         for stroke in strokes:
-            begin, end = first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
+            begin, end = _ends(stroke, first, last)
             text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
             axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
         axes.plot(course.time, values, color=colour, linewidth=0.8)
@@ -49,21 +49,16 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time on the device's clock [s]")
     for stroke, middle in _numbered(strokes, first, last):
-        upper.annotate(
-            str(stroke.number),
-            xy=(middle, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 2),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            color=INK,
-            fontsize=7.5,
-        )
+        _mark(upper, str(stroke.number), (middle, 1.0), (0, 2), ha="center", va="bottom", color=INK, fontsize=7.5)
     name, title = "course", "Normal and tangential force over the whole recording"
     header = ("time [s]", "normal force [N]", "tangential force [N]")
     rows = tuple(zip(course.time, course.normal, course.tangential, strict=True))
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
+
+
+def _mark(axes: Axes, text: str, at: tuple[float, float], off: tuple[float, float], **look: Any) -> None:  # noqa: ANN401 - matplotlib's
+    """Write beside an instant and a share of the axes' height, `off` in points."""
+    axes.annotate(text, at, off, ("data", "axes fraction"), "offset points", **look)
 
 
 def _numbered(strokes: tuple[StrokeFinding, ...], first: float, last: float) -> list[tuple[StrokeFinding, float]]:
@@ -71,11 +66,14 @@ def _numbered(strokes: tuple[StrokeFinding, ...], first: float, last: float) -> 
     room = 0.025 * (last - first)
     kept: list[tuple[StrokeFinding, float]] = []
     for stroke in strokes:
-        begin, end = first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
-        middle = (begin + end) / 2
+        middle = sum(_ends(stroke, first, last)) / 2
         if not kept or middle - kept[-1][1] >= room:
             kept.append((stroke, middle))
     return kept
+
+
+def _ends(stroke: StrokeFinding, first: float, last: float) -> tuple[float, float]:
+    return first if stroke.onset is None else stroke.onset, last if stroke.lift is None else stroke.lift
 
 
 MOST_LABELLED = 12  # more curves in one picture cannot be distinguished by labels
@@ -215,16 +213,7 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
     whole.axvline(PRESSED, color=GREY, linewidth=0.5, linestyle=(0, (2, 3)))
     whole.set_ylim(0.0, 1.25 * max(row[3] for row in rows) * 1e3)
     for text, offset, side in (("pressing", -4, "right"), ("sliding", 4, "left")):
-        whole.annotate(
-            text,
-            xy=(PRESSED, 0.98),
-            xycoords=("data", "axes fraction"),
-            xytext=(offset, 0),
-            textcoords="offset points",
-            ha=side,
-            va="top",
-            color=GREY,
-        )
+        _mark(whole, text, (PRESSED, 0.98), (offset, 0), ha=side, va="top", color=GREY)
     whole.set_title(name)
     sliding.set_xlim(PRESSED, end)
     margin = 0.06 * (max(seen) - min(seen) or max(seen))

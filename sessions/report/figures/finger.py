@@ -5,6 +5,7 @@
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -21,6 +22,10 @@ LONGEST_ARROW = 1.5  # of the tractions in the picture [mm]
 ARROWS = 22  # at most
 NO_SED = "No node of this finger has a finite SED."
 HALF_WIDTH = 4.6  # of the close view [mm]
+_ARROW: dict[str, Any] = {
+    **{"angles": "xy", "scale_units": "xy", "scale": 1.0, "units": "xy"},
+    **{"width": 0.045, "headwidth": 4.0, "headlength": 5.0, "headaxislength": 4.5},
+}
 _STYLE = {"slip": "solid", "cap": (0, (4, 1.2)), "stick": (0, (1, 1))}
 _WORDS = {"slip": "slips", "cap": "slips at the bound", "stick": "sticks"}
 
@@ -30,8 +35,7 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
     whole, close = sheet(328, 330), sheet(328, 330)
     filled = _tissue(whole.axes[0], field, levels)
     _tissue(close.axes[0], field, levels)
-    x = np.array([place[0] for place in field.nodes])
-    y = np.array([place[1] for place in field.nodes])
+    x, y = np.array(field.nodes).T
     whole.axes[0].set_xlim(x.min() - 0.5, x.max() + 0.5)
     whole.axes[0].set_ylim(-1.2, y.max() + 0.5)
     if filled is not None:
@@ -55,15 +59,11 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
         (*place, p, t, state)
         for place, p, t, state in zip(field.contact, field.pressure, field.traction, field.state, strict=True)
     )
+    other, header = f"{stem}-contact", ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state")
+    picture = svg(whole, stem, title, simulated=simulated)
     return (
-        Panel(stem, title, svg(whole, stem, title, simulated=simulated), ("x [mm]", "y [mm]", "SED [MPa]"), nodes),
-        Panel(
-            f"{stem}-contact",
-            near,
-            svg(close, f"{stem}-contact", near, simulated=simulated),
-            ("x [mm]", "y [mm]", "pressure [MPa]", "traction along +x [MPa]", "state"),
-            skin,
-        ),
+        Panel(stem, title, picture, ("x [mm]", "y [mm]", "SED [MPa]"), nodes),
+        Panel(other, near, svg(close, other, near, simulated=simulated), header, skin),
     )
 
 
@@ -122,14 +122,9 @@ def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourS
 
 
 def _bar(drawn: Sheet, filled: TriContourSet, levels: tuple[float, ...]) -> None:
+    axes, ticks = drawn.axes[0], levels[:: -(-len(levels) // 6)]
     bar = drawn.figure.colorbar(
-        filled,
-        ax=drawn.axes[0],
-        location="bottom",
-        ticks=levels[:: -(-len(levels) // 6)],
-        spacing="proportional",
-        aspect=28,
-        pad=0.02,
+        filled, ax=axes, location="bottom", ticks=ticks, spacing="proportional", aspect=28, pad=0.02
     )
     bar.set_label("SED [kPa]")
 
@@ -144,6 +139,7 @@ def _name_layers(axes: Axes, field: Field) -> None:
     ]
     if len(lines) < 4 or len({len(line) for line in lines}) > 1:
         return  # the outlines have no points in common that would lie across the layers
+    line = {"arrowstyle": "-", "color": INK, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
     for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
         at = int((0.88 - 0.04 * row) * len(outer))
         axes.annotate(
@@ -153,14 +149,7 @@ def _name_layers(axes: Axes, field: Field) -> None:
             textcoords="axes fraction",
             ha="left",
             va="center",
-            arrowprops={
-                "arrowstyle": "-",
-                "color": INK,
-                "linewidth": 0.4,
-                "shrinkA": 1.0,
-                "shrinkB": 0.0,
-                "relpos": (0.0, 0.5),
-            },
+            arrowprops=line,
         )
 
 
@@ -182,21 +171,8 @@ def _tractions(drawn: Sheet, field: Field) -> None:
         x = field.contact[i][0]
         vector = (scale * field.traction[i], scale * field.pressure[i])
         text = f"pressure {1e3 * field.pressure[i]:.1f} kPa, traction {1e3 * field.traction[i]:.1f} kPa"
-        axes.quiver(
-            x - vector[0],
-            -0.08 - vector[1],
-            *vector,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-            units="xy",
-            width=0.045,
-            headwidth=4.0,
-            headlength=5.0,
-            headaxislength=4.5,
-            color=INK,
-            gid=drawn.note(text),
-        )
+        start = (x - vector[0], -0.08 - vector[1])
+        axes.quiver(*start, *vector, color=INK, gid=drawn.note(text), **_ARROW)
     _states(axes, field)
     unit = _nice(strongest)
     left = _middle(field) - HALF_WIDTH + 0.3

@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import astuple, replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -69,16 +71,12 @@ def relation_panel(
         f"{shown.label} [{shown.kept_unit}]",
         f"error estimate of {shown.label} [-]",
     )
+    relative = [n[1] / abs(n[0]) if len(n) > 1 and n[0] else None for _, n in points]
     rows = tuple(
-        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), numbers[0], _relative(numbers))
-        for m, numbers in points
+        (m.index, m.mean, m.low, m.high, experiment.own_scores.get(m.index), numbers[0], error)
+        for (m, numbers), error in zip(points, relative, strict=True)
     )
     return Panel(name, title, svg(figure_sheet, name, title, simulated=simulated), header, rows)
-
-
-def _relative(numbers: Numbers) -> float | None:
-    """Return the error of a response by its size; None where there is none."""
-    return numbers[1] / abs(numbers[0]) if len(numbers) > 1 and numbers[0] else None
 
 
 def relation_words(experiment: Experiment) -> str:
@@ -94,12 +92,9 @@ def relation_words(experiment: Experiment) -> str:
 
 def _two_columns() -> Sheet:
     drawn = sheet(328, 300)
-    (axes,) = drawn.axes
-    axes.remove()
+    drawn.axes[0].remove()
     grid = drawn.figure.add_gridspec(1, 2, width_ratios=(1.0, 0.18))
-    return Sheet(
-        drawn.figure, (drawn.figure.add_subplot(grid[0, 0]), drawn.figure.add_subplot(grid[0, 1])), drawn.hover
-    )
+    return replace(drawn, axes=tuple(drawn.figure.add_subplot(grid[0, column]) for column in (0, 1)))
 
 
 def _on_line(related: Relation, score: float) -> float:
@@ -178,19 +173,8 @@ def paths_panel(descriptor: str, findings: Sequence[PathFinding], *, simulated: 
         name, title = f"paths-{descriptor}", f"Correlation of {descriptor} along many paths of the analysis"
         text = svg(drawn, name, title, simulated=simulated)
     header = (*CHOICES, "usual", "surfaces", "trials", "r of means", "r within subjects", "low", "high")
-    rows = tuple(
-        (
-            *(str(getattr(one.path, choice)) for choice in CHOICES),
-            int(one.usual),
-            one.surfaces,
-            one.trials,
-            one.r,
-            one.within,
-            one.low,
-            one.high,
-        )
-        for one in findings
-    )
+    numbers_of = attrgetter("surfaces", "trials", "r", "within", "low", "high")
+    rows = tuple((*map(str, astuple(one.path)), int(one.usual), *numbers_of(one)) for one in findings)
     return Panel(name, title, text, header, rows)
 
 

@@ -10,7 +10,7 @@ from sessions.report.contents import Answers, Experiment
 from sessions.report.figures.relation import PATHS_CAPTION, paths_panel
 from sessions.report.figures.style import GREEN, GREY, INK, PALE, Panel, Plate, Sheet, look, sheet, svg
 from sessions.report.tables.rivals import rival_words
-from sessions.report.trials import model_in_short
+from sessions.report.tables.study_models import study_model
 from sessions.report.wording import ShownResponse, correlation, shown_response
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import MeanScore
@@ -68,14 +68,11 @@ def score_panel(experiment: Experiment, *, simulated: bool) -> Panel:
     name, title = f"scores-{experiment.name}", f"Scores of {experiment.descriptor} against the stimuli's index"
     header = ("index", "subjects", "mean score", "standard deviation", "95 % interval low", "95 % interval high")
     header += tuple(f"score of {answers.subject}" for answers in experiment.answers)
-    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *_answers(experiment, m.index)) for m in experiment.scores)
+    by_index = dict(
+        zip(experiment.indices, zip(*(one.scores for one in experiment.answers), strict=True), strict=False)
+    )
+    rows = tuple((m.index, m.n, m.mean, m.sd, m.low, m.high, *by_index.get(m.index, ())) for m in experiment.scores)
     return Panel(name, title, svg(drawn, name, title, simulated=simulated), header, rows)
-
-
-def _answers(experiment: Experiment, index: int) -> tuple[float | None, ...]:
-    """Return the score of each subject on one stimulus."""
-    at = experiment.indices.index(index)
-    return tuple(answers.scores[at] for answers in experiment.answers)
 
 
 def _draw_identity(axes: Axes, place: tuple[float, bool] | None) -> None:
@@ -115,13 +112,9 @@ def study_plates(study: StudyFindings) -> tuple[Plate, ...]:
         relations = tuple(_relation(one, shown, simulated=simulated) for one in study.descriptors if one.points)
     along = (paths_panel(one.descriptor, one.paths, simulated=simulated) for one in study.descriptors if one.paths)
     paths = tuple(panel for panel in along if panel is not None)
+    caption = f"Score against the {shown.label} {RELATION} Model: {study_model(study)}."
     plates = (
-        Plate(
-            "relation",
-            f"Score against the {shown.label} {RELATION} Model: "
-            f"{model_in_short(study.options.prediction, study.options.area)}.",
-            relations,
-        ),
+        Plate("relation", caption, relations),
         Plate("scores", SCORES, scores),
         Plate("paths", PATHS_CAPTION, paths),
     )
@@ -145,9 +138,8 @@ MOST = 400  # points that tell their values each on their own
 def _experiment(one: DescriptorFindings) -> Experiment:
     """Return the scores of a descriptor as a session's figure takes them."""
     answers = tuple(Answers(subject, scores) for subject, scores in one.answers.items())
-    return Experiment(
-        one.descriptor, one.descriptor, "", 0, 0.0, ("", ""), one.indices, one.scores, answers, None, None
-    )
+    name = one.descriptor
+    return Experiment(name, name, "", 0, 0.0, ("", ""), one.indices, one.scores, answers, None, None)
 
 
 def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool) -> Panel:
@@ -163,20 +155,18 @@ def _relation(one: DescriptorFindings, shown: ShownResponse, *, simulated: bool)
         if not each:
             dots = [x for x, _, _ in own], [y for _, y, _ in own]
             axes.plot(*dots, "o", color=GREY, markersize=2, gid=drawn.note(f"subject {subject}"))
-    means = {mean.index: mean.mean for mean in one.scores}
-    bars = {mean.index: (mean.low, mean.high) for mean in one.scores}
+    means = {mean.index: mean for mean in one.scores}
     for surface in one.surfaces:
-        response = surface.response
-        if response is not None and surface.index in means:
-            x, y = shown.factor * response.mean, means[surface.index]
+        response, mean = surface.response, means.get(surface.index)
+        if response is not None and mean is not None:
+            x, y = shown.factor * response.mean, mean.mean
             words = f"index {surface.index}: mean {shown.label} {shown.text(x)}, mean score {y:.1f}"
             axes.plot(x, y, "o", color=GREEN, markersize=5, zorder=3, gid=drawn.note(words))
-            low, high = bars[surface.index]
             if response.low is not None and response.high is not None:
                 ends = [shown.factor * response.low, shown.factor * response.high]
                 axes.plot(ends, [y, y], color=GREEN, linewidth=0.9, zorder=2)
-            if low is not None and high is not None:
-                axes.plot([x, x], [low, high], color=GREEN, linewidth=0.9, zorder=2)
+            if mean.low is not None and mean.high is not None:
+                axes.plot([x, x], [mean.low, mean.high], color=GREEN, linewidth=0.9, zorder=2)
             axes.annotate(str(surface.index), (x, y), xytext=(5, 4), textcoords="offset points", zorder=4)
     axes.set_ylim(-4, 109)
     axes.set_yticks([0, 20, 40, 60, 80, 100])

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from textwrap import fill
 
-from sessions.report.tables import Cell, Notes, Row, Table, table
+from sessions.report.tables import Notes, Row, Table, table
 from sessions.report.wording import NONE, capital, correlation, digits, p_value, places
 from sessions.statistics.correlations import POWER
 from sessions.statistics.rivals import RESPONSES, Rival
@@ -91,8 +91,7 @@ def _verdict(name: str, model: str, compared: Sequence[Rival]) -> list[str]:
     """Return which rivals the scores follow more or less closely than the model, and of which nothing can be said."""
     sides: dict[str, list[str]] = {"more": [], "less": [], "neither": []}
     for rival in compared:
-        contrast = rival.contrast
-        if contrast is not None:
+        if (contrast := rival.contrast) is not None:
             side = "more" if contrast.difference < 0.0 else "less"
             sides[side if contrast.differs(_ALPHA) else "neither"].append(rival.name)
     if not compared:
@@ -111,7 +110,7 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
     contrast = rival.contrast
     ends = bounds(rival.low, rival.high)
     partial = bounds(rival.partial_low, rival.partial_high)
-    less = (NONE, NONE, NONE)
+    less: Row = (NONE, NONE, NONE)
     if contrast is not None:
         less = (
             notes.estimate(contrast.difference, correlation, None, bounds(contrast.low, contrast.high)),
@@ -119,7 +118,7 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
             NONE if contrast.p is None else p_value(contrast.p),
         )
     elif rival.name != quantity:
-        less = (notes.number(None, correlation, why("contrast")), *less[1:])
+        less = (notes.number(None, correlation, why("contrast")), NONE, NONE)
     return (
         rival.name,
         rival.n,
@@ -127,14 +126,10 @@ def _row(rival: Rival, quantity: str, notes: Notes) -> Row:
         *less,
         notes.estimate(rival.partial, correlation, why("partial"), partial, "it takes five surfaces"),
         notes.number(rival.left_out_error, places(1), why("left_out_error")),
-        _weight(rival, notes),
+        NONE
+        if rival.weight is None and why("weight") is None
+        else notes.number(rival.weight, places(3), why("weight")),
     )
-
-
-def _weight(rival: Rival, notes: Notes) -> Cell:
-    if rival.weight is None and "weight" not in rival.reasons:
-        return Cell(NONE)
-    return notes.number(rival.weight, places(3), rival.reasons.get("weight"))
 
 
 def _named(names: Sequence[str]) -> str:

@@ -8,8 +8,7 @@ from sessions.report.tables import Cell, Notes, Row, Rows, Table, range_cell, se
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import compared_in_study, latent_table, psychometric_table, scales_table
 from sessions.report.tables.session import paths_table, rank_interval, score_cells, spread_cell
-from sessions.report.tables.study_models import flaws_table, models_table, planted_table, trials_table
-from sessions.report.trials import model_in_short
+from sessions.report.tables.study_models import flaws_table, models_table, planted_table, study_model, trials_table
 from sessions.report.wording import (
     NONE,
     correlation,
@@ -96,21 +95,14 @@ def _scores(study: StudyFindings) -> Table | None:
         f"comparing surfaces with one another, of the subjects who scored every surface ({complete or 'none'}). Under "
         "the standard deviation: its 95 % interval by chi squared."
     )
-    groups = _by_descriptor(study, rows)
-    return table("table-scores", caption, columns, groups, notes)
+    return table("table-scores", caption, columns, _by_descriptor(study, rows), notes)
 
 
 def _agreement(study: StudyFindings) -> Table | None:
     rows = tuple(
-        (
-            one.descriptor,
-            agreement.n,
-            digits(agreement.kendall_w, 2),
-            p_value(agreement.friedman_p),
-            p_value(agreement.page_p),
-        )
+        (one.descriptor, of.n, digits(of.kendall_w, 2), p_value(of.friedman_p), p_value(of.page_p))
         for one in study.descriptors
-        if (agreement := one.agreement) is not None
+        if (of := one.agreement) is not None
     )
     columns = "descriptor | subjects | Kendall's W | Friedman's p | Page's p"
     caption = (
@@ -169,8 +161,7 @@ def _estimates(study: StudyFindings) -> Table | None:
         "Magnitude estimates, each subject on a scale of its own: geometric means over subjects with t intervals of "
         f"the logarithms, as they were given and with every subject's own modulus taken away (Stevens 1957).{left}"
     )
-    groups = _by_descriptor(study, rows)
-    return table("table-estimates", caption, columns, groups, notes)
+    return table("table-estimates", caption, columns, _by_descriptor(study, rows), notes)
 
 
 def _geometric(mean: Average, notes: Notes) -> Row:
@@ -186,14 +177,8 @@ def _surfaces(study: StudyFindings) -> Table | None:
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
-            response = None if s.response is None else _scaled(s.response, shown.factor)
-            yield (
-                s.index,
-                s.subjects,
-                *_mean(s.mu, 3, notes),
-                *_mean(response, shown.places, notes),
-                _spread(response, notes),
-            )
+            cells = (*_mean(s.mu, 3, notes), *_mean(s.response, shown.places, notes, shown.factor))
+            yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor, notes))
 
     shown = shown_response(study.response)
     unit = shown.unit
@@ -201,20 +186,20 @@ def _surfaces(study: StudyFindings) -> Table | None:
         f"index | subjects | µ [1] | 95 % interval [1] | {shown.label} [{unit}] | 95 % interval [{unit}] | "
         f"standard deviation [{unit}]"
     )
-    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         f"Friction that the model got, and predicted {shown.label}: means over subjects, each from its own strokes, "
         f"with t intervals; standard deviation of the {shown.label} with its interval by chi squared. "
-        f"Model: {model}."
+        f"Model: {study_model(study)}."
     )
     groups = [(one.descriptor, tuple(row(one))) for one in study.descriptors if any(s.subjects for s in one.surfaces)]
     return table("table-surfaces", caption, columns, groups, notes)
 
 
-def _spread(mean: Average | None, notes: Notes) -> Cell:
+def _spread(mean: Average | None, factor: float, notes: Notes) -> Cell:
     if mean is None:
-        return notes.number(None, str, "no subject's stroke gives this number")
-    return spread_cell(mean.sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
+        return notes.number(None, str, _NO_STROKE)
+    sd = None if mean.sd is None else factor * mean.sd
+    return spread_cell(sd, mean.n, lambda v: significant(v, 2), "one subject alone has no spread", notes)
 
 
 def _forces(study: StudyFindings) -> Table | None:
@@ -230,16 +215,13 @@ def _forces(study: StudyFindings) -> Table | None:
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
         "depth to match [mm] | 95 % interval [mm]"
     )
-    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         "Normal force as measured over the steady window, that of the model at the depth of its block (times the "
         "finger's width, assumed unless it was measured), and the depth at which the two would be equal (on a rough "
         "mesh, to some tenths of a per cent). Means over subjects with t intervals, which hold what errs from trial to "
-        f"trial. Model: {model}."
+        f"trial. Model: {study_model(study)}."
     )
-    return table(
-        "table-forces", caption, columns, [(one.descriptor, tuple(row(one))) for one in study.descriptors], notes
-    )
+    return table("table-forces", caption, columns, _by_descriptor(study, row), notes)
 
 
 def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row:
@@ -248,19 +230,18 @@ def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row
     return mean.n, digits(mean.mean, decimals), ends
 
 
-def _scaled(mean: Average, by: float) -> Average:
-    def times(value: float | None) -> float | None:
-        return None if value is None else by * value
-
-    return Average(mean.n, by * mean.mean, times(mean.sd), times(mean.low), times(mean.high))
+_NO_STROKE = "no subject's stroke gives this number"
 
 
-def _mean(mean: Average | None, decimals: int, notes: Notes) -> Row:
+def _mean(mean: Average | None, decimals: int, notes: Notes, factor: float = 1.0) -> Row:
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
-        return (notes.number(None, str, "no subject's stroke gives this number"),) * 2
-    interval = notes.interval(mean.low, mean.high, places(decimals), "one subject alone has no interval")
-    return digits(mean.mean, decimals), interval
+        return (notes.number(None, str, _NO_STROKE),) * 2
+
+    def shown(value: float) -> str:
+        return digits(factor * value, decimals)
+
+    return shown(mean.mean), notes.interval(mean.low, mean.high, shown, "one subject alone has no interval")
 
 
 def _relation(study: StudyFindings) -> Table | None:
@@ -277,31 +258,27 @@ def _relation(study: StudyFindings) -> Table | None:
         )
 
     columns = "scores | n | r | 95 % interval | rho | 95 % interval of rho | p | p, Holm | r with one left out"
-    model, label = model_in_short(study.options.prediction, study.options.area), BY_NAME[study.response].label
     caption = (
-        f"Predicted {label} ({model}) with scores. Means: Pearson's r of means over the subjects who have "
-        "both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett and Wright 2000) and exact p. "
-        "Within subjects: repeated-measures correlation of each subject's scores with what its own strokes give "
-        "(Bakdash and Marusich 2017), with an interval and a p for other people who meet these very surfaces "
-        "(jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the intervals of means speak. "
-        "Confirmatory are these correlations of scores as given alone, one for each descriptor: they are the family "
-        "of p, Holm (Holm "
-        "1979). Every other p, of means, of standardised scores and of estimates, is exploratory and not corrected; "
-        "nor are the intervals. Last column: least and greatest r when one surface, or one subject, is left out, and "
-        "which."
+        f"Predicted {BY_NAME[study.response].label} ({study_model(study)}) with scores. Means: Pearson's r of means "
+        "over the subjects who have both, interval by Fisher's z; Spearman's rho with an interval likewise (Bonett "
+        "and Wright 2000) and exact p. Within subjects: repeated-measures correlation of each subject's scores with "
+        "what its own strokes give (Bakdash and Marusich 2017), with an interval and a p for other people who meet "
+        "these very surfaces (jackknife of Fisher's z over subjects, Miller 1974). Of other surfaces only the "
+        "intervals of means speak. Confirmatory are these correlations of scores as given alone, one for each "
+        "descriptor: they are the family of p, Holm (Holm 1979). Every other p, of means, of standardised scores and "
+        "of estimates, is exploratory and not corrected; nor are the intervals. Last column: least and greatest r "
+        "when one surface, or one subject, is left out, and which."
     )
-    groups = [(one.descriptor, rows(one)) for one in study.descriptors]
-    return table("table-relation", caption, columns, groups, notes)
+    return table("table-relation", caption, columns, _by_descriptor(study, rows), notes)
 
 
 def _rivals(study: StudyFindings) -> tuple[Table | None, ...]:
-    kinds = [
-        (one.descriptor, kind, rivals)
+    compared = [
+        (f"{one.descriptor}, {kind}", rivals)
         for one in study.descriptors
         for kind, rivals in (("means over subjects", one.rivals_of_means), ("within subjects", one.rivals))
     ]
-    model, label = model_in_short(study.options.prediction, study.options.area), BY_NAME[study.response].label
-    compared = [(f"{descriptor}, {kind}", rivals) for descriptor, kind, rivals in kinds]
+    model, label = study_model(study), BY_NAME[study.response].label
     return rivals_table(compared, label, model), responses_table(compared, label, model)
 
 
@@ -352,4 +329,4 @@ def _without(left_out: Sequence[tuple[str, float]]) -> str:
 
 
 def _by_descriptor(study: StudyFindings, rows: Callable[[DescriptorFindings], Iterable[Row]]) -> list[Rows]:
-    return [(one.descriptor, tuple(rows(one))) for one in study.descriptors]
+    return [(one.descriptor, rows(one)) for one in study.descriptors]

@@ -14,16 +14,19 @@ from sessions.statistics.scores import bounds
 from sessions.statistics.visit import TrialRow, Visit, decided
 
 
+def study_model(study: StudyFindings) -> str:
+    """Return in a few words which model a study's SEDs are of."""
+    return model_in_short(study.options.prediction, study.options.area)
+
+
 def models_table(study: StudyFindings) -> Table | None:
     """Return the mixed models of scores on the model's response and on index, with how far subjects differ."""
-    models = [
-        (f"{one.descriptor}: score on {what}", model)
-        for one in study.descriptors
-        for what, model in _models(one, study)
-    ]
     quantity = BY_NAME[study.response]
     groups = [
-        (f"{name}, {_fitted(model)}", _terms(model, quantity)) for name, model in models if not isinstance(model, str)
+        (f"{one.descriptor}: score on {what}, {_fitted(model)}", _terms(model, quantity))
+        for one in study.descriptors
+        for what, model in _models(one, study)
+        if not isinstance(model, str)
     ]
     caption = (
         "Mixed models of the score, fitted by restricted maximum likelihood: level and first slope differ between "
@@ -52,12 +55,11 @@ def missing_models(study: StudyFindings) -> list[str]:
         for what, model in _models(one, study):
             if isinstance(model, str):
                 by_reason[model].append(f"{one.descriptor} on {what}")
-    related = [(one.descriptor, one.mean_relation) for one in study.descriptors]
     return [
         *(
-            f"No correlation of means on {name}: {r.reason}."
-            for name, r in related
-            if r is not None and r.pearson is None
+            f"No correlation of means on {one.descriptor}: {r.reason}."
+            for one in study.descriptors
+            if (r := one.mean_relation) is not None and r.pearson is None
         ),
         *(f"No mixed model of {', '.join(names)}: {why}." for why, names in by_reason.items()),
     ]
@@ -93,7 +95,7 @@ def _fitted(model: MixedModel) -> str:
     return f"{model.n} scores of {plural(model.subjects, 'subject')}{singular}"
 
 
-def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
+def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
     first, (unit, _) = model.terms[1].name, shown_unit(quantity)
     units = {response_term(quantity): f"points per {unit}", **UNITS}
     middle = f"{digits(model.middle, 3)} {unit}" if first != INDEX else f"index {digits(50 + model.middle, 1)}"
@@ -102,25 +104,15 @@ def _terms(model: MixedModel, quantity: Quantity) -> tuple[Row, ...]:
         p_text = NONE if p is None else p_value(p)
         return (name, unit, significant(estimate, 3), range_cell(low, high, three_figures), p_text)
 
-    rows = [
-        row(
-            f"level at {middle}" if t.name == INTERCEPT else t.name,
-            units.get(t.name, "points"),
-            t.estimate,
-            t.low,
-            t.high,
-            t.p,
-        )
-        for t in model.terms
-    ]
-    if model.spreads is not None:
-        caption = (
-            (LEVELS, "points", model.spreads.level),
-            ("spread of subjects' slopes", units[first], model.spreads.slope),
-            (NOISE, "points", model.spreads.left),
-        )
-        rows += [row(name, unit, s.sd, s.low, s.high, None) for name, unit, s in caption if s is not None]
-    return tuple(rows)
+    names = {INTERCEPT: f"level at {middle}"}
+    for t in model.terms:
+        yield row(names.get(t.name, t.name), units.get(t.name, "points"), t.estimate, t.low, t.high, t.p)
+    of = model.spreads
+    if of is not None:
+        kinds = ((LEVELS, of.level), ("spread of subjects' slopes", of.slope), (NOISE, of.left))
+        for name, s in kinds:
+            if s is not None:
+                yield row(name, units[first] if s is of.slope else "points", s.sd, s.low, s.high, None)
 
 
 def planted_table(study: StudyFindings) -> Table | None:
@@ -169,18 +161,20 @@ def trials_table(study: StudyFindings) -> Table | None:
         "trial | index | score [0–100] | µ [1] | τ max [kPa] | N [N] | speed [mm/s] | SED [kPa] | "
         "estimated error [%] | flaws"
     )
-    groups = tuple(
-        (f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}", tuple(_rows(visit, descriptor, notes)))
+    groups = [
+        (
+            f"{visit.session}, {descriptor}{_left_out(study, visit, descriptor)}",
+            [_row(row, notes) for row in visit.rows if row.descriptor == descriptor],
+        )
         for visit in study.visits
         for descriptor in dict.fromkeys(row.descriptor for row in visit.rows)
-    )
+    ]
     known = dict.fromkeys(visit.calibration for visit in study.visits if visit.calibration)
     calibrations = f" (calibration: {'; '.join(known)})" if known else ""
-    model = model_in_short(study.options.prediction, study.options.area)
     caption = (
         "Every trial, from which all numbers above come. µ: what the model got; τ max, normal force N and speed of the "
         f"stroke, each over its 95 % interval by block bootstrap{calibrations}. SED: at "
-        f"{model}, over what the uncertainty of friction makes of it; error: that estimated from its "
+        f"{study_model(study)}, over what the uncertainty of friction makes of it; error: that estimated from its "
         "mesh. A dash says why. Means, correlations and models above take each number as it "
         "stands: their own intervals come from how subjects and trials differ, which holds these errors too."
     )
@@ -191,12 +185,6 @@ def _left_out(study: StudyFindings, visit: Visit, descriptor: str) -> str:
     if visit.session in dict(study.copies):
         return " (a copy: counts nothing)"
     return "" if decided(study.excluded, visit.subject, descriptor) is None else " (left out of every number above)"
-
-
-def _rows(visit: Visit, descriptor: str, notes: Notes) -> Iterable[Row]:
-    for row in visit.rows:
-        if row.descriptor == descriptor:
-            yield _row(row, notes)
 
 
 def _row(row: TrialRow, notes: Notes) -> Row:
