@@ -23,7 +23,7 @@ ABOUT = "an illustration with assumed numbers: no fitted map from {label} to the
 SHOWN = 10  # every so many steps the rate is kept
 
 
-_EDIN = "that units fire from below 1 %: Edin 2004, J. Neurophysiol. 92:3233"
+_EDIN_2004 = "Edin 2004, J. Neurophysiol. 92:3233"
 # The threshold of each family of quantities, in its unit: what 1 % strain makes in the published dermis, E = 0.08 MPa.
 _ENERGY = 4e-6, "SED of 1 % strain in the published dermis, E e^2 / 2 with E = 0.08 MPa"
 _STRAIN = 0.01, "1 % strain"
@@ -58,18 +58,14 @@ class AfferentSettings:
 
 # Unit ("": the quantity's own), standing, and what it rests on. "assumed": no authority is claimed for the number.
 PARAMETERS: Mapping[str, tuple[str, str, str]] = {
-    "threshold": ("", "assumed", _EDIN),
+    "threshold": ("", "assumed", f"that units fire from below 1 %: {_EDIN_2004}"),
     "exponent": ("-", "assumed", "1: rate follows the quantity; 0.5 with an energy: rate follows strain"),
     "background": ("imp/s", "assumed", "that SA-2s fire at rest: Saal, Birznieks & Johansson 2023, eLife 89616"),
     "static_gain": ("imp/s", "assumed", "at the reference; sweep 5 to 40"),
-    "dynamic_gain": (
-        "imp/s per 1/s",
-        "assumed",
-        "that rate grows with strain rate: Edin 2004, J. Neurophysiol. 92:3233; sweep 0 to 15",
-    ),
+    "dynamic_gain": ("imp/s per 1/s", "assumed", f"that rate grows with strain rate: {_EDIN_2004}; sweep 0 to 15"),
     "adaptation_gain": ("imp/s", "assumed", "below the static gain: these units never fall silent; sweep 0 to 15"),
     "adaptation_time": ("s", "assumed", "sweep 0.3 to 5"),
-    "greatest_rate": ("imp/s", "assumed", "peaks of 50 to 95 imp/s: Edin 2004, J. Neurophysiol. 92:3233"),
+    "greatest_rate": ("imp/s", "assumed", f"peaks of 50 to 95 imp/s: {_EDIN_2004}"),
     "variation": ("-", "assumed", "coefficient of variation of intervals; sweep 0.1 to 0.4"),
     "refractory": ("s", "assumed", "sweep 1 to 5 ms"),
     "seed": ("-", "set", "of the spike times"),
@@ -163,8 +159,9 @@ def session_firing(
         time, rate = firing_rate(row.history.time, course, reference, chosen)
         spikes = spike_times(time, rate, np.random.default_rng([chosen.seed, number]), chosen)
         peak = settled = None
-        ends = _ends(row, chosen.quantity)
-        if ends is not None:
+        friction = row.interval if chosen.quantity == SED.name else None  # which the SED alone has an interval of
+        if friction is not None and friction.low is not None and friction.high is not None:
+            ends = friction.low, friction.high
             # The whole course moves with its end: friction is what is uncertain, and presses nothing.
             peaks = [firing_rate(row.history.time, end / value * course, reference, chosen)[1] for end in ends]
             peak = float(peaks[0].max()), float(peaks[1].max())
@@ -178,13 +175,6 @@ def _settled(row: TrialPrediction, quantity: str) -> float | None:
     if quantity == SED.name:
         return row.sed
     return row.responses[quantity][0] if quantity in row.responses else None
-
-
-def _ends(row: TrialPrediction, quantity: str) -> Ends | None:
-    """Return the ends of the interval that friction makes, which the SED alone has; None without one."""
-    if quantity != SED.name or row.interval is None or row.interval.low is None or row.interval.high is None:
-        return None
-    return row.interval.low, row.interval.high
 
 
 def _settled_rate(value: float, reference: float, settings: AfferentSettings) -> float:
@@ -216,9 +206,8 @@ def parameters(settings: AfferentSettings, reference: float | None = None) -> li
     quantity, usual = _named(settings), usual_settings(settings.quantity)
     if reference is not None:
         basis = f"where x is 1: the median {quantity.label} of the trials; another reference scales every gain"
-        rows.append(
-            {"name": "reference", "value": reference, "unit": quantity.unit, "standing": "assumed", "basis": basis}
-        )
+        of_reference = {"name": "reference", "value": reference, "unit": quantity.unit}
+        rows.append({**of_reference, "standing": "assumed", "basis": basis})
     for name, (unit, standing, basis) in PARAMETERS.items():
         value: float = getattr(settings, name)
         chosen = standing if value == getattr(usual, name) else "set"

@@ -34,13 +34,10 @@ class PredictionOptions:
     indentation: float | None = None  # [mm], instead of each block's own
     course: Literal["steady", "history"] = "history"
     kinematics: Literal["small", "finite"] = "small"
-    intervals: bool = (
-        False  # also what the uncertainty of friction makes of each SED, see `sessions.prediction.uncertainty`
-    )
+    # Also what the uncertainty of friction makes of each SED, and the trials otherwise: see `prediction.uncertainty`
+    intervals: bool = False
     variant_intervals: bool = False  # those of the variants at finite strain too, which takes longer
-    variants: Literal["none", "small", "both"] = (
-        "none"  # also otherwise, see `sessions.prediction.uncertainty`; at which strain
-    )
+    variants: Literal["none", "small", "both"] = "none"  # at which strain
 
 
 def with_own_finger(options: PredictionOptions, plan: SessionPlan) -> PredictionOptions:

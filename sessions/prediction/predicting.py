@@ -44,7 +44,7 @@ def predict(
     chosen = with_own_finger(options or PredictionOptions(), plan)
     prepared = prepared_cases(analysis, plan, chosen)
     rows = [one.row for one in prepared]
-    report = watch or _unseen
+    report: Watch = watch or (lambda _number, _row, _way: None)
     for number, one in enumerate(prepared):
         if one.scene is None:
             report(number, one.row, None)
@@ -52,7 +52,8 @@ def predict(
     scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
     # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
     small = chosen.kinematics == "small"
-    depths = _depths(scenes, [_force_per_mm(prepared[n]) if small else None for n in solved])
+    measured = [prepared[n].row.measured_normal if small else None for n in solved]
+    depths = _depths(scenes, [None if f is None else f / s.finger.width for f, s in zip(measured, scenes, strict=True)])
     ways: dict[int, Way] = {}
     answers: dict[int, Prediction | SolveFailure] = {}
 
@@ -88,20 +89,11 @@ def predict(
     )
 
 
-def _unseen(_number: int, _row: TrialPrediction, _way: Way | None) -> None:
-    """Tell nobody."""
-
-
 def _depths(scenes: Sequence[Scene], forces: Sequence[float | None]) -> list[float | None]:
     """Return for each scene the depth at which it bears its force [N/mm], or None where it has none."""
     wanted = [(scene, force) for scene, force in zip(scenes, forces, strict=True) if force is not None]
     matched = iter(matching_depths([scene for scene, _ in wanted], [force for _, force in wanted]))
     return [None if force is None else next(matched) for force in forces]
-
-
-def _force_per_mm(prepared: Prepared) -> float | None:
-    measured = prepared.row.measured_normal
-    return None if measured is None or prepared.scene is None else measured / prepared.scene.finger.width
 
 
 def _filled(
@@ -117,16 +109,14 @@ def _filled(
         elif row.measured_normal is None:
             reasons["matching_depth"] = "The stroke gives no steady normal force."
         else:
-            reasons["matching_depth"] = (
-                "The model would have to be pressed nearly to its bone, or has no settled state there."
-            )
+            why = "The model would have to be pressed nearly to its bone, or has no settled state there."
+            reasons["matching_depth"] = why
+    row = replace(row, matching_depth=depth)
     if isinstance(back, SolveFailure):
         reasons["opposite_sed"] = str(back)
     else:
-        row = replace(
-            row, opposite_sed=back.sed_ending, opposite_error=known_error(back, back.error_estimate), opposite=back
-        )
-    row = replace(row, matching_depth=depth)
+        error = known_error(back, back.error_estimate)
+        row = replace(row, opposite_sed=back.sed_ending, opposite_error=error, opposite=back)
     if isinstance(answer, SolveFailure):
         reasons |= dict.fromkeys(("sed", "normal_force", "tangential_force"), str(answer))
         return replace(row, reasons=reasons)

@@ -62,7 +62,8 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
             "sequence": block.sequence.astype(np.float64),
         }
         for stroke in analysis.strokes:
-            if not any(_holds(stroke, press.start) for press in analysis.presses):
+            begin, end = stroke.onset, np.inf if stroke.lift is None else stroke.lift
+            if begin is None or not any(begin <= press.start <= end for press in analysis.presses):
                 continue
             name = f"the press at {stroke.onset:.2f} s" + (f" of trial {trial.number}" if trial else "")
             when = np.interp(log.at, clocks[log.clock], block.time, left=-np.inf, right=np.inf)
@@ -74,10 +75,6 @@ def press_curves(recording: Recording, log: DisplacementLog, settings: AnalysisS
                 presses.append(loading)
                 names.append(name)
     return PressCurves(tuple(presses), tuple(names), tuple(holds), tuple(left_out))
-
-
-def _holds(stroke: Stroke, instant: float) -> bool:
-    return stroke.onset is not None and stroke.onset <= instant and (stroke.lift is None or instant <= stroke.lift)
 
 
 def _loading(stroke: Stroke, when: Array, log: DisplacementLog) -> LoadingCurve | str:

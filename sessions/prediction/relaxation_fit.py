@@ -69,12 +69,8 @@ class RelaxationFit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data."""
-        return {
-            "part": self.part._asdict(),
-            "time": self.time._asdict(),
-            "at_once": self.at_once,
-            "sentence": self.sentence,
-        }
+        part, time = self.part._asdict(), self.time._asdict()
+        return {"part": part, "time": time, "at_once": self.at_once, "sentence": self.sentence}
 
     def relaxing(self, scene: Scene) -> Scene:
         """Return a scene whose layers are as stiff at once as found here and relax."""
@@ -101,21 +97,16 @@ def relaxing_fit(
     rate = relaxation(model, finger_fit, holds)
     for _ in range(TURNS):
         before = rate.part.value
-        calm = [
-            one._replace(force=_rebinned(one, hold.at_once(rate.part.value, rate.time.value)))
-            for one, hold in zip(presses, holds, strict=True)
-        ]
+        calm: list[LoadingCurve] = []
+        for one, hold in zip(presses, holds, strict=True):
+            force = hold.at_once(rate.part.value, rate.time.value).force[: one.readings]
+            binned = LoadingCurve.of(hold.displacement[: one.readings], force, np.zeros(one.readings))
+            calm.append(one._replace(force=binned.force))
         finger_fit = fit(model, calm, gain_error, seed)
         rate = relaxation(model, finger_fit, holds)
         if abs(rate.part.value - before) < AGREED:
             break
     return finger_fit, rate
-
-
-def _rebinned(press: LoadingCurve, hold: HoldCurve) -> Array:
-    """Return the forces (n,) of a hold's readings on its way, as the points of a press have them."""
-    way = slice(0, press.readings)
-    return LoadingCurve.of(hold.displacement[way], hold.force[way], np.zeros(press.readings)).force
 
 
 def relaxation(model: PressModel, finger_fit: FingerFit, presses: Sequence[HoldCurve]) -> RelaxationFit:

@@ -134,8 +134,8 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
 
     carried = along("sed", prediction.sed_ending)
     low, high = _ends(carried)
-    sed_sensitivity = by["sed"]
-    slopes = sed_sensitivity["mu"], sed_sensitivity["tau_max"], sed_sensitivity["force"] if "force" in names else None
+    sed = by["sed"]
+    slopes = sed["mu"], sed["tau_max"], sed["force"] if "force" in names else None
     whole = SedInterval(
         low,
         high,
@@ -155,7 +155,9 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
     missed = np.abs(solved(tried) - carried[tried])  # nan, and so no less, where one has no settled state
     if bool((missed <= max(MISS * (high - low), _FLAT * prediction.sed_ending)).all()):
         return whole
-    some = solved(_spread_out(carried))
+    # Each stands for an equal share of all: the middle one, by what the derivatives carry.
+    middles = ((np.arange(SAMPLES) + 0.5) / SAMPLES * len(carried)).astype(np.int64)
+    some = solved(np.argsort(carried, kind="stable")[middles])
     lost = int(np.isnan(some).sum())
     if lost:
         reason = f"{lost} of {SAMPLES} draws of the friction have no settled state, or lie too near the limit to tell"
@@ -167,12 +169,6 @@ def _interval(prediction: Prediction, slide: Nearby | None, drawn: Drawn, scale:
 def _ends(draws: Array) -> Ends:
     low, high = np.quantile(draws, _QUANTILES).tolist()
     return low, high
-
-
-def _spread_out(carried: Array) -> Indices:
-    """Return draws each of which stands for an equal share of all: the middle one, by what the derivatives carry."""
-    middles = (np.arange(SAMPLES) + 0.5) / SAMPLES * len(carried)
-    return np.argsort(carried, kind="stable")[middles.astype(np.int64)]
 
 
 def _loads(scene: Scene, drawn: Drawn, scale: float) -> tuple[tuple[str, ...], Array, Array] | str:
@@ -271,9 +267,8 @@ def _along(
     return tuple(out)
 
 
-_Answers = list[
-    tuple[float | None, Prediction | str]
-]  # for each trial the tau_max [MPa] that the model got, and what of it
+# For each trial the tau_max [MPa] that the model got, and what of it
+_Answers = list[tuple[float | None, Prediction | str]]
 
 
 def _known(prediction: SessionPrediction, variant: Variant) -> _Answers | None:
@@ -299,7 +294,8 @@ def _alternative(
     row: TrialPrediction, variant: Variant, tau_max: float | None, answer: Prediction | str
 ) -> Alternative:
     if isinstance(answer, str):
-        return replace(_none(row, variant, answer), tau_max=tau_max)
+        depth = None if variant.driven == "force" else row.indentation
+        return Alternative(variant, tau_max, depth, None, None, None, None, answer)
     width = answer.scene.finger.width
     return Alternative(
         variant,
@@ -315,8 +311,3 @@ def _alternative(
         indentation_error=known_error(answer, answer.indentation_error),
         doubt=doubt_of(answer),
     )
-
-
-def _none(row: TrialPrediction, variant: Variant, reason: str) -> Alternative:
-    depth = None if variant.driven == "force" else row.indentation
-    return Alternative(variant, None, depth, None, None, None, None, reason)

@@ -55,12 +55,9 @@ def average(values: Sequence[float]) -> Average | None:
 
 def averages(table: Mapping[str, Mapping[int, float]]) -> dict[int, Average]:
     """Return the mean over subjects of each index, from subject -> index -> number."""
-    by_index: dict[int, Average] = {}
-    for index in sorted({index for row in table.values() for index in row}):
-        mean = average([row[index] for row in table.values() if index in row])
-        if mean is not None:
-            by_index[index] = mean
-    return by_index
+    indices = sorted({index for row in table.values() for index in row})
+    means = ((index, average([row[index] for row in table.values() if index in row])) for index in indices)
+    return {index: mean for index, mean in means if mean is not None}
 
 
 def estimates(trials: Sequence[tuple[Visit, TrialRow]], quantity: str) -> Estimates | None:

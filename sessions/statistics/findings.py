@@ -89,9 +89,8 @@ class DescriptorFindings:
     exponent: Exponent | None  # of magnitude estimates by the µ that the model got; None where nobody gave any
     scales: tuple[PairedScale, ...]  # of choices between two, by both models; () where nobody chose
     consistence: Mapping[str, Consistence]  # of each subject who chose in every pair
-    on_response: (
-        MixedModel | str
-    )  # score on the response as people read it [kPa or 1], drift and carry-over; or why there is no model
+    # Score on the response as people read it [kPa or 1], drift and carry-over; or why there is no model
+    on_response: MixedModel | str
     on_index: MixedModel | str  # score on the maker's index, drift and carry-over
     on_friction: MixedModel | str  # score on the index and on the µ of each subject's own stroke, drift and carry-over
     fingers: Spread | None  # how fingers differ: of the logarithm of mu between subjects, surfaces taken away [-]
@@ -253,27 +252,18 @@ def _spreads(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recove
     people = planted.get("people")
     if not people:
         return []
-    rows: list[Recovered] = []
-    if not isinstance(one.on_friction, str) and (differ := one.on_friction.spreads) is not None:
-        by_index = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
-        rows += [
-            _spread(one, name, sd, spread)
-            for name, sd, spread in (
-                (LEVELS, people["offset_spread"], differ.level),
-                (SLOPES, by_index, differ.slope),
-                (NOISE, people["judgement_noise"], differ.left),
-            )
-            if spread is not None
-        ]
-    if one.fingers is not None:
-        # A transducer's gains, of drag and of press, differ between visits as fingers do.
-        sd = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
-        rows.append(_spread(one, FINGERS, sd, one.fingers))
-    return rows
-
-
-def _spread(one: DescriptorFindings, name: str, planted: float, spread: Spread) -> Recovered:
-    return Recovered(one.descriptor, name, planted, spread.sd, spread.low, spread.high)
+    by_index = (1.0 - people.get("friction_weight", 0.0)) * people["gain_spread"]
+    # A transducer's gains, of drag and of press, differ between visits as fingers do.
+    moisture = math.hypot(people["moisture"], math.sqrt(2.0) * planted.get("calibration_sd", 0.0))
+    differ = None if isinstance(one.on_friction, str) else one.on_friction.spreads
+    level, slope, left = (None, None, None) if differ is None else (differ.level, differ.slope, differ.left)
+    spreads = (
+        (LEVELS, people["offset_spread"], level),
+        (SLOPES, by_index, slope),
+        (NOISE, people["judgement_noise"], left),
+        (FINGERS, moisture, one.fingers),
+    )
+    return [Recovered(one.descriptor, name, sd, s.sd, s.low, s.high) for name, sd, s in spreads if s is not None]
 
 
 def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recovered]:
@@ -305,9 +295,8 @@ def found_flaws(
             continue
         rows = {row.trial: row for row in visit.rows}
         if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
-            rows_found.append(
-                PlantedFlaw(session, faults["expected"], detected=False)
-            )  # a trial that the session does not have
+            # a trial that the session does not have
+            rows_found.append(PlantedFlaw(session, faults["expected"], detected=False))
             continue
         seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
         seen += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []

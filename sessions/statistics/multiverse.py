@@ -116,34 +116,34 @@ def trial_paths(
     steady = replace(prediction.options, course="steady")
     analyses = _analyses(recording)
     usual = {one.trial: one for one in next(iter(analyses.values())).friction}
-    scenes: dict[tuple[str, ...], Mapping[int, Scene]] = {}
+    scenes: dict[Path, Mapping[int, Scene]] = {}  # whichever receptor answers
     for path in paths:
         if path.receptor == RECEPTORS[0]:
-            varied = _varied(analyses, path, usual)
             kind = replace(steady, kinematics=path.kinematics)
-            scenes[_without_receptor(path)] = scenes_of(varied, recording.plan, kind)
+            scenes[path] = scenes_of(_varied(analyses, path, usual), recording.plan, kind)
     wanted = dict.fromkeys(scene for of_path in scenes.values() for scene in of_path.values())
     known = [row.prediction for row in prediction.trials if row.prediction is not None]
     answers = _solved(tuple(wanted), known, quantity, progress)
     trials = sorted({trial for of_path in scenes.values() for trial in of_path})
-    return {
-        trial: tuple(_value(answers, scenes[_without_receptor(p)].get(trial), p) for p in paths) for trial in trials
-    }
 
+    def value(trial: int, path: Path) -> float | None:
+        scene = scenes[replace(path, receptor=RECEPTORS[0])].get(trial)
+        answer = None if scene is None else answers.get(scene)
+        return None if answer is None else answer[RECEPTORS.index(path.receptor)]
 
-def _without_receptor(path: Path) -> tuple[str, ...]:
-    return (path.filter, path.window, path.mu, path.area, path.kinematics)
+    return {trial: tuple(value(trial, path) for path in paths) for trial in trials}
 
 
 def _analyses(recording: Recording) -> Mapping[tuple[str, str, AreaLaw], Analysis]:
     """Return the analysis by filter, window and law of the area; with other laws than the first for one window only."""
     first, *laws = dict.fromkeys(law for law, _ in AREAS.values())
     cases = [*product(FILTERS, WINDOWS, [first]), *product(FILTERS, list(WINDOWS)[:1], laws)]
-    return {(f, w, law): analyse(recording, _settings(FILTERS[f], WINDOWS[w], law)) for f, w, law in cases}
 
+    def settings(f: str, w: str, law: AreaLaw) -> AnalysisSettings:
+        steady = SteadySettings(steady_rule=WINDOWS[w])
+        return AnalysisSettings(filter=FilterSettings(cut_off=FILTERS[f]), steady=steady, area=law)
 
-def _settings(cut_off: float, rule: WindowRule, law: AreaLaw) -> AnalysisSettings:
-    return AnalysisSettings(filter=FilterSettings(cut_off=cut_off), steady=SteadySettings(steady_rule=rule), area=law)
+    return {case: analyse(recording, settings(*case)) for case in cases}
 
 
 def _varied(
@@ -165,11 +165,6 @@ def _varied(
     return replace(analysis, friction=tuple(friction))
 
 
-def _value(answers: Mapping[Scene, Pair | None], scene: Scene | None, path: Path) -> float | None:
-    answer = None if scene is None else answers.get(scene)
-    return None if answer is None else answer[RECEPTORS.index(path.receptor)]
-
-
 def _solved(
     scenes: Sequence[Scene], known: Sequence[Prediction], quantity: Quantity, progress: Progress | None
 ) -> Mapping[Scene, Pair | None]:
@@ -179,7 +174,7 @@ def _solved(
     friction, which is solved; where that fails they are solved themselves.
     """
     alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
-    for scene in sorted(scenes, key=_friction):
+    for scene in sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf)):
         alike[_kind(scene)].append(scene)
     first = {kind: group[0] for kind, group in alike.items()}
     solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
@@ -209,10 +204,6 @@ def _kind(scene: Scene) -> Scene:
     return replace(scene, friction=Friction(0.0), solve=replace(scene.solve, course="steady"))
 
 
-def _friction(scene: Scene) -> tuple[float, float]:
-    return scene.friction.mu, np.inf if scene.friction.tau_max is None else scene.friction.tau_max
-
-
 @dataclass(frozen=True, slots=True)
 class PathFinding:
     """How a predicted quantity and scores go together along one path. None where too few numbers are left."""
@@ -239,11 +230,7 @@ class PathTrial:
 
 
 def path_findings(
-    trials: Sequence[PathTrial],
-    kinematics: str,
-    law: AreaLaw = FIXED,
-    *,
-    within: bool,
+    trials: Sequence[PathTrial], kinematics: str, law: AreaLaw = FIXED, *, within: bool
 ) -> tuple[PathFinding, ...]:
     """Return how predictions go with scores along each path.
 
@@ -311,16 +298,11 @@ def spread(values: Sequence[float | None]) -> Spread | None:
     if not numbers:
         return None
     least, lower, median, upper, greatest = np.quantile(numbers, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
-    return Spread(len(values), len(numbers), _distinct(numbers), least, lower, median, upper, greatest)
-
-
-def _distinct(ordered: Sequence[float]) -> int:
-    """Return how many of some numbers in order lie more than `SAME` beyond the one counted before."""
-    counted: list[float] = []
-    for value in ordered:
-        if not counted or value - counted[-1] > SAME:
-            counted.append(value)
-    return len(counted)
+    distinct = numbers[:1]
+    for value in numbers:
+        if value - distinct[-1] > SAME:
+            distinct.append(value)
+    return Spread(len(values), len(numbers), len(distinct), least, lower, median, upper, greatest)
 
 
 def by_choice(findings: Sequence[PathFinding]) -> tuple[tuple[str, str, Spread | None, bool], ...]:

@@ -9,17 +9,7 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction import SED, Quantity, shown_unit
-from sessions.statistics.answers import (
-    Average,
-    average,
-    averages,
-    by_subject,
-    choices,
-    constant_stimuli,
-    estimates,
-    exponent,
-    latent_scales,
-)
+from sessions.statistics import answers
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.findings import (
     CARRY_OVER,
@@ -131,9 +121,9 @@ def _descriptor(
     answered = [(v, r, r.response(quantity.name), r.score) for v, r in trials]
     points = [(v.subject, r, x, score) for v, r, x, score in answered if x is not None and score is not None]
     scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
-    chosen = choices(trials)
+    chosen = answers.choices(trials)
     scales = tuple(paired_scale(chosen, model) for model in MODELS) if chosen else ()
-    compared = constant_stimuli(trials)
+    compared = answers.constant_stimuli(trials)
     competing = [_rival_trial(subject, r, score) for subject, r, _, score in points]
     return DescriptorFindings(
         descriptor=name,
@@ -152,8 +142,8 @@ def _descriptor(
         without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
         normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
         differences=differences(matrix),
-        estimates=estimates(trials, quantity.name),
-        exponent=exponent(trials),
+        estimates=answers.estimates(trials, quantity.name),
+        exponent=answers.exponent(trials),
         scales=scales,
         consistence=consistence(chosen),
         on_response=_model([(p[0], p[1], p[3]) for p in points], quantity, response_term(quantity)),
@@ -167,7 +157,7 @@ def _descriptor(
             within=True,
         ),
         constant_stimuli=compared,
-        latent=latent_scales(trials, scales, compared),
+        latent=answers.latent_scales(trials, scales, compared),
     )
 
 
@@ -221,8 +211,8 @@ def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
 def _surface(index: int, quantity: str, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
     """Return means over subjects, each subject's own repeats averaged first."""
 
-    def over_subjects(value: Callable[[TrialRow], float | None]) -> Average | None:
-        return average(by_subject([(v.subject, value(row)) for v, row in trials]))
+    def over_subjects(value: Callable[[TrialRow], float | None]) -> answers.Average | None:
+        return answers.average(answers.by_subject([(v.subject, value(row)) for v, row in trials]))
 
     response = over_subjects(lambda row: row.response(quantity))
     names = ("mu", "normal_force", "model_normal_force", "matching_depth")
@@ -252,7 +242,7 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
 
 def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
     """Return what scores say that were standardised; `points` are subject, index and response to its own stroke."""
-    means = averages(table)
+    means = answers.averages(table)
     pairs = [(subject, i, x, table[subject][i]) for subject, i, x in points if i in table.get(subject, {})]
     within = repeated_correlation([p[0] for p in pairs], [p[2] for p in pairs], [p[3] for p in pairs])
     return Normalised(means, _related(pairs), within)

@@ -144,9 +144,8 @@ class _Task:
         """Return a parameter with its interval of the profile likelihood."""
         value = float(self.best[which])
         low, high = self._end(which, -1.0), self._end(which, 1.0)
-        return IntervalEstimate(
-            value, None if low is None else min(low, value), None if high is None else max(high, value)
-        )
+        low, high = None if low is None else min(low, value), None if high is None else max(high, value)
+        return IntervalEstimate(value, low, high)
 
     def deviance(self) -> float:
         """Return the binomial deviance of the chances that were fitted."""
@@ -160,9 +159,8 @@ class _Task:
         """Return the best parameters and their log likelihood, from starts with few lapses and with many."""
         rough = special.ndtri((self.k + 0.5) / (self.n + 1.0))  # a straight line, were there neither lapses nor chance
         slope = float(np.polyfit(self.x, rough, 1, w=np.sqrt(self.n))[0])
-        middle = float(np.mean(self.x)) - float(np.mean(rough)) / math.copysign(
-            max(abs(slope), 1.0 / self.reach), slope
-        )
+        steep = math.copysign(max(abs(slope), 1.0 / self.reach), slope)
+        middle = float(np.mean(self.x)) - float(np.mean(rough)) / steep
         optima = [
             self._at({}, np.array([middle, times * slope, 0.0, lapse, 0.01]), _PRECISE)
             for times, lapse in ((1.0, 0.01), (2.0, 0.15))
@@ -207,9 +205,8 @@ class _Task:
 
         def lost(scaled: Array) -> tuple[float, Array]:
             value, slope = self._log_likelihood(scaled * self.scale)
-            more, by_theta = (
-                self._adjustment(float(scaled[_SCATTER] * self.scale[_SCATTER])) if adjusted else (0.0, 0.0)
-            )
+            theta = float(scaled[_SCATTER] * self.scale[_SCATTER])
+            more, by_theta = self._adjustment(theta) if adjusted else (0.0, 0.0)
             slope[_SCATTER] += by_theta
             return -value - more, -slope * self.scale
 

@@ -1,6 +1,7 @@
 """What else follows the scores beside a model's quantity: its others, and friction, forces and speed of the strokes."""
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -56,9 +57,8 @@ class Rival:
     partial: float | None = None  # r given the µ that the model got
     partial_low: float | None = None  # 95 % interval: Fisher's z; within subjects bootstrap over subjects
     partial_high: float | None = None
-    left_out_error: float | None = (
-        None  # of a surface's scores by the line through the others, root mean square [points]
-    )
+    # Of a surface's scores by the line through the others, root mean square [points]
+    left_out_error: float | None = None
     weight: float | None = None  # Akaike's, of the mixed model with subjects and surfaces crossed
     same_order: bool | None = None  # orders the surfaces as the model's quantity does, or wholly the other way round
     needed: int | None = None  # surfaces with which Steiger's test would tell the two correlations of means apart
@@ -156,9 +156,8 @@ def _compared(rival: Rival, model: Sequence[float], other: Sequence[float], scor
         same_order=abs(rho) > 1 - 1e-12,
         needed=cases_needed(abs(first), abs(second), turned * mutual),
     )
-    return (
-        rival if rival.contrast else _because(rival, "contrast", "no test from these few surfaces, or of a perfect r")
-    )
+    why = None if rival.contrast else "no test from these few surfaces, or of a perfect r"
+    return _because(rival, "contrast", why)
 
 
 def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
@@ -246,7 +245,10 @@ def _left_out_surface(trials: Sequence[RivalTrial], name: str) -> float | None:
     errors: list[float] = []
     for index in dict.fromkeys(trial.index for trial in trials):
         kept = [trial for trial in trials if trial.index != index]
-        level = {subject: _mean_of(kept, subject, name) for subject in dict.fromkeys(t.subject for t in kept)}
+        own: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
+        for t in kept:
+            own[t.subject].append((t.values[name], t.score))
+        level = {subject: [float(np.mean(one)) for one in zip(*pairs, strict=True)] for subject, pairs in own.items()}
         steps = [(t.values[name] - level[t.subject][0], t.score - level[t.subject][1]) for t in kept]
         size = sum(x * x for x, _ in steps)
         if size <= 1e-24 * max((t.values[name] ** 2 for t in kept), default=1.0):
@@ -257,11 +259,6 @@ def _left_out_surface(trials: Sequence[RivalTrial], name: str) -> float | None:
                 x, y = level[trial.subject]
                 errors.append(trial.score - y - slope * (trial.values[name] - x))
     return math.sqrt(float(np.mean(np.square(errors)))) if errors else None
-
-
-def _mean_of(trials: Sequence[RivalTrial], subject: str, name: str) -> tuple[float, float]:
-    own = [(trial.values[name], trial.score) for trial in trials if trial.subject == subject]
-    return float(np.mean([x for x, _ in own])), float(np.mean([y for _, y in own]))
 
 
 def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:

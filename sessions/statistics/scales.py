@@ -60,9 +60,8 @@ class PairedScale:
     model: Model
     choices: int
     subjects: int
-    values: Mapping[int, IntervalEstimate] = field(
-        default_factory=dict[int, IntervalEstimate]
-    )  # by index, with mean 0, in logits or z
+    # By index, with mean 0, in logits or z
+    values: Mapping[int, IntervalEstimate] = field(default_factory=dict[int, IntervalEstimate])
     first: IntervalEstimate | None = None  # what coming first adds, in the same unit
     deviance: float | None = None  # against a model with a chance of its own for every ordered pair
     freedom: int | None = None  # degrees of freedom of that deviance
@@ -183,10 +182,9 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
         chance, slope = _chances(x @ beta, model)
         spread = np.maximum(chance * (1.0 - chance), np.finfo(float).tiny)
         weight = n * slope**2 / spread
+        information, pull = x.T @ (weight[:, None] * x), x.T @ ((y - n * chance) * slope / spread)
         try:
-            step = np.asarray(
-                np.linalg.solve(x.T @ (weight[:, None] * x), x.T @ ((y - n * chance) * slope / spread)), np.float64
-            )
+            step = np.asarray(np.linalg.solve(information, pull), np.float64)
         except np.linalg.LinAlgError:
             return None
         beta = beta + step
@@ -225,13 +223,9 @@ def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
     compared = met > 0
     chance = _chances(eta, model)[0][compared]
     n, y = met[compared], chosen[compared]
-    terms = _x_log(y, n * chance) + _x_log(n - y, n * (1.0 - chance))
+    terms = np.asarray(special.xlogy(y, y / (n * chance)), np.float64)
+    terms += np.asarray(special.xlogy(n - y, (n - y) / (n * (1.0 - chance))), np.float64)
     return float(2.0 * terms.sum()), int(compared.sum()) - len(fitted) + 1
-
-
-def _x_log(count: Array, expected: Array) -> Array:
-    """Return count times the logarithm of count by expected, 0 where nothing was counted."""
-    return count * np.log(np.where(count > 0.0, count / expected, 1.0))
 
 
 NAME = "log magnitude"

@@ -4,6 +4,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,6 @@ from sessions.statistics.correlations import CONFIDENCE, pearson, t_quantile
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
-from itertools import pairwise
 
 from sessions.recording.log import TrialRecord
 

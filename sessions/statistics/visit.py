@@ -72,9 +72,8 @@ class VisitOptions:
 
     prediction: PredictionOptions = field(default_factory=lambda: PredictionOptions(course="steady", intervals=True))
     area: AreaLaw = FIXED  # by which tau_max is computed; the paths have areas of their own
-    paths: Literal["none", "small", "finite"] = (
-        "none"  # many paths too, and at which strain; see `sessions.statistics.multiverse`
-    )
+    # Many paths too, and at which strain: see `sessions.statistics.multiverse`
+    paths: Literal["none", "small", "finite"] = "none"
     gain_error: float | None = None  # of each axis of every transducer [-]; None: what was set for each session
     quantity: str = SED.name  # that the paths hold
 
@@ -185,6 +184,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         if block.phase == "main"
         for place, trial in enumerate(block.trials)
     )
+    numbers = [{name: getattr(row, name) for name in NUMBERS} for row in (prediction.trials if prediction else ())]
     end = known.end
     return Visit(
         session=known.folder.name,
@@ -197,7 +197,7 @@ def visit_of(recording: Recording, options: VisitOptions, made_by: Mapping[str, 
         losses=(*known.losses, *known.flaws),
         made_by=dict(made_by),
         sha256=file_sha256(known.folder / LIVE_FILE),
-        sealed="" if prediction is None else _sealed(known, prediction),
+        sealed="" if prediction is None else sealed_sentence(known, numbers),
         decisions=tuple(decision.sentence for decision in analysis.decisions),
         calibration=analysis.bootstrap.calibration,
         model=tuple(fact for fact in model_facts(prediction) if fact[0] != "audits"),
@@ -208,10 +208,6 @@ def scores_of(visit: Visit, rows: Sequence[TrialRow]) -> ScoreTable:
     """Return the scores that some of a visit's rows hold."""
     scores = tuple(Score(visit.subject, row.descriptor, row.index, row.score) for row in rows if row.score is not None)
     return ScoreTable(visit.session, visit.subject, bool(visit.simulated), scores)
-
-
-def _sealed(recording: Recording, prediction: SessionPrediction) -> str:
-    return sealed_sentence(recording, [{name: getattr(row, name) for name in NUMBERS} for row in prediction.trials])
 
 
 def _row(
@@ -234,8 +230,8 @@ def _row(
         choice=record.choice,
         standard=None if block.standard is None else block.standard.known_index,
     )
-    flagged = {flaw.name: None for flaw in analysis.flaws if flaw.trial == trial.number and flaw.grade != "note"}
-    flaws = tuple(str(name) for name in flagged)
+    flagged = (str(one.name) for one in analysis.flaws if one.trial == trial.number and one.grade != "note")
+    flaws = tuple(dict.fromkeys(flagged))
     friction = next((one for one in analysis.friction if one.trial == trial.number), None)
     answer = None if prediction is None else next((p for p in prediction.trials if p.trial == trial.number), None)
     if friction is None:

@@ -137,9 +137,8 @@ def agreement(table: Table) -> Agreement | None:
 
     friedman = stats.friedmanchisquare(*scores.T)
     page = stats.page_trend_test(scores)
-    return Agreement(
-        len(subjects), float(friedman.statistic) / (n * (c - 1)), float(friedman.pvalue), float(page.pvalue)
-    )
+    kendall_w = float(friedman.statistic) / (n * (c - 1))
+    return Agreement(len(subjects), kendall_w, float(friedman.pvalue), float(page.pvalue))
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +207,12 @@ def equal_moduli(table: Table) -> dict[str, dict[int, float]]:
     With a free modulus each subject chooses its own unit (Stevens 1957, Psychol. Rev. 64:153). Raises ValueError for an
     estimate that is not above 0: a free modulus has no zero.
     """
-    logs = {subject: {index: _log(subject, value) for index, value in row.items()} for subject, row in table.items()}
+    for subject, row in table.items():
+        for value in row.values():
+            if value <= 0.0:
+                why = f"{subject} gave the estimate {value:g}; with a free modulus every estimate is above 0"
+                raise ValueError(why)
+    logs = {subject: {index: math.log(value) for index, value in row.items()} for subject, row in table.items()}
     means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items() if row}
     grand = float(np.mean(list(means.values()))) if means else 0.0
     return {
@@ -216,12 +220,6 @@ def equal_moduli(table: Table) -> dict[str, dict[int, float]]:
         for subject, row in logs.items()
         if row
     }
-
-
-def _log(subject: str, value: float) -> float:
-    if value <= 0.0:
-        raise ValueError(f"{subject} gave the estimate {value:g}; with a free modulus every estimate is above 0")
-    return math.log(value)
 
 
 def _without_means(values: Array, codes: NDArray[np.intp]) -> Array:
