@@ -87,7 +87,14 @@ def write_report(report: Report, path: Path, drawings: Sequence[Plate] | None = 
 
 def leave_others_alone(path: Path) -> None:
     """Raise ReportError where a page would replace something that is none."""
-    if path.exists() and not _is_page(path):
+    if not path.exists():
+        return
+    try:
+        with path.open("rb") as file:
+            start = file.read(len(HEAD))
+    except OSError as error:
+        raise ReportError(f"{path} cannot be read ({error.strerror}): choose another file") from error
+    if start not in (b"", HEAD.encode()):
         raise ReportError(f"{path} holds something that is no report, so it is left alone: choose another file")
 
 
@@ -96,10 +103,8 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
     written: list[Path] = []
     for plate in plates(report) if drawings is None else drawings:
         for panel in plate.panels:
-            for ending, text in (
-                (".svg", panel.svg),
-                (".csv", panel_csv(panel, report.head if report.simulated else "")),
-            ):
+            numbers = panel_csv(panel, report.head if report.simulated else "")
+            for ending, text in ((".svg", panel.svg), (".csv", numbers)):
                 path = folder / (re.sub(r"[^0-9A-Za-z_-]", "-", panel.name) + ending)  # a name any file system takes
                 swap_in(path, text)
                 written.append(path)
@@ -159,25 +164,14 @@ def panel_csv(panel: Panel, head: str) -> str:
     return out.getvalue()
 
 
-def _is_page(path: Path) -> bool:
-    """Say whether a file begins as our pages do; an empty one may be replaced as well."""
-    try:
-        with path.open("rb") as file:
-            start = file.read(len(HEAD))
-    except OSError as error:
-        raise ReportError(f"{path} cannot be read ({error.strerror}): choose another file") from error
-    return start in (b"", HEAD.encode())
-
-
 def swap_in(path: Path, text: str) -> None:
     """Replace the file at `path` in one step. Raises ReportError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, text.encode())
     except OSError as error:
-        raise ReportError(
-            f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"
-        ) from error
+        why = f"{path} cannot be written ({error.strerror}): {remedy(error)}, or choose another folder"
+        raise ReportError(why) from error
 
 
 # Tables that are no appendix; that of the trials stands under a heading of its own behind it.

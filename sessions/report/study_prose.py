@@ -38,8 +38,7 @@ def summary(study: StudyFindings) -> list[str]:
             f"session says. {OTHER_FINGERS}"
         )
     sentences += chain.from_iterable(map(psychometric_sentences, compared_in_study(study)))
-    if study.friction is not None:
-        f = study.friction
+    if (f := study.friction) is not None:
         sentences.append(
             f"Of {f.strokes} strokes the planted µ came back with a median error of "
             f"{digits(100 * f.median_error, 2)} %, {digits(100 * f.worst_error, 2)} % at worst; "
@@ -64,25 +63,19 @@ def _related(one: DescriptorFindings, study: StudyFindings) -> list[str]:
     strain = study.options.prediction.kinematics
     other = "finite" if strain == "small" else "small"
     if one.repeated is None:
-        return [f"{name}: {_unrelated(one, label)}"]
+        trials = Counter(subject for subject, *_ in one.points)
+        if sum(trials.values()) - len(trials) - 1 < 2:
+            return [f"{name}: too few subjects with scores and strokes of their own for a correlation within subjects."]
+        return [f"{name}: no correlation within subjects, in none of whom score and {label} both vary."]
     r = one.repeated
     interval = f"no interval from {plural(r.subjects, 'subject')} with two trials or more"
     if r.people is not None:
-        low, high = r.people
-        interval = f"95 % interval for other people on these surfaces {correlation(low)} to {correlation(high)}"
-    otherwise = _otherwise(one, other)
+        low, high = map(correlation, r.people)
+        interval = f"95 % interval for other people on these surfaces {low} to {high}"
     return [
         f"{name}: within subjects, score and the {label} predicted at {strain} strain go together by "
-        f"r = {correlation(r.r)}, {interval}; {otherwise}."
+        f"r = {correlation(r.r)}, {interval}; {_otherwise(one, other)}."
     ]
-
-
-def _unrelated(one: DescriptorFindings, label: str) -> str:
-    """Say why there is no correlation within subjects."""
-    trials = Counter(subject for subject, *_ in one.points)
-    if sum(trials.values()) - len(trials) - 1 < 2:
-        return "too few subjects with scores and strokes of their own for a correlation within subjects."
-    return f"no correlation within subjects, in none of whom score and {label} both vary."
 
 
 def _otherwise(one: DescriptorFindings, other: str) -> str:
@@ -113,9 +106,7 @@ def who(study: StudyFindings) -> list[Fact]:
 
 def excluded(study: StudyFindings) -> list[str]:
     """Return a sentence for all that was kept out of the results, by whom and why."""
-    sentences = [
-        f"Session {folder} could not be read, and nothing of it counts: {why}." for folder, why in study.failed
-    ]
+    sentences = [f"Session {name} could not be read, and nothing of it counts: {why}." for name, why in study.failed]
     sentences += [
         f"Session {session} holds the same recording as {first} (their SHA-256 agree), and counts nothing."
         for session, first in study.copies
@@ -125,23 +116,18 @@ def excluded(study: StudyFindings) -> list[str]:
         for one in study.excluded
         if _fits(study, one)
     ]
-    sentences += [
-        f"Session {visit.session}: {stopped(decision)}"
-        for visit in study.visits
-        for decision in visit.decisions
-        if " is left out: " in decision
-    ]
-    return [*sentences, *_missing(study)]
+    return [*sentences, *_decided(study, leaving_out=True), *_missing(study)]
+
+
+def _decided(study: StudyFindings, *, leaving_out: bool) -> list[str]:
+    """Return the decisions about strokes that leave one out, or all others."""
+    decided = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
+    return [f"Session {name}: {stopped(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
 
 
 def remarks(study: StudyFindings) -> list[str]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
-    sentences = [
-        f"Session {visit.session}: {stopped(decision)}"
-        for visit in study.visits
-        for decision in visit.decisions
-        if " is left out: " not in decision
-    ]
+    sentences = _decided(study, leaving_out=False)
     sentences += [
         f"Session {visit.session} ended before its last trial; what it holds counts."
         for visit in study.visits
@@ -224,9 +210,8 @@ def _missing(study: StudyFindings) -> list[str]:
             if row.sed is None and row.why and row.outcome != "open":
                 alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
     for places in alike.values():
-        first = "" if len({reason for _, reason in places}) == 1 else "of the first: "
-        named = _listed([place for place, _ in places])
-        why = f"{first}{stopped(places[0][1])}"
+        named, reasons = _listed([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
+        why = f"{'' if len(reasons) == 1 else 'of the first: '}{stopped(reasons[0])}"
         sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
     return sentences
 
@@ -237,14 +222,13 @@ def _listed(places: Sequence[str]) -> str:
 
 def sealed(study: StudyFindings) -> str:
     """Return whether predictions were sealed before scores."""
-    seals = [(visit.session, visit.sealed) for visit in study.visits if visit.sealed]
-    if not seals:
-        return ""
     alike: defaultdict[str, list[str]] = defaultdict(list)
-    for session, sentence in seals:
-        alike[sentence].append(session)
+    for visit in study.visits:
+        if visit.sealed:
+            alike[visit.sealed].append(visit.session)
     if len(alike) == 1:
-        return f"In {'each' if len(seals) > 1 else 'the one'} of {plural(len(seals), 'session')}: {seals[0][1]}"
+        ((sentence, sessions),) = alike.items()
+        return f"In {'each' if len(sessions) > 1 else 'the one'} of {plural(len(sessions), 'session')}: {sentence}"
     return " ".join(f"{', '.join(sessions)}: {sentence}" for sentence, sessions in alike.items())
 
 

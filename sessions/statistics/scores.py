@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sessions.recording.log import TrialRecord
 from sessions.statistics.correlations import CONFIDENCE, pearson, t_quantile
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
-
-from sessions.recording.log import TrialRecord
 
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
 _RESAMPLES = 10_000

@@ -1,17 +1,19 @@
 """The analysis of a whole recording: its strokes, the friction the model gets of them, and every flaw."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
+from sessions.file_access import complete
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.strokes.bootstrap import StrokeIntervals, stroke_intervals
-from sessions.strokes.decisions import OF_SESSION, Decision, Decisions, Value, read
+from sessions.strokes.decisions import OF_SESSION, Decision, DecisionError, Decisions, Value, read
 from sessions.strokes.settings import AnalysisSettings, BootstrapSettings
 from sessions.strokes.stroke import Flaw, FlawName, FrictionParameters, Stroke, friction_parameters
 from sessions.strokes.trial_analysis import (
@@ -22,17 +24,10 @@ from sessions.strokes.trial_analysis import (
     strokes_for_model,
     tilt_of,
 )
+from sessions.toml_file import SettingsError, from_table
 
 if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
     from sessions.recording.reader import Recording
-from collections.abc import Mapping
-
-import msgspec
-
-from sessions.file_access import complete
-from sessions.recording import Recording
-from sessions.strokes.decisions import DecisionError
-from sessions.toml_file import SettingsError, from_table
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -212,7 +207,7 @@ def with_present(analysis: Analysis, decision: Decision) -> Decision:
     raise DecisionError(f"there is no {decision.of}: {there}")
 
 
-def preview(recording: Recording, decision: Decision, before: Decisions, now: Analysis) -> Analysis:
+def preview(recording: "Recording", decision: Decision, before: Decisions, now: Analysis) -> Analysis:
     """Return the analysis as it would be with a decision more; `now` is that without it.
 
     Raises DecisionError where the decision cannot be, or would change nothing.

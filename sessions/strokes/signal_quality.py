@@ -10,14 +10,7 @@ from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import StatusCount, StatusTable, TransducerInfo, flagged_words
-from sessions.strokes.invalid_readings import (
-    ConstantRun,
-    at_the_same_value,
-    constant_runs,
-    repeated_readings,
-    saturated_readings,
-    spikes,
-)
+from sessions.strokes import invalid_readings as invalid
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.stroke import FlawName, Grade
 
@@ -63,13 +56,13 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     steps = np.diff(block.time)
     forward = steps[steps > 0.0]
     step = float(np.median(forward)) if len(forward) else np.nan
-    beyond = saturated_readings(block, info)
-    wild_axes = spikes(block.raw, settings.signal) & ~beyond[:, None]
+    beyond = invalid.saturated_readings(block, info)
+    wild_axes = invalid.spikes(block.raw, settings.signal) & ~beyond[:, None]
     wild: Mask = np.asarray(wild_axes.any(axis=1), np.bool_)
-    repeated = repeated_readings(block, settings.signal)
-    stuck = constant_runs(block.time, block.raw, wild | beyond, settings.signal)
-    frozen = repeated | at_the_same_value(block.raw, stuck, clipped=False)
-    clipped = at_the_same_value(block.raw, stuck, clipped=True)
+    repeated = invalid.repeated_readings(block, settings.signal)
+    stuck = invalid.constant_runs(block.time, block.raw, wild | beyond, settings.signal)
+    frozen = repeated | invalid.at_the_same_value(block.raw, stuck, clipped=False)
+    clipped = invalid.at_the_same_value(block.raw, stuck, clipped=True)
     saturated = beyond | clipped
     stalled = np.concatenate([[False], steps <= 0.0])
     good = ~(frozen | saturated | wild | stalled)
@@ -171,7 +164,9 @@ def _flaws_of_readings(
         yield FlawName.SATURATED, sentence, "doubtful"
 
 
-def _flaws_of_axes(stuck: tuple[ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array) -> _FlawParts:
+def _flaws_of_axes(
+    stuck: tuple[invalid.ConstantRun, ...], wild: Mask, dead: tuple[str, ...], time: Array
+) -> _FlawParts:
     """Yield which axes stuck, by the first run that shows it, had wild readings (n, 6), or never moved."""
     for axis, clipped in dict.fromkeys((one.axis, one.clipped) for one in stuck):
         runs = [one for one in stuck if (one.axis, one.clipped) == (axis, clipped)]

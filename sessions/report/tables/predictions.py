@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 from sessions.prediction import SED
 from sessions.prediction.stored import Alternative, Ends, SedInterval
@@ -25,18 +26,14 @@ def prediction_table(report: Report) -> Table | None:
         bound = intervals.get("tau_max")
         if bound is not None and p.tau_max is not None and stroke is not None and stroke.tau_max:
             bound = bound[0] * p.tau_max / stroke.tau_max, bound[1] * p.tau_max / stroke.tau_max  # as it was read
-        missing = p.reasons.get("sed")
+        missing, error = p.reasons.get("sed"), None if p.doubt else p.error_estimate
         return (
             notes.estimate(p.mu, places(3), p.reasons.get("mu") or missing, mu, _SHORT),
             {"mean over steady window": "mean"}.get(p.mu_rule, p.mu_rule),
             notes.estimate(p.tau_max, tau, p.reasons.get("tau_max") or missing, bound, _SHORT, unit=1e3),
             _depth(p, notes),
             _stroked_sed(p, notes),
-            notes.number(
-                None if p.doubt else p.error_estimate,
-                lambda v: significant(100 * v, 2),
-                p.doubt or p.reasons.get("error_estimate"),
-            ),
+            notes.number(error, lambda v: significant(100 * v, 2), p.doubt or p.reasons.get("error_estimate")),
             notes.number(p.wall_s, lambda v: significant(v, 2), p.reasons.get("wall_s")),
         )
 
@@ -55,36 +52,35 @@ _SED_ALONE = "the uncertainty of friction goes through to the SED alone"
 _SHORT = "the stroke has too few readings"
 
 
-def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
-    interval = p.sed_interval
-    why = p.reasons.get("sed_interval")
-    star = p.interval_by == "sampling"
-    if p.doubt and p.sed is not None:
-        return _alone(notes, p.sed, sed, p.doubt)
-    return _sed(notes, p.sed, p.error_estimate, p.reasons.get("sed"), interval, why, star=star)
+class _Estimate(NamedTuple):
+    """A number of the model, with its relative error and the interval that friction makes, or why it has none."""
+
+    value: float | None
+    error: float | None
+    reason: str | None  # why there is no number
+    ends: Ends | None
+    without: str | None  # why there is no interval
+    doubt: str = ""  # why no finger can be in that state
 
 
-def _alone(notes: Notes, value: float, shown: Callable[[float], str], doubt: str) -> Cell:
-    """Return a number of a state that no finger can be in: without ± or interval, which would speak for it."""
-    return notes.estimate(value, shown, None, None, doubt)
+def _cell(notes: Notes, of: _Estimate, shown: Callable[[float], str], least: int, unit: float = 1.0) -> Cell:
+    """Return a number ± its error, over its interval; in doubt without both, which would speak for it."""
+    if of.doubt and of.value is not None:
+        return notes.estimate(of.value, shown, None, None, of.doubt)
+    with_error_of = _with(of.error, least, unit)
+    return notes.estimate(of.value, with_error_of, of.reason, of.ends, of.without, of_ends=shown, unit=unit)
 
 
-def _sed(
-    notes: Notes,
-    value: float | None,
-    error: float | None,
-    reason: str | None,
-    ends: Ends | None,
-    without: str | None,
-    *,
-    star: bool,
-) -> Cell:
-    """Return an SED in kPa, ± its relative error from the mesh, over the interval that friction makes.
-
-    `star` marks an interval that was found otherwise than the others of its table.
-    """
-    cell = notes.estimate(value, _with(error, 3, 1e3), reason, ends, without, of_ends=sed, unit=1e3)
+def _sed(notes: Notes, of: _Estimate, *, star: bool) -> Cell:
+    """Return an SED in kPa; `star` marks an interval that was found otherwise than the others of its table."""
+    cell = _cell(notes, of, sed, 3, 1e3)
     return replace(cell, interval=f"{cell.interval}*") if star and cell.interval else cell
+
+
+def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
+    why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
+    estimate = _Estimate(p.sed, p.error_estimate, why, p.sed_interval, without, p.doubt)
+    return _sed(notes, estimate, star=p.interval_by == "sampling")
 
 
 def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
@@ -142,9 +138,7 @@ def beside_table(report: Report) -> Table | None:
 
     def cell(one: Alternative) -> Cell:
         ends, why, star = _of(one.interval)
-        if one.doubt and one.sed is not None:
-            return _alone(notes, one.sed, sed, one.doubt)
-        return _sed(notes, one.sed, one.error_estimate, one.reason, ends, why, star=star)
+        return _sed(notes, _Estimate(one.sed, one.error_estimate, one.reason, ends, why, one.doubt), star=star)
 
     legend = "; ".join(f"({n}) {way}" for n, way in enumerate(ways, 1))
     caption = (
@@ -169,16 +163,11 @@ def beside_forces_table(report: Report) -> Table | None:
         interval = one.interval
         ends = None if interval is None else interval.indentation if pressed else interval.normal_force
         why = None if interval is None else interval.reason
-        value = None if one.sed is None else value
-        if one.doubt and value is not None:
-            return _alone(notes, value, places(2), one.doubt)
-        return notes.estimate(value, _with(error, 2), one.reason, ends, why, of_ends=places(2))
+        estimate = _Estimate(None if one.sed is None else value, error, one.reason, ends, why, one.doubt)
+        return _cell(notes, estimate, places(2), 2)
 
-    units = {
-        one.variant.way: "mm" if one.variant.driven == "force" else "N"
-        for p in report.predictions
-        for one in p.alternatives
-    }
+    alternatives = [one.variant for p in report.predictions for one in p.alternatives]
+    units = {variant.way: "mm" if variant.driven == "force" else "N" for variant in alternatives}
     caption = (
         "The model's normal force in each column of the table before, or the depth that the measured force presses it "
         "to. ±: the solver's estimate of its error, from the mesh. Under it: the 95 % interval that the uncertainty of "
@@ -223,10 +212,9 @@ def force_table(report: Report) -> Table | None:
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
 
         def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
-            value, shown = getattr(p, name), places(decimals)
-            if p.doubt and value is not None and name in _OF_STATE:
-                return _alone(notes, value, shown, p.doubt)
-            return notes.estimate(value, _with(error, decimals), p.reasons.get(name), ends, without, of_ends=shown)
+            doubt = p.doubt if name in _OF_STATE else ""
+            estimate = _Estimate(getattr(p, name), error, p.reasons.get(name), ends, without, doubt)
+            return _cell(notes, estimate, places(decimals), decimals)
 
         why = p.reasons.get("sed_interval")
         return (
@@ -265,18 +253,15 @@ def direction_table(report: Report) -> Table | None:
         back, without, star = _of(p.opposite_interval)
         why = p.reasons.get("opposite_sed") or p.reasons.get("sed")
         ratio, ends = _ratio(p, back)
-        other = _sed(notes, p.opposite_sed, p.opposite_error, why, back, without, star=star)
-        if p.opposite_doubt and p.opposite_sed is not None:
-            other = _alone(notes, p.opposite_sed, sed, p.opposite_doubt)
+        opposite = _Estimate(p.opposite_sed, p.opposite_error, why, back, without, p.opposite_doubt)
         doubt = p.doubt or p.opposite_doubt
+        unknown = doubt or without or p.reasons.get("sed_interval")
         return (
             _depth(p, notes),
             direction(p.direction),
             _stroked_sed(p, notes),
-            other,
-            notes.estimate(
-                ratio, places(3), why, None if doubt else ends, doubt or without or p.reasons.get("sed_interval")
-            ),
+            _sed(notes, opposite, star=star),
+            notes.estimate(ratio, places(3), why, None if doubt else ends, unknown),
         )
 
     caption = (

@@ -82,9 +82,10 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
     name = capital(one.descriptor)
     if one.scales and one.scales[0].p is not None:
         fits = [
-            f"{scale.model} {digits(scale.deviance, 1)} on {scale.freedom} degrees of freedom (p {_p(scale.p)})"
+            f"{scale.model} {digits(scale.deviance, 1)} on {scale.freedom} degrees of freedom (p {p})"
             for scale in one.scales
             if scale.deviance is not None and scale.p is not None
+            for p in [p_value(scale.p) if scale.p < 0.001 else f"= {p_value(scale.p)}"]
         ]
         sentences.append(f"{name}: deviance of the scales from choices: {', '.join(fits)}.")
     if one.consistence:
@@ -105,11 +106,6 @@ def scale_sentences(one: DescriptorFindings) -> list[str]:
     elif exponent is not None and exponent.reason:
         sentences.append(f"{name}: no exponent of the estimates by µ: {exponent.reason}.")
     return sentences
-
-
-def _p(p: float) -> str:
-    text = p_value(p)
-    return text if text.startswith("<") else f"= {text}"
 
 
 Means = tuple[Average | None, Average | None]  # of log PSE and of log JND over subjects
@@ -207,17 +203,10 @@ def _mean_row(means: Means, notes: Notes) -> Iterable[Row]:
     pse, jnd = means
     if pse is None or jnd is None or pse.n < LEAST_OF_A_MEAN:
         return
-    cells = [
-        notes.estimate(
-            unit(mean.mean),
-            places(after),
-            None,
-            None if ends is None else (unit(ends[0]), unit(ends[1])),
-            "it takes two subjects",
-        )
-        for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0))
-        for ends in [bounds(mean.low, mean.high)]
-    ]
+    cells: list[Cell] = []
+    for mean, unit, after in ((pse, math.exp, 2), (jnd, _mean_percent, 0)):
+        ends = None if mean.low is None or mean.high is None else (unit(mean.low), unit(mean.high))
+        cells.append(notes.estimate(unit(mean.mean), places(after), None, ends, "it takes two subjects"))
     yield ("geometric mean", f"of {pse.n} and {jnd.n}", *cells, NONE, NONE, NONE)
 
 

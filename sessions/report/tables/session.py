@@ -5,15 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from sessions.prediction import BY_NAME
 from sessions.report.contents import Planted, Report, StrokeFinding
 from sessions.report.tables import Cell, Column, Group, Notes, Row, Rows, Table, grouped, range_cell, sections_of, table
-from sessions.report.tables.predictions import (
-    afferent_table,
-    beside_forces_table,
-    beside_table,
-    direction_table,
-    force_table,
-    model_mu,
-    prediction_table,
-)
+from sessions.report.tables import predictions as of_predictions
 from sessions.report.tables.rivals import responses_table, rivals_table
 from sessions.report.tables.scales import compared_with_standard, psychometric_table
 from sessions.report.wording import (
@@ -55,8 +47,8 @@ def stroke_table(report: Report) -> Table | None:
     columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
     def row(stroke: StrokeFinding) -> Row:
-        def cell(name: str, shown: Format, ends: Format | None = None, unit: float = 1.0) -> Cell:
-            return _estimate(notes, stroke, name, shown, ends, unit)
+        def cell(name: str, shown: Format, unit: float = 1.0) -> Cell:
+            return _estimate(notes, stroke, name, shown, unit)
 
         return (
             cell("mu_static", places(3)),
@@ -64,9 +56,7 @@ def stroke_table(report: Report) -> Table | None:
             cell("mu_max", places(3)),
             cell("tau_max", tau, unit=1e3),
             cell("speed", places(1)),
-            notes.number(
-                stroke.direction, lambda v: {1: "p → d", -1: "d → p"}[int(v)], stroke.reasons.get("direction")
-            ),
+            notes.number(stroke.direction, lambda v: "p → d" if v > 0 else "d → p", stroke.reasons.get("direction")),
             ", ".join(name.replace("_", " ") for name in stroke.flaws) or "none",
         )
 
@@ -74,8 +64,7 @@ def stroke_table(report: Report) -> Table | None:
     caption = (
         "Strokes. µ dynamic: mean over the steady window; µ static: height of the static peak; µ maximum: greatest "
         "above the force floor; τ max: greatest tangential force over the contact area, which is taken as given; "
-        "speed: slope of the centre of pressure."
-        f"{kind}"
+        f"speed: slope of the centre of pressure.{kind}"
     )
     return _table(report, "table-strokes", caption, columns, row, notes)
 
@@ -131,15 +120,11 @@ def _table(
     return table(name, caption, f"{'stroke | trial | index' if planned else 'stroke'} | {columns}", groups, notes)
 
 
-def _estimate(
-    notes: Notes, stroke: StrokeFinding, name: str, shown: Format, of_ends: Format | None = None, unit: float = 1.0
-) -> Cell:
+def _estimate(notes: Notes, stroke: StrokeFinding, name: str, shown: Format, unit: float = 1.0) -> Cell:
     """Return one number of a stroke over its bootstrap interval, or why it has none."""
     without = "a person decided it" if _OF_DECISION.get(name) in stroke.decided else _WITHOUT.get(name, _TOO_SHORT)
     why = stroke.reasons.get(name) or _MISSING.get(name)
-    return notes.estimate(
-        getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, of_ends=of_ends, unit=unit
-    )
+    return notes.estimate(getattr(stroke, name), shown, why, stroke.bootstrap.get(name), without, unit=unit)
 
 
 def planted_table(report: Report) -> Table | None:
@@ -159,7 +144,7 @@ def planted_table(report: Report) -> Table | None:
         stroke = strokes_by_trial.get(p.trial)
         cells: list[Cell | str | int] = [p.trial, NONE if stroke is None or stroke.index is None else str(stroke.index)]
         prediction = predictions.get(p.trial)
-        name, mu = model_mu(stroke, prediction)
+        name, mu = of_predictions.model_mu(stroke, prediction)
         quantities: tuple[tuple[str, float, float | None, Format, float], ...] = (
             (name, p.mu, mu, places(3), 1.0),
             ("tau_max", p.tau_max, stroke.tau_max if stroke else None, tau, 1e3),
@@ -187,7 +172,7 @@ def planted_table(report: Report) -> Table | None:
 def score_table(report: Report) -> Table | None:
     """Return mean scores with their intervals."""
     notes = Notes()
-    groups = tuple((e.name, tuple(score_cells(m, notes) for m in e.scores)) for e in report.experiments)
+    groups = [(e.name, [score_cells(m, notes) for m in e.scores]) for e in report.experiments]
     columns = "index | subjects | mean score [0–100] | 95 % interval of the mean [0–100] | standard deviation [0–100]"
     caption = (
         "Scores: mean ± t(0.975, n − 1) s / √n, n subjects. Repeats of one subject are averaged first. Under the "
@@ -205,13 +190,8 @@ def score_cells(mean: MeanScore, notes: Notes) -> Row:
             f"for index {mean.index} of {mean.descriptor}, {range_cell(*mean.bootstrap, places(1)).text}."
         )
         interval = Cell(interval.text, notes.mark(why), why)
-    return (
-        mean.index,
-        mean.n,
-        digits(mean.mean, 1),
-        interval,
-        spread_cell(mean.sd, mean.n, places(1), mean.reason, notes),
-    )
+    sd = spread_cell(mean.sd, mean.n, places(1), mean.reason, notes)
+    return mean.index, mean.n, digits(mean.mean, 1), interval, sd
 
 
 def spread_cell(
@@ -226,12 +206,11 @@ def answer_tables(report: Report) -> tuple[Table | None, ...]:
     """Return every subject's scores, a table an experiment."""
     tables: list[Table | None] = []
     for e in report.experiments:
-        if e.answers:
-            notes = Notes()
-            rows = tuple((a.subject, *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers)
-            columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
-            caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
-            tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
+        notes = Notes()
+        rows = [(a.subject, *(notes.number(s, places(1), "no score") for s in a.scores)) for a in e.answers]
+        columns = " | ".join(["subject", *(f"index {index}" for index in e.indices)])
+        caption = f"Every score of {e.descriptor} [0–100]; repeats of one subject averaged."
+        tables.append(table(f"table-answers-{identifier(e.name)}", caption, columns, [("", rows)], notes))
     return tuple(tables)
 
 
@@ -264,9 +243,11 @@ def rank_interval(related: Relation, notes: Notes) -> Cell:
 
 
 def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
-    left_out = ", ".join(
-        f"{label}:\N{NO-BREAK SPACE}{NONE if r is None else correlation(r)}" for label, r in related.without
-    )
+    def slope(value: float) -> str:
+        return significant(1e6 * value, 3)
+
+    without = [(label, NONE if r is None else correlation(r)) for label, r in related.without]
+    no_slope = "no line has one through two points, or through points wholly on it"
     return (
         name,
         related.n,
@@ -275,15 +256,8 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
         notes.number(related.spearman, correlation, related.reason),
         rank_interval(related, notes),
         notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
-        notes.estimate(
-            related.slope,
-            lambda v: significant(1e6 * v, 3),
-            related.reason,
-            slope_interval(related),
-            "no line has one through two points, or through points wholly on it",
-            unit=1e6,
-        ),
-        left_out,
+        notes.estimate(related.slope, slope, related.reason, slope_interval(related), no_slope, unit=1e6),
+        ", ".join(f"{label}:\N{NO-BREAK SPACE}{r}" for label, r in without),
     )
 
 
@@ -350,15 +324,15 @@ def tables(report: Report) -> dict[str, tuple[Table, ...]]:
         "relation": (relation_table(report),),
         "strokes": (stroke_table(report), course_table(report)),
         "predictions": (
-            prediction_table(report),
-            force_table(report),
-            direction_table(report),
-            beside_table(report),
-            beside_forces_table(report),
+            of_predictions.prediction_table(report),
+            of_predictions.force_table(report),
+            of_predictions.direction_table(report),
+            of_predictions.beside_table(report),
+            of_predictions.beside_forces_table(report),
         ),
         "rivals": (rivals_table(compared, quantity, report.model), responses_table(compared, quantity, report.model)),
         "scores": (score_table(report), *answer_tables(report), psychometric_table(compared_with_standard(report))),
-        "afferent": (afferent_table(report),),
+        "afferent": (of_predictions.afferent_table(report),),
         "paths": (paths_table((e.name, e.paths) for e in report.experiments),),
         "planted": (planted_table(report),),
     }
