@@ -3,9 +3,7 @@
 from dataclasses import dataclass, replace
 from time import perf_counter
 
-from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked
-from solver.accuracy.refinement import with_shares
-from solver.arrays import Array
+from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state, steps_asked
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import nearby, roughly, settled
 from solver.equilibrium import EquilibriumState
@@ -14,7 +12,6 @@ from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
 from solver.mesh.mesher import Lines, Sizing
-from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
 COARSE = (
@@ -182,12 +179,11 @@ def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) ->
 
 
 def on_nested(
-    scene: Scene, top: MeshSolution, numbers: Array, steps: Steps | None, meshes: Meshes
-) -> tuple[NestedNumbers | None, Steps | None]:
-    """Return the numbers of a scene on the nested mesh of `top`, None where it has no state there, and its steps.
+    scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
+) -> tuple[NestedState | None, Steps | None]:
+    """Return the state of a scene on the nested mesh of `top`, None where it has none there, and its steps.
 
-    `numbers` (COUNT,) are those on the mesh of `top`, `steps` those taken where the state depends on its way. Raises
-    Cancelled.
+    `steps` are those taken where the state depends on its way. Raises Cancelled.
     """
     begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
@@ -204,7 +200,4 @@ def on_nested(
         return None, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)
     (values,), (changes,) = edge_changes(finger.newton, [(state, forces)], finger.numbers_and_row)
-    nested = nested_numbers(values, changes, steps)
-    if nested is None:
-        return None, steps
-    return with_shares(scene, numbers, nested, steps, (finger, state), changes[:, 0]), steps
+    return nested_state(finger, state, values, changes, steps), steps

@@ -152,17 +152,29 @@ def edge_changes(
     ]
 
 
-def nested_numbers(values: Array, changes: Array, steps: Steps | None) -> NestedNumbers | None:
-    """Return what a nested mesh has of one scene: `values` (COUNT + r,) and their `changes` by edges (m, COUNT + r).
+class NestedState(NamedTuple):
+    """A scene on its nested mesh."""
 
-    `steps` are those taken where its state depends on its way. None where contact with a moved edge has no equilibrium,
-    as at a limit of friction.
+    numbers: NestedNumbers
+    finger: Finger[Patches]
+    state: EquilibriumState
+    edges: Array  # (m,) what its SED changes by as each edge of contact moves by a node [MPa]
+
+
+def nested_state(
+    finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None
+) -> NestedState | None:
+    """Return a state of the nested mesh with its numbers, of `values` (COUNT + r,) and `changes` (m, COUNT + r).
+
+    `steps` are those taken where it depends on its way. None where contact with a moved edge has no equilibrium, as at
+    a limit of friction.
     """
-    changes = np.linalg.norm(changes, axis=0)
-    if np.isinf(changes).any():
+    of_edges = np.linalg.norm(changes, axis=0)
+    if np.isinf(of_edges).any():
         return None
     numbers = values[:COUNT] if steps is None else steps.taken(values[:COUNT])
-    return NestedNumbers(numbers, changes[:COUNT], values[COUNT:], changes[COUNT:])
+    nested = NestedNumbers(numbers, of_edges[:COUNT], values[COUNT:], of_edges[COUNT:])
+    return NestedState(nested, finger, state, changes[:, 0])
 
 
 def _with_moved_edges(

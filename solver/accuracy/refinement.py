@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from solver._kernels.compiling import OPEN, SLIP, STICK
-from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, Steps, errors
+from solver.accuracy.error_estimate import FROM_EDGES, FROM_HALVING, NestedState, Steps, errors
 from solver.arrays import Array, Indices
 from solver.body.linear import Elastic
 from solver.constitutive import Moduli
@@ -118,24 +118,16 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     return recover((free + compliance[:, forces] @ missing).reshape(-1, 2))
 
 
-def with_shares(
-    scene: Scene,
-    numbers: Array,
-    nested: NestedNumbers,
-    steps: Steps | None,
-    there: tuple[Finger[Any], EquilibriumState],
-    edges: Array,
-) -> NestedNumbers:
-    """Return `nested` with what each gap between lines has of the SED's error, where a finer mesh may be asked for.
+def with_shares(scene: Scene, numbers: Array, there: NestedState, steps: Steps | None) -> NestedNumbers:
+    """Return the numbers of a nested state, with each gap's part of the SED's error where a finer mesh may be wanted.
 
-    `numbers` (COUNT,) are the scene's on the mesh that counts, `there` is the finger with its state on the nested one,
-    and `edges` (m,) are what the SED changes by as edges of contact move.
+    `numbers` (COUNT,) are the scene's on the mesh that counts.
     """
+    nested, finger, state, edges = there
     tolerance = scene.solve.tolerance
     missed = tolerance is not None and errors(scene, numbers, nested, steps).sed > tolerance
     if not missed and scene.solve.contrast_tolerance is None:
         return nested
-    finger, state = there
     parts = np.concatenate(_grid(finger).parts(finger.displacement(state), state))
     parts *= FROM_HALVING * abs(float(nested.numbers[0] - numbers[0])) / max(float(parts.sum()), np.finfo(float).tiny)
     before = np.flatnonzero(np.diff(state.state))

@@ -13,7 +13,7 @@ import numpy as np
 
 from solver.accuracy import audits as audit
 from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
-from solver.accuracy.error_estimate import Steps, edge_changes, nested_numbers, steps_asked, steps_of_press
+from solver.accuracy.error_estimate import Steps, edge_changes, nested_state, steps_asked, steps_of_press
 from solver.accuracy.refinement import with_shares
 from solver.arrays import Array
 from solver.body import Patches
@@ -226,10 +226,9 @@ def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved], numbers:
         forced = [(state, forces_of(solved[number].scene, state.load)) for number, state in states.items()]
         values, changes = edge_changes(mesh.newton, forced, mesh.numbers_and_row)
         for (number, state), value, change in zip(states.items(), values, changes, strict=True):
-            one, nested = solved[number], nested_numbers(value, change, solved[number].steps)
-            if nested is not None:
-                there = mesh, state
-                out[number] = with_shares(one.scene, numbers[number], nested, one.steps, there, change[:, 0])
+            one = solved[number]
+            there = nested_state(mesh, state, value, change, one.steps)
+            out[number] = None if there is None else with_shares(one.scene, numbers[number], there, one.steps)
     return out
 
 
@@ -289,7 +288,8 @@ def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: floa
     numbers = finger.all_numbers([state])[0]
     before_estimate = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    finer, steps = on_nested(scene, top, numbers, steps, meshes)
+    there, steps = on_nested(scene, top, steps, meshes)
+    finer = None if there is None else with_shares(scene, numbers, there, steps)
     row = finger.row.average(state.u)
     took = perf_counter() - before_estimate
     warnings, wall = doubts(finger, state), before_estimate - begun - setup
