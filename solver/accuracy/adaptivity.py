@@ -11,7 +11,8 @@ from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
 from solver.equilibrium.load_stepping import forces_of, sliding_load
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.mesh.mesher import Lines, Sizing
+from solver.mesh import Lines
+from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
 COARSE = (

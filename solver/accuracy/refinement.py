@@ -23,8 +23,8 @@ from solver.body.linear import Elastic
 from solver.constitutive import Moduli
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import Finger, LinearFinger, settled_moduli
-from solver.mesh import ALONG, OUT, line
-from solver.mesh.mesher import FINEST, FingerMesh, Lines
+from solver.mesh import ALONG, OUT, Lines, line
+from solver.mesh.mesher import FINEST, FingerMesh
 from solver.prediction import NestedNumbers
 from solver.scene import Scene
 

@@ -4,6 +4,7 @@ Any mesh can be halved: every element is divided in four by its own quadratic ge
 """
 
 from dataclasses import dataclass, field, fields
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -211,6 +212,36 @@ def with_middles(lines: Array) -> Array:
     out = np.empty(2 * len(lines) - 1)
     out[::2], out[1::2] = lines, (lines[1:] + lines[:-1]) / 2.0
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Where the lines between a finger's elements lie, in the order of its nodes: proximal to distal, and outwards."""
+
+    arcs: tuple[float, ...]  # arc positions of those across the tissue [mm]
+    bone: tuple[float, ...]  # of those along it, in a meshed bone: radii, from the core to 1, by the bone's; else none
+    fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
+    skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
+
+    @property
+    def rows(self) -> int:
+        """Number of elements across the tissue."""
+        return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
+
+    def divided(self, columns: Indices, rows: Indices) -> "Lines":
+        """Return the lines with each gap between two in so many equal parts: `columns` (a,) and `rows` (b,) of them."""
+        bone, fat = max(len(self.bone) - 1, 0), len(self.fat) - 1
+        return Lines(
+            _divided(self.arcs, columns),
+            _divided(self.bone, rows[:bone]),
+            _divided(self.fat, rows[bone : bone + fat]),
+            _divided(self.skin, rows[bone + fat :]),
+        )
+
+
+def _divided(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
+    gaps = zip(pairwise(lines), parts.tolist(), strict=True)
+    return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])
 
 
 # A divided element has 5 x 5 nodes, numbered along its first direction, then up: here those of the element's own nine

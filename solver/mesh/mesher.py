@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.arrays import Array, Indices
-from solver.mesh import Mesh, distinct, grid_mesh, with_middles
+from solver.mesh import Lines, Mesh, distinct, grid_mesh, with_middles
 from solver.scene.tables import Finger, Receptor
 
 
@@ -146,36 +146,6 @@ class ElementSizes:
 
 
 SIZES = ElementSizes()
-
-
-@dataclass(frozen=True, slots=True)
-class Lines:
-    """Where the lines between elements lie, in the order of the nodes: from proximal to distal, and outwards."""
-
-    arcs: tuple[float, ...]  # arc positions of those across the tissue [mm]
-    bone: tuple[float, ...]  # of those along it, in a meshed bone: radii, from the core to 1, by the bone's; else none
-    fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
-    skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
-
-    @property
-    def rows(self) -> int:
-        """Number of elements across the tissue."""
-        return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
-
-    def divided(self, columns: Indices, rows: Indices) -> "Lines":
-        """Return the lines with each gap between two in so many equal parts: `columns` (a,) and `rows` (b,) of them."""
-        bone, fat = max(len(self.bone) - 1, 0), len(self.fat) - 1
-        return Lines(
-            _divided(self.arcs, columns),
-            _divided(self.bone, rows[:bone]),
-            _divided(self.fat, rows[bone : bone + fat]),
-            _divided(self.skin, rows[bone + fat :]),
-        )
-
-
-def _divided(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
-    gaps = zip(pairwise(lines), parts.tolist(), strict=True)
-    return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])
 
 
 @dataclass(frozen=True, slots=True)

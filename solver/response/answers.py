@@ -27,7 +27,8 @@ from solver.equilibrium.load_path import Instant, end, march
 from solver.equilibrium.load_stepping import forces_of
 from solver.equilibrium.relaxation import CondensedRelaxing
 from solver.failures import NotConverged, SolveFailure
-from solver.mesh.mesher import Lines, Sizing
+from solver.mesh import Lines
+from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, check_stop, interruptible, report_part, report_progress
 from solver.response.answer import Solved, prediction

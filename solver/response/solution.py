@@ -14,7 +14,8 @@ from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure
-from solver.mesh.mesher import FingerMesh, Lines
+from solver.mesh import Lines
+from solver.mesh.mesher import FingerMesh
 from solver.prediction import Prediction
 from solver.progress import Progress, interruptible, report_progress
 from solver.response.answers import MESHINGS, Answer, Meshing, Watch

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from solver import Friction, Loading, Materials, NoSteadyState, NotConverged, Prediction, Scene, Solve, solve
-from solver.mesh.mesher import Lines
+from solver.mesh import Lines
 from solver.response import solution
 from solver.response.answers import FiniteMeshing
 
