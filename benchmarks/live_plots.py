@@ -47,8 +47,8 @@ def _by_hand():  # noqa: ANN202
     from daq_app.qt.live_panel import AXES, PLOTS, SED
     from daq_app.qt.live_plot import LivePlot
     from daq_app.window.course_state import Mark
+    from daq_app.window.live_model import MODEL_CHANNELS
     from daq_app.window.live_trace import CHANNELS, Columns
-    from daq_app.window.view_model import CHANNELS as MODEL_CHANNELS
 
     plots = [LivePlot(*plot, 1.0) for plot in PLOTS]
     plots += [LivePlot(*SED, 1.0, MODEL_CHANNELS), *(LivePlot(*plot, 1.0) for plot in AXES)]

@@ -6,12 +6,9 @@ from typing import Literal
 from msgspec import Struct, field
 
 from daq_app.analyst.frame import Film, Finger
-from daq_app.analyst.raw import RawReadings
-from daq_app.wording import tr_noop
+from daq_app.analyst.stroke import Edge, History, RawReadings
 from sessions.report.contents import PredictionFinding, Report
 
-Edge = Literal["onset", "lift", "steady begin", "steady end"]
-EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
 Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a predicted row
 
 
@@ -25,13 +22,6 @@ class Step(Struct, frozen=True):
     words: str
     left: float | None = None  # about how long it will still take [s]; None: not known
     load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
-
-
-class History(Struct, frozen=True):
-    """The decisions that can be undone, the last one first, and those that can be redone, the first one first."""
-
-    done: tuple[str, ...] = ()  # each in words
-    undone: tuple[str, ...] = ()
 
 
 class ReportReady(Struct, frozen=True):

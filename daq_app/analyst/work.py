@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.edges import brought_back, decision_meant, decision_of, history, taken_back
+from daq_app.analyst.finger_words import NAMES, compared, film_words, named_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
-from daq_app.analyst.raw import RawFile
-from daq_app.analyst.seen import NAMES, compared, film_words, named_errors
-from daq_app.analyst.shown import picture_errors, sed_words
+from daq_app.analyst.session_words import picture_errors, sed_words
+from daq_app.analyst.stroke import RawFile, brought_back, decision_meant, decision_of, history, taken_back
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export

@@ -2,19 +2,17 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QComboBox,
-    QWidget,
-)
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QComboBox, QSizePolicy, QWidget
 
-from daq_app.qt.indicators import Lamp, LoadBar
+from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, named, regrade, say, scrolled, vbox
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
-from daq_app.window.bench_load import AXES
+from daq_app.window.live_feed import AXES
 from daq_app.window.messages import Message
-from daq_app.window.view_bench import NAMES, BenchView
+from daq_app.window.view import NAMES, Bar, BenchView
 from daq_app.wording import tr, tr_noop
 
 SHOWN_COUNTERS = tr_noop(
@@ -172,3 +170,73 @@ class BenchStrip(Panel):
         say(self._words, view.lamp_words)
         for bar in view.bars:
             self._bars[bar.name].show_bar(bar)
+
+
+class LoadBar(QWidget):
+    """How far one axis is loaded now, and the most it was loaded since somebody acknowledged it."""
+
+    NAME, NOISE = 86, 104  # widths of the words beside the bar, before the font's scale
+
+    def __init__(self, name: str, scale: float) -> None:
+        super().__init__()
+        self._scale = scale
+        self._bar = Bar(name, 0.0, 0.0, over=False, noise="")
+        self.setAccessibleName(tr("load on {name}", name=tr(name)))
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setFixedHeight(round(2.75 * GRID * scale))
+
+    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
+        """Return the usual size."""
+        return QSize(round(200 * self._scale), self.height())
+
+    def show_bar(self, bar: Bar) -> None:
+        """Show a load."""
+        if bar == self._bar:
+            return
+        self._bar = bar
+        now = (
+            tr("no rated range") if bar.share is None else tr("{share:.0f} % of the rated load", share=100 * bar.share)
+        )
+        peak = "" if bar.peak is None else tr(", at most {peak:.0f} %", peak=100 * bar.peak)
+        state = tr(", OVERLOAD") if bar.over else ""
+        noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""
+        self.setAccessibleName(
+            tr(
+                "load on {name}: {now}{peak}{state}{noise}",
+                name=tr(bar.name),
+                now=now,
+                peak=peak,
+                state=state,
+                noise=noise,
+            )
+        )
+        self.setToolTip(self.accessibleName())
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint name, bar, peak and noise."""
+        t, bar = theme_of(self), self._bar
+        painter = QPainter(self)
+        left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)
+        if self.width() < left + right + 40:
+            right = 0
+        colour = QColor(t.wrong if bar.over else t.text)
+        painter.setPen(colour)
+        name = QRectF(0, 0, left - 4, self.height())
+        painter.drawText(name, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignLeft, tr(bar.name))
+        track = QRectF(left, self.height() / 2 - 5, max(self.width() - left - right - 4, 8), 10)
+        painter.setPen(QPen(QColor(t.line), 1))
+        painter.setBrush(QColor(t.raised))
+        painter.drawRect(track)
+        if bar.share is not None:
+            filled = track.adjusted(1, 1, -1, -1)
+            filled.setWidth(filled.width() * min(bar.share, 1.0))
+            painter.fillRect(filled, QColor(t.wrong if bar.share >= 1 else t.quiet))
+        if bar.peak is not None:
+            at = track.left() + track.width() * min(bar.peak, 1.0)
+            painter.fillRect(QRectF(at - 1.5, track.top() - 3, 3, track.height() + 6), colour)
+        if right:
+            painter.setPen(QColor(t.wrong if bar.over else t.quiet))
+            words = tr("OVERLOAD") if bar.over else bar.noise
+            place = QRectF(self.width() - right + 4, 0, right - 4, self.height())
+            painter.drawText(place, Qt.AlignmentFlag.AlignVCenter | Qt.AlignmentFlag.AlignRight, words)

@@ -9,16 +9,15 @@ from typing import Protocol
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from daq_app.qt.languages import translator
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import life_of
 from daq_app.recorder.messages import REQUESTS, Report, Request
-from daq_app.window.bench_load import Load
-from daq_app.window.live_feed import LiveFeed, together
+from daq_app.window.live_feed import LiveFeed, Load, together
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.messages import DevicesFound, DrawingFailed, Judged, LifeKnown, Loaded, Message, Searching, Tick
 from daq_app.window.state import AppState, fold
+from daq_app.window.subject import translator
 from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable

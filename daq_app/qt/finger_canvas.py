@@ -8,11 +8,10 @@ from PySide6.QtCore import QEvent, QObject, QPointF, QRectF, QSize, QSizeF, Qt, 
 from PySide6.QtGui import QColor, QFontMetricsF, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
-from daq_app.analyst.frame import FIELD_CHOICES, Frame, Parts, View
-from daq_app.analyst.probe import Line, probe_words
+from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, Parts, View, probe_words
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
+from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font
-from daq_app.qt.zoomed_plot import name_axis, pg, style_axis
 from daq_app.wording import tr
 
 NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.frame import Box, FieldChoice, Frame, Parts, Range, View, halved, seen
-from daq_app.analyst.probe import Line
-from daq_app.qt.indicators import paint_lost
-from daq_app.qt.shapes import faces, sheer
+from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halved, seen
+from daq_app.qt.painting import faces, paint_lost, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
 

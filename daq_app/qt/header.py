@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QFontMetrics, QResizeEvent
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
-from daq_app.qt.indicators import Arrow, Lamp
-from daq_app.qt.languages import name_of
+from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import Panel, button, hbox, label, regrade, say
-from daq_app.qt.tokens import GRID, SMALL, font
+from daq_app.qt.preferences import name_of
+from daq_app.qt.tokens import GRID, SMALL, font, theme_of
 from daq_app.window.messages import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
@@ -156,3 +156,40 @@ class ToDo(Panel):
             self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
+
+
+class Arrow(QWidget):
+    """Which way the stroke goes, as somebody facing the subject's finger from behind sees it: up is away."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._direction = 0
+        self.setFixedSize(5 * GRID, 7 * GRID)
+        self.setAccessibleName(tr("no stroke asked for"))
+
+    def show_direction(self, direction: int) -> None:
+        """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
+        if direction != self._direction:
+            self._direction = direction
+            words = {
+                1: tr("stroke away from the subject"),
+                -1: tr("stroke towards the subject"),
+                0: tr("no stroke asked for"),
+            }
+            self.setAccessibleName(words[direction])
+            self.setToolTip(words[direction])
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the arrow."""
+        if not self._direction:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.translate(self.width() / 2, self.height() / 2)
+        painter.scale(1, self._direction)
+        painter.setPen(QPen(QColor(theme_of(self).text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
+        half = self.height() / 2 - 6
+        painter.drawLine(QPointF(0, half), QPointF(0, -half))
+        painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))
+        painter.drawLine(QPointF(0, -half), QPointF(12, -half + 14))

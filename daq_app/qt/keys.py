@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QGridLayout, QMainWindow, QWidget
 from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, scrolled, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
-from daq_app.window.answer import owner
+from daq_app.window.subject import owner
 from daq_app.wording import tr, tr_noop
 
 WIDTH, HEIGHT = 720, 560  # of the page, before the font's scale

@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap, QStaticText
 
-from daq_app.qt.painted import PaintedWidget
-from daq_app.qt.shapes import blank, draw_line, fine, sheer
+from daq_app.qt.painting import PaintedWidget, blank, draw_line, fine, sheer
 from daq_app.qt.tokens import SMALL, font
 from daq_app.window.course_state import Mark
-from daq_app.window.live_trace import CHANNELS, Columns
-from daq_app.window.plot_scale import MARGIN, PlotScale, ticks, times
+from daq_app.window.live_trace import CHANNELS, MARGIN, Columns, PlotScale, ticks, times
 from daq_app.wording import tr, tr_noop
 
 Array = NDArray[np.float64]

@@ -7,31 +7,22 @@ from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import (
-    QAbstractButton,
-    QGridLayout,
-    QHBoxLayout,
-    QMainWindow,
-    QStackedWidget,
-    QWidget,
-)
+from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QMainWindow, QStackedWidget, QWidget
 
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
-from daq_app.qt.menus import Menus, Rail, Room
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import bare, fill, scrolled, vbox
-from daq_app.qt.remembered import restore_place, save_place
-from daq_app.qt.rooms import Rooms
+from daq_app.qt.preferences import restore_place, save_place
+from daq_app.qt.rooms import Menus, Rail, Room, Rooms
 from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_picture import open_preview
-from daq_app.qt.subject_side import SubjectSide
+from daq_app.qt.subject_side import SubjectSide, TabletScreen
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tablet_screen import TabletScreen
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline

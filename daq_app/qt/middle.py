@@ -1,20 +1,136 @@
 """The middle of the experimenter's window: the trials, the signals or an inspected trial, and the last stroke."""
 
+import math
 from collections.abc import Callable
 
-from PySide6.QtWidgets import QStackedWidget, QWidget
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QPushButton, QScrollArea, QStackedWidget, QWidget
 
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
-from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.parts import Panel, Wrapped, button, hbox, regrade, scrolled, vbox
-from daq_app.qt.tokens import GRID
+from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, spoken
+from daq_app.qt.live_plot import LivePlot
+from daq_app.qt.parts import Panel, Wrapped, button, hbox, label, named, regrade, say, scrolled, vbox
+from daq_app.qt.tokens import GRID, SMALL, TARGET
+from daq_app.window.course_state import Mark
+from daq_app.window.live_trace import Columns
+from daq_app.window.stroke_quality import PICTURE
 from daq_app.window.view_course import CourseView
-from daq_app.window.view_trials import inspection
+from daq_app.window.view_trials import KINDS, Inspection, Tile, inspection
 from daq_app.wording import tr
 
+TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}  # of the style sheet
 GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
 AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose stroke has begun
+
+
+class TrialStrip(QScrollArea):
+    """One row of tiles, which moves sideways where it is longer than its room; the trial in hand stays in sight."""
+
+    def __init__(self, scale: float, inspect: Callable[[int], None]) -> None:
+        """Show no trials; `inspect` is called with the number of the trial whose tile is pressed."""
+        super().__init__()
+        self._inspect = inspect
+        self._shown: tuple[Tile, ...] = ()
+        self.horizontalScrollBar().rangeChanged.connect(self._keep_in_sight)  # new tiles have their places then
+        self.tiles: list[QPushButton] = []
+        inside = QWidget()
+        self._row = hbox(1, on=inside, spacing=GRID // 2)
+        scrolled(inside, self)
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setAccessibleName(tr("trials of the session"))
+        lines = round((2 * SMALL + 2 * GRID) * scale)
+        self.setFixedHeight(max(lines, TARGET) + 12 + GRID // 2)  # with the scroll bar
+
+    def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
+        """Show the trials."""
+        if tiles == self._shown:
+            return
+        while len(self.tiles) > len(tiles):
+            gone = self.tiles.pop()
+            gone.hide()  # until it is deleted nobody can press it
+            gone.deleteLater()
+        while len(self.tiles) < len(tiles):
+            self._add()
+        for tile_button, tile in zip(self.tiles, tiles, strict=True):
+            text = f"{KINDS[tile.kind][0]} {tile.number}\n{tile.code}"
+            if tile_button.text() != text:
+                tile_button.setText(text)
+            tile_button.setAccessibleName(tile.words)
+            tile_button.setToolTip(tile.words)
+            regrade(tile_button, TILE_GRADES.get(tile.kind, ""))
+        self._shown = tiles
+        self._keep_in_sight()
+
+    def show_inspected(self, number: int | None) -> None:
+        """Show which trial is inspected; None: none is."""
+        for tile_button, tile in zip(self.tiles, self._shown, strict=True):
+            tile_button.setChecked(tile.number == number)
+
+    def _keep_in_sight(self) -> None:
+        current = next((at for at, tile in enumerate(self._shown) if tile.kind == "current"), None)
+        if current is not None:
+            self.ensureWidgetVisible(self.tiles[current], 8 * GRID, 0)
+
+    def _add(self) -> None:
+        at = len(self.tiles)
+        tile_button = button("", tr("trial"), lambda: self._inspect(self._shown[at].number), "tile", checkable=True)
+        tile_button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # a click leaves Space to the primary button
+        self.tiles.append(tile_button)
+        self._row.insertWidget(at, tile_button)
+
+
+class InspectedTrial(QWidget):
+    """Takes the place of the signals while a trial is inspected; readings go on behind it."""
+
+    def __init__(self, scale: float, back: Callable[[], None]) -> None:
+        """Show no trial; `back` returns to the signals."""
+        super().__init__()
+        self._shown: Inspection | None = None
+        self.heading = label("", "name", wrap=True)
+        self.verdict = label("", "title", wrap=True)
+        self.details = label("", "quiet", wrap=True)
+        self.cells = {name: label("–", "value") for name in PICTURE}
+        self._plots = [LivePlot(*plot, scale, PICTURE) for plot in PLOTS]
+        for plot in self._plots:
+            plot.show_times(plot is self._plots[-1])
+            plot.show_end(tr("end"))
+        head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
+        # Two means in a row find room at every size of type.
+        cells = named(((short_name(name), cell) for name, cell in self.cells.items()), 2)
+        plots = zip(self._plots, (3, 2, 2), strict=True)
+        vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
+
+    def show_trial(self, shown: Inspection) -> None:
+        """Show a trial."""
+        if shown == self._shown:
+            return
+        self._shown = shown
+        say(self.heading, shown.heading)
+        say(self.verdict, shown.verdict)
+        regrade(self.verdict, {"refused": "wrong", "doubtful": "look"}.get(shown.grade, ""))
+        say(self.details, shown.details)
+        self.details.setVisible(bool(shown.details))
+        for name, text in shown.cells:
+            say(self.cells[name], text)
+            self.cells[name].setAccessibleName(spoken(name, text))
+        for plot in self._plots:
+            plot.setVisible(shown.picture is not None)
+        if shown.picture is not None:
+            self._show_picture(shown)
+
+    def _show_picture(self, shown: Inspection) -> None:
+        picture = shown.picture
+        assert picture is not None
+        time = picture.time
+        end = float(time[-1]) if len(time) else 0.0
+        span = end - float(time[0]) if len(time) else 0.0
+        marks = [Mark("onset", picture.onset, picture.onset)] if picture.onset is not None else []
+        marks += [Mark("lift", picture.lift, picture.lift)] if picture.lift is not None else []
+        marks += [Mark("steady", *shown.steady)] if shown.steady is not None else []
+        for plot in self._plots:
+            plot.show_seconds(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
+            plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
 
 
 class Middle(QWidget):

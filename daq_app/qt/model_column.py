@@ -7,8 +7,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
-from daq_app.analyst.seen import (
+from daq_app.analyst.finger_words import (
     common_range,
     compared,
     film_words,
@@ -18,14 +17,22 @@ from daq_app.analyst.seen import (
     shown_film,
     was_tried,
 )
-from daq_app.analyst.shown import picture_errors, scene_table, session_pictures
+from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
+from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
 from daq_app.analyst.state import AnalystState, chosen
-from daq_app.qt.field_plot import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
-from daq_app.qt.finger_pictures import FILM_SUFFIXES, FilmWriter, write_picture
 from daq_app.qt.parts import Wrapped, button, choice, fill, hbox, vbox
-from daq_app.qt.picture_view import PICTURE, ComparedView, PictureView, SaveButtons
+from daq_app.qt.pictures import (
+    FILM_SUFFIXES,
+    PICTURE,
+    ComparedView,
+    FilmWriter,
+    PictureView,
+    SaveButtons,
+    write_picture,
+)
+from daq_app.qt.plots import LINE, OWN, FieldBar, FieldPlot
 from daq_app.qt.tables import TextTable
 from daq_app.qt.tokens import Tokens
 from daq_app.qt.transport_bar import TransportBar

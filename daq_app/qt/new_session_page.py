@@ -5,32 +5,15 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import (
-    QBoxLayout,
-    QButtonGroup,
-    QComboBox,
-    QCompleter,
-    QFileDialog,
-    QRadioButton,
-    QWidget,
-)
+from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
-from daq_app.qt.cards import CardFrame, CutShort, TransducerRow
+from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
 from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
-from daq_app.qt.screen_fields import ScreenFields
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.messages import LanguageChosen, Message
-from daq_app.window.new_session import (
-    AXES,
-    Bench,
-    SessionForm,
-    enrolled,
-    enrolment,
-    offered,
-    place_of,
-)
+from daq_app.window.new_session import AXES, Bench, SessionForm, enrolled, enrolment, offered, place_of
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names

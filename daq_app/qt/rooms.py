@@ -1,23 +1,206 @@
-"""The rooms of the window: a session that is prepared or run in one, recorded sessions in the other."""
+"""The ways through the window: its menu, the rail, and the rooms. Menu entries are acts that keys do too."""
 
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from platform import python_version
+from typing import TYPE_CHECKING, Literal
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFileDialog, QListWidget, QListWidgetItem, QStackedWidget, QWidget
+from PySide6.QtCore import Qt, QUrl, qVersion
+from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QListWidget,
+    QListWidgetItem,
+    QMainWindow,
+    QMenu,
+    QMessageBox,
+    QStackedWidget,
+    QToolButton,
+    QWidget,
+)
 
+from daq_app.qt import preferences
 from daq_app.qt.bridge import Bridge
-from daq_app.qt.menus import Menus, Rail, Room
-from daq_app.qt.parts import button, hbox, label, vbox
-from daq_app.qt.remembered import recent_sessions, remember_session
+from daq_app.qt.keys import KEYS
+from daq_app.qt.parts import Panel, button, hbox, label, vbox
+from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.window.messages import NewSession
-from daq_app.wording import tr
+from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
 if TYPE_CHECKING:
     from daq_app.qt.analyst_window import AnalystWindow
 
+Room = Literal["prepare", "run", "review"]
+ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
+WHY_NOT = {
+    "prepare": tr_noop("A session is being recorded: end it before the next is prepared."),
+    "run": tr_noop("No session is in hand: start one in Prepare."),
+}
+ROOM_NAMES: Mapping[Room, str] = {"prepare": tr_noop("Prepare"), "run": tr_noop("Run"), "review": tr_noop("Review")}
+KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
+WIDTH = 84  # before the font's scale [px]
+DOCS = Path(__file__).parents[2] / "docs" / "index.md"
+SESSION = (
+    ("redo", tr_noop("Redo…")),
+    ("undo", tr_noop("Undo the last redo")),
+    ("skip", tr_noop("Skip…")),
+    ("pause", tr_noop("Pause or go on")),
+    ("note", tr_noop("Note…")),
+    ("end", tr_noop("End…")),
+)
+PANELS = (
+    ("bench", tr_noop("Bench")),
+    ("drawer", tr_noop("Drawer: axes, sample, finger")),
+    ("mirror", tr_noop("The subject's page")),
+    ("inspect", tr_noop("Inspect the last trial")),
+    ("hold", tr_noop("Hold the picture")),
+    ("model", tr_noop("Live model at finite strain")),
+)
+LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
+
+
+class Rail(Panel):
+    """Three buttons, one for each room; that of the room that is shown stays pressed."""
+
+    def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
+        """Show that nothing is open; `go` is called with the room that is wanted."""
+        super().__init__(tr("rooms"), "strip")
+        self.buttons = {
+            room: button(
+                f"{tr(ROOM_NAMES[room])}\n{KEY[room]}",
+                tr(ROOM_NAMES[room]),
+                lambda room=room: go(room),
+                "rail",
+                checkable=True,
+            )
+            for room in ROOMS
+        }
+        vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
+        self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
+
+    def show_room(self, room: Room, *, in_hand: bool, over: bool) -> None:
+        """Show which room is open, and which can be; a session may be `in_hand`, or `over`."""
+        for name, widget in self.buttons.items():
+            widget.setChecked(name == room)
+            closed = (name == "prepare" and in_hand and not over) or (name == "run" and not in_hand)
+            widget.setEnabled(not closed)
+            widget.setToolTip(tr(WHY_NOT[name]) if closed else "")
+            widget.setAccessibleDescription(widget.toolTip())
+
+
+class Menus:
+    """Fills the menu bar of a window."""
+
+    def __init__(self, window: QMainWindow, act: Callable[[str], None], theme: Callable[[str], None]) -> None:
+        """Build the menu; `act` does what an entry stands for, `theme` takes a theme's name."""
+        self._window = window
+        self._act = act
+        bar = window.menuBar()
+        if (more := bar.findChild(QToolButton)) is not None:
+            more.setAccessibleName(tr("the rest of the menu"))
+        file = bar.addMenu(tr("&File"))
+        self._add(file, "open", tr("Open session…"))
+        self.recent = file.addMenu(tr("Open recent"))
+        self.recent.aboutToShow.connect(self._list_recent)
+        file.addSeparator()
+        self.report = self._add(file, "report", tr("Write report…"))
+        self.export = self._add(file, "export", tr("Export…"))
+        file.addSeparator()
+        self._add(file, "quit", tr("Quit"))
+        self.session = bar.addMenu(tr("&Session"))
+        self._add(self.session, "new", tr("New session"))
+        self.pilot = self._add(self.session, "pilot", tr("Pilot the protocol"))
+        self._add(self.session, "preview", tr("Preview the subject's pages"))
+        self._add(self.session, "tare", tr("Zero the bench"))
+        self.session.addSeparator()
+        self.course = [self._add(self.session, name, tr(words)) for name, words in SESSION]
+        view = bar.addMenu(tr("&View"))
+        for room in ROOMS:
+            self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
+        view.addSeparator()
+        self.themes = self._choices(view.addMenu(tr("Theme")), preferences.THEMES, preferences.theme(), theme)
+        sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
+        now = next((words for words, scale in sizes.items() if scale == preferences.type_scale()), "")
+        self.sizes = self._choices(
+            view.addMenu(tr("Font size")), tuple(sizes), now, lambda words: self._size(sizes[words])
+        )
+        spoken = {name_of(code): code for code in languages(EXPERIMENTER)}
+        self.languages = self._choices(
+            view.addMenu(tr("Language")),
+            tuple(spoken),
+            name_of(preferences.language()),
+            lambda words: self._speak(spoken[words]),
+        )
+        panels = view.addMenu(tr("Panels"))
+        for name, words in PANELS:
+            self._add(panels, name, tr(words))
+        self._add(view, "subject", tr("Subject's window"))
+        help_menu = bar.addMenu(tr("&Help"))
+        self._add(help_menu, "keys", tr("Keys"))
+        docs = help_menu.addAction(tr("Documentation"), lambda: QDesktopServices.openUrl(QUrl.fromLocalFile(str(DOCS))))
+        docs.setEnabled(DOCS.exists())
+        help_menu.addAction(tr("About daq-app"), lambda: about_box(window).show())
+
+    def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
+        """Offer what can be done now."""
+        for action in self.course:
+            action.setEnabled(in_hand and not over)
+        self.pilot.setEnabled(not in_hand)
+        for action in (self.report, self.export):
+            action.setEnabled(opened)
+
+    def _add(self, menu: QMenu, name: str, words: str) -> QAction:
+        """Return an entry; its key is shown, and stays with the window, which routes keys by their meaning."""
+        key = next((known.key for known in KEYS if known.act == name), "")
+        return menu.addAction(f"{words}\t{key}" if key else words, lambda: self._act(name))
+
+    def _choices(self, menu: QMenu, names: tuple[str, ...], now: str, take: Callable[[str], None]) -> QActionGroup:
+        group = QActionGroup(menu)
+        for name in names:
+            action = menu.addAction(tr(name).capitalize(), lambda name=name: take(name))
+            action.setCheckable(True)
+            action.setChecked(name == now)
+            group.addAction(action)
+        return group
+
+    def _size(self, scale: float) -> None:
+        preferences.choose_type_scale(scale)
+        self._act("type size")
+
+    def _speak(self, code: str) -> None:
+        preferences.choose_language(code)
+        self._act("language")
+
+    def _list_recent(self) -> None:
+        self.recent.clear()
+        listed = preferences.recent_sessions()
+        for place in listed:
+            self.recent.addAction(place.name, lambda place=place: self._act(f"open {place}"))
+        if not listed:
+            self.recent.addAction(tr("No session was recorded or opened yet")).setEnabled(False)
+
+
+def about_box(parent: QWidget) -> QMessageBox:
+    """Return a box with the versions, which goes when it is closed."""
+    box = QMessageBox(QMessageBox.Icon.NoIcon, tr("About daq-app"), about_words(), parent=parent)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    return box
+
+
+def about_words() -> str:
+    """Return the versions of the program and of what it stands on."""
+    known = [f"daq-app {_version('daq-app')}", f"Python {python_version()}", f"Qt {qVersion()}"]
+    return "\n".join((*known, *(f"{name} {_version(name)}" for name in LIBRARIES)))
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"
 
 
 class ReviewRoom(QWidget):

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF, QSettings, Qt, Signal
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QScreen
 from PySide6.QtWidgets import QLineEdit, QWidget
 
+from daq_app.qt.answer_fields import LENGTH
 from daq_app.qt.parts import button, hbox, label, say, vbox
-from daq_app.qt.score_line import LENGTH
+from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.wording import tr
 from sessions.recording import Setting
@@ -28,12 +29,6 @@ class Millimetres:
     def words(self) -> str:
         """Return where it comes from."""
         return "checked with a ruler" if self.checked else "as the screen says, not checked with a ruler"
-
-
-def settings() -> QSettings:
-    """Return what the window remembers on this computer: its looks, the screens' sizes, and folders of sessions."""
-    # A file on every system: the format that follows the system cannot be led elsewhere by a test.
-    return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
 
 
 def millimetres(screen: QScreen) -> Millimetres:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # Qt is loaded only once it is known that it can be
     from daq_app.qt.analyst_window import AnalystWindow
     from daq_app.qt.bridge import Client
     from daq_app.qt.main_window import MainWindow
-    from daq_app.qt.tablet_screen import TabletScreen
+    from daq_app.qt.subject_side import TabletScreen
     from daq_app.qt.tokens import Tokens
 
 SIMULATED_BENCH = "sim:?rate=200"
@@ -54,12 +54,12 @@ def window(arguments: list[str]) -> int:
         return _said(f"{folder} is no folder: give a session's folder")
 
     def analyst(application: "QApplication") -> "AnalystWindow":
-        from daq_app.qt import remembered
+        from daq_app.qt import preferences
         from daq_app.qt.analyst_window import AnalystWindow
 
-        tokens = remembered.chosen_tokens()
-        _dress(application, tokens, remembered.type_scale())
-        remembered.remember_session(folder)
+        tokens = preferences.chosen_tokens()
+        _dress(application, tokens, preferences.type_scale())
+        preferences.remember_session(folder)
         return AnalystWindow(folder, tokens)
 
     return _shown(analyst)
@@ -111,22 +111,22 @@ def opened(
     # The recorder's process starts while the window is being built.
     recorder = (start or Recorder.start)()
     recorder.send(Connect(SIMULATED_BENCH))
-    from daq_app.qt import remembered
+    from daq_app.qt import preferences
     from daq_app.qt.bridge import Bridge
     from daq_app.qt.main_window import MainWindow
 
     application.setQuitOnLastWindowClosed(False)
-    scale, tokens = remembered.type_scale(), theme or remembered.chosen_tokens()
+    scale, tokens = preferences.type_scale(), theme or preferences.chosen_tokens()
     _dress(application, tokens, scale)
     bridge = Bridge(recorder, start or Recorder.start)
     bridge.connecting(SIMULATED_BENCH)
     window = MainWindow(bridge, scale, tablet)
 
     def theme_changed() -> None:
-        _dress(application, remembered.chosen_tokens(), scale)
+        _dress(application, preferences.chosen_tokens(), scale)
 
     def theme_chosen(name: str) -> None:
-        remembered.choose_theme(name)
+        preferences.choose_theme(name)
         theme_changed()
 
     window.theme_wanted.connect(theme_chosen)
@@ -145,7 +145,7 @@ def opened(
 
 def _tablet(address: str | None) -> "TabletScreen":
     """Return the subject's page on a tablet. Raises NoTabletServer."""
-    from daq_app.qt.tablet_screen import TabletScreen
+    from daq_app.qt.subject_side import TabletScreen
     from daq_app.tablet.server import PORT
 
     return TabletScreen(address, PORT)
@@ -175,10 +175,10 @@ def _speak(application: "QApplication") -> None:
     """Give this process, those that it starts and Qt's own dialogs the experimenter's language."""
     from PySide6.QtCore import QLibraryInfo, QTranslator
 
-    from daq_app.qt import remembered
-    from daq_app.qt.languages import direction
+    from daq_app.qt import preferences
+    from daq_app.qt.preferences import direction
 
-    language = os.environ[VARIABLE] = remembered.language()
+    language = os.environ[VARIABLE] = preferences.language()
     application.setLayoutDirection(direction(language))
     own = QTranslator(application)
     if own.load(f"qtbase_{language}", QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)):

@@ -1,23 +1,29 @@
 """The chosen stroke: its curves and edges, its replay, what was decided about it, its numbers and its readings."""
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFormLayout, QTabWidget, QWidget
+from collections.abc import Callable
+
+from PySide6.QtCore import QSettings, Qt, Signal
+from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
+from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.messages import Edge
-from daq_app.analyst.shown import FRICTION_HEAD, friction_table, numbers
+from daq_app.analyst.session_words import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, chosen
-from daq_app.qt.decisions_bar import DecisionsBar
-from daq_app.qt.parts import hbox, label, scrolled, vbox
-from daq_app.qt.picture_view import SaveButtons
+from daq_app.analyst.stroke import Edge, History
+from daq_app.qt.parts import Wrapped, button, hbox, label, scrolled, vbox
+from daq_app.qt.pictures import SaveButtons
+from daq_app.qt.preferences import type_scale
 from daq_app.qt.stroke_view import StrokeView
 from daq_app.qt.tables import ReadingsTable, TextTable
-from daq_app.qt.tokens import GRID, Tokens
+from daq_app.qt.tokens import GRID, TEXT, Tokens, font
 from daq_app.qt.transport_bar import TransportBar
 from daq_app.wording import tr
 from sessions.report.contents import StrokeFinding
 
 NUMBERS, READINGS = range(2)  # tabs
+BY = "analyst/by"  # where the code is remembered
+NOBODY = "analyst"  # who decided, where nobody gave a code
+DRAGGED = "dragged by hand"
 
 
 class StrokeColumn(QWidget):
@@ -153,3 +159,100 @@ class StrokeColumn(QWidget):
         self.stroke.show_moment(at)
         if not self.player.playing:
             self.readings.go_to(at)
+
+
+class DecisionStack(QUndoStack):
+    """The session's file holds the decisions, and whatever it says is shown; `wanted` asks for the next line of it."""
+
+    wanted = Signal(bool)  # True: redo; False: undo
+
+    def show_history(self, history: History) -> None:
+        """Show what can be undone and redone; nothing is asked for by it."""
+        words = [self.text(at) for at in range(self.count())]
+        if (*history.done, *history.undone) == tuple(words) and len(history.done) == self.index():
+            return
+        self.blockSignals(True)  # each command that is pushed is done, and one that is left is undone
+        self.clear()
+        for one in (*history.done, *history.undone):
+            self.push(_Decision(one, self.wanted.emit))
+        self.setIndex(len(history.done))
+        self.blockSignals(False)
+        self.indexChanged.emit(self.index())
+
+
+class _Decision(QUndoCommand):
+    def __init__(self, words: str, ask: Callable[[bool], object]) -> None:
+        super().__init__(words)
+        self._ask = ask
+
+    def undo(self) -> None:
+        self._ask(False)
+
+    def redo(self) -> None:
+        self._ask(True)
+
+
+class DecisionsBar(QWidget):
+    """A code, a reason, undo and redo; under them what was decided about the chosen stroke."""
+
+    requested = Signal(object)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.by = QLineEdit(str(QSettings().value(BY, "")))
+        self.by.setPlaceholderText(NOBODY)
+        self.by.setAccessibleName(tr("code of who decides; never a name"))
+        self.by.setMaximumWidth(round(110 * type_scale()))
+        self.by.editingFinished.connect(lambda: QSettings().setValue(BY, self.by.text()))
+        self.why = QLineEdit()
+        self.why.setPlaceholderText(DRAGGED)
+        self.why.setMinimumWidth(QFontMetrics(font(TEXT, type_scale())).horizontalAdvance(DRAGGED) + 3 * GRID)
+        self.why.setAccessibleName(tr("why an edge is moved"))
+        self.stack = DecisionStack(self)
+        self.stack.wanted.connect(self._ask)
+        self.stack.indexChanged.connect(self._show_next)
+        self.undo = button(tr("Undo"), "", self.stack.undo, "small")
+        self.redo = button(tr("Redo"), "", self.stack.redo, "small")
+        self._show_next()
+        self.sentences_label = Wrapped("value", "look")
+        vbox(
+            hbox(
+                label(tr("by"), "quiet"),
+                self.by,
+                label(tr("why"), "quiet"),
+                (self.why, 1),
+                self.undo,
+                self.redo,
+                spacing=GRID // 2,
+            ),
+            self.sentences_label,
+            on=self,
+            spacing=GRID // 2,
+        )
+
+    def who(self) -> str:
+        """Return the code of who decides."""
+        return self.by.text().strip() or NOBODY
+
+    def reason(self) -> str:
+        """Return why."""
+        return self.why.text().strip() or DRAGGED
+
+    def show_decided(self, sentences: tuple[str, ...], history: m.History) -> None:
+        """Show what was decided about a stroke, and what of the session can be undone."""
+        self.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
+        self.stack.show_history(history)
+
+    def _ask(self, again: bool) -> None:
+        self.requested.emit(m.Undo(self.who(), again))
+
+    def _show_next(self) -> None:
+        """Say on each button what it would do next."""
+        stack = self.stack
+        for widget, can, words in (
+            (self.undo, stack.canUndo(), tr("undo {decision}, Ctrl+Z", decision=stack.undoText())),
+            (self.redo, stack.canRedo(), tr("redo {decision}, Ctrl+Shift+Z", decision=stack.redoText())),
+        ):
+            widget.setEnabled(can)
+            widget.setAccessibleName(words if can else tr("{button}: no decision", button=widget.text()))
+            widget.setToolTip(widget.accessibleName())

@@ -7,15 +7,13 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
-from daq_app.analyst.edges import LEAP, STEP, Placed, edges_of, within
-from daq_app.analyst.messages import EDGES, Edge
-from daq_app.analyst.probe import read_out
-from daq_app.analyst.raw import RawReadings
+from daq_app.analyst.frame import read_out
+from daq_app.analyst.stroke import EDGES, LEAP, STEP, Edge, Placed, RawReadings, edges_of, within
+from daq_app.qt.painting import sheer
 from daq_app.qt.parts import hbox, vbox
-from daq_app.qt.remembered import type_scale
-from daq_app.qt.shapes import sheer
+from daq_app.qt.plots import ZoomedPlot, pg
+from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MU, SMALL, N, T, Tokens, font
-from daq_app.qt.zoomed_plot import ZoomedPlot, pg
 from daq_app.wording import tr, tr_noop
 from sessions.report.contents import StrokeFinding
 

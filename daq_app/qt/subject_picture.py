@@ -6,15 +6,11 @@ from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent
 from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
-from daq_app.qt.drawer import Openness
-from daq_app.qt.languages import missing_glyphs, translator
-from daq_app.qt.parts import Wrapped, button, hbox, label, vbox
+from daq_app.qt.parts import Openness, Wrapped, button, hbox, label, vbox
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.tokens import GRID
+from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.window.new_session import Refused, SessionForm
-from daq_app.window.preview import PreviewPage, preview
-from daq_app.window.subject_texts import SubjectText
-from daq_app.window.view_subject import SubjectView
+from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, preview, translator
 from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH
 

@@ -6,15 +6,13 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
-from daq_app.qt.free_answers import ChoiceOfTwo, NumberField
-from daq_app.qt.indicators import PressBar
-from daq_app.qt.languages import direction, translator
+from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
 from daq_app.qt.parts import button, fill, hbox, label, say, vbox
-from daq_app.qt.score_line import ScoreLine
+from daq_app.qt.preferences import direction
 from daq_app.qt.screens import Millimetres, RulerCheck, millimetres
 from daq_app.qt.tokens import GRID, font
-from daq_app.window.subject_texts import SubjectText as Text
-from daq_app.window.view_subject import Kind, SubjectView
+from daq_app.window.subject import Kind, SubjectView, translator
+from daq_app.window.subject import SubjectText as Text
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.languages import ENGLISH
 

@@ -8,7 +8,7 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelInd
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
-from daq_app.analyst.raw import RawReadings
+from daq_app.analyst.stroke import RawReadings
 from daq_app.qt.parts import Wrapped, vbox
 from daq_app.qt.tokens import GRID
 from daq_app.wording import tr, tr_noop

@@ -1,6 +1,8 @@
 """Colours, sizes and type of the window: one set of tokens for light and dark, and the style sheet made of it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from unicodedata import category, normalize
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetrics, QGuiApplication, QPalette
@@ -208,3 +210,11 @@ QScrollBar::handle:horizontal {{ background: {t.line}; border-radius: 4px; min-w
 QScrollBar::add-line:horizontal, QScrollBar::sub-line:horizontal {{ width: 0; }}
 QToolTip {{ background: {t.raised}; color: {t.text}; border: 1px solid {t.line}; padding: 4px; }}
 """
+
+
+def missing_glyphs(texts: Iterable[str], font: QFont) -> str:
+    """Return the characters of texts, each once, that neither the font nor one that stands in for it can draw."""
+    drawn, characters = QFontMetrics(font), set(normalize("NFC", "".join(texts)))
+    return "".join(
+        sorted(c for c in characters if not (c.isspace() or category(c) == "Cf" or drawn.inFontUcs4(ord(c))))
+    )

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from daq_app.tablet.messages import LARGEST, FromTablet, Hello, Refused, ToTablet, Welcome, read, written
+from daq_app.tablet.dialogue import LARGEST, FromTablet, Hello, Refused, ToTablet, Welcome, read, written
 
 if TYPE_CHECKING:  # an optional package
     from websockets.http11 import Request, Response

@@ -1,7 +1,8 @@
-"""From the recorder's live messages to what is drawn, and to the readings of the take in hand."""
+"""From the recorder's live messages to what is drawn, how far the transducer is loaded, and the readings of a take."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
@@ -9,8 +10,9 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live, Report, Six
-from daq_app.window.bench_load import Load, load_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
+from daq_app.wording import tr_noop
+from drivers.calibration import ALARM, ALARM_COMBINED, WARNING, loads
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
@@ -19,11 +21,53 @@ from sessions.strokes.settings import RatioSettings
 
 Array = NDArray[np.float64]
 
+AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+
 FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
 ARRAYS = ("sequence", "time", "received_ns", "wrench", "status")  # of live readings
 KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
+
+    axes: tuple[float, ...] = (0.0,) * 6
+    combined: float = 0.0  # see `drivers.loads`
+
+    def latched(self, other: "Load") -> "Load":
+        """Return the greater of each share.
+
+        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0), 0.9).latched(Load((0.2,) * 6, 0.4)).axes
+        (0.2, 0.2, 0.9, 0.2, 0.2, 0.2)
+        """
+        pairs = zip(self.axes, other.axes, strict=True)
+        return Load(tuple(float(np.fmax(a, b)) for a, b in pairs), float(np.fmax(self.combined, other.combined)))
+
+    @property
+    def over(self) -> tuple[str, ...]:
+        """Return the names of what is beyond its rated load."""
+        over = tuple(name for name, share in zip(AXES, self.axes, strict=True) if share > ALARM)
+        return (*over, tr_noop("combined")) if self.combined > ALARM_COMBINED else over
+
+    @property
+    def near(self) -> tuple[str, ...]:
+        """Return the names of what is near its rated load, or beyond it."""
+        named = zip((*AXES, "combined"), (*self.axes, self.combined), strict=True)
+        return tuple(name for name, share in named if share > WARNING)
+
+
+def load_of(wrench: Array, rated: Array) -> Load:
+    """Return the greatest load within readings (n, 6) [N, N mm] of a transducer with rated ranges (6,) [N, N mm].
+
+    `wrench` is as felt: what strains the transducer includes its zero.
+    """
+    if not len(wrench):
+        return Load()
+    greatest = loads(wrench, rated).max(axis=0)
+    return Load(tuple(greatest[:6].tolist()), float(greatest[6]))
 
 
 def together(reports: Iterable[Report]) -> Iterator[Report]:

@@ -4,7 +4,7 @@ from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.bench_load import Load
+from daq_app.window.live_feed import Load
 from daq_app.window.stroke_quality import Quality
 from drivers.catalog import Probe
 

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from daq_app.recorder.messages import Kind, People, StartSession
-from daq_app.window.bench_state import BenchState
+from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
@@ -319,8 +319,7 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     seed = form.seed.strip()
     if seed and not (seed.isascii() and seed.isdigit() and int(seed) <= LARGEST_SEED):
         wrong["seed"] = tr(
-            "A seed is a whole number from 0 to {largest}; leave it empty for a new one.",
-            largest=LARGEST_SEED,
+            "A seed is a whole number from 0 to {largest}; leave it empty for a new one.", largest=LARGEST_SEED
         )
     height = _number(form.height)
     if form.height.strip() and (height is None or not abs(height) <= HIGHEST):
@@ -330,9 +329,7 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     area = _number(form.area)
     if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):
         wrong["area"] = tr(
-            "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.",
-            least=AREAS[0],
-            most=AREAS[1],
+            "An area is a number of mm² from {least:.0f} to {most:.0f}, or left empty.", least=AREAS[0], most=AREAS[1]
         )
     place = Path(form.folder.strip() or ".").expanduser()
     existing = next((p for p in (place, *place.parents) if p.exists()), place)

@@ -1,14 +1,157 @@
 """What the window knows: one frozen state, and how each message changes it. No Qt, no clock, no file."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import numpy as np
 
 from daq_app.recorder import messages as m
-from daq_app.window.bench_state import BenchState, bench_after
+from daq_app.recorder.device_history import Life
 from daq_app.window.course_state import SessionState, session_after, session_begun
-from daq_app.window.messages import Dismissed, DrawingFailed, LanguageChosen, Message, NewSession, Tick
+from daq_app.window.live_feed import Load
+from daq_app.window.messages import (
+    DevicesFound,
+    Dismissed,
+    DrawingFailed,
+    LanguageChosen,
+    LifeKnown,
+    Loaded,
+    Message,
+    NewSession,
+    Searching,
+    Tick,
+)
+from daq_app.wording import tr
+from drivers.catalog import Probe
+from drivers.transducer import Health, TransducerInfo
+from sessions.plan.plan import Frame
 from sessions.plan.protocols.languages import ENGLISH
+from sessions.recording import LoggedEvent
 
+Six = tuple[float, float, float, float, float, float]
+Link = Literal["none", "connecting", "open", "lost"]
 _FROM_RECORDER = frozenset(m.REPORTS)
+
+
+@dataclass(frozen=True, slots=True)
+class Zero:
+    """A measured zero of the bench."""
+
+    mean: Six  # in force, nothing subtracted [N, N mm]
+    noise: Six  # standard deviation [N, N mm]
+    readings: int
+    duration: float  # [s]
+
+
+@dataclass(frozen=True, slots=True)
+class BenchState:
+    """The transducer, and whether to trust it."""
+
+    link: Link = "none"
+    uri: str = ""
+    info: TransducerInfo | None = None
+    frame: Frame | None = None  # of a bench that knows it
+    problem: str | None = None  # why the link is lost, or was not made
+    searching: bool = False
+    searched: bool = False  # a search has ended since somebody connected or let go
+    devices: tuple[Probe, ...] = ()
+    health: Health = field(default_factory=Health)
+    rate: float = float("nan")  # measured [Hz]
+    load: Load = field(default_factory=Load)
+    peak: Load = field(default_factory=Load)  # since somebody acknowledged it
+    saturated: int = 0  # since somebody acknowledged it
+    taring: bool = False
+    zero: Zero | None = None  # the latest
+    first_zero: Zero | None = None  # the first since the bench was connected
+    life: Life | None = None  # of its serial number, where anything is kept of it
+
+
+def bench_after(bench: BenchState, message: Message) -> BenchState:
+    """Return the bench after a message; the same object where it does not concern the bench."""
+    match message:
+        case m.Connect() | m.Device() | m.NoDevice() | m.LinkDown() | m.LinkBack() | m.Failed():
+            return _linked(bench, message)
+        case m.SessionEnded() | m.Gone():
+            return _left(bench, message)
+        case m.Tare() | m.Tared() | LoggedEvent(kind="zeroed"):
+            return _tared(bench, message)
+        case m.HealthReport():
+            # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
+            peak = Load(tuple(message.peak), message.combined_peak)
+            return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
+        case Loaded(load):
+            return replace(bench, load=load, peak=bench.peak.latched(load))
+        case LifeKnown(serial, life) if bench.info is not None and bench.info.serial == serial:
+            return replace(bench, life=life)
+        case m.AcknowledgeOverloads():
+            return replace(bench, peak=Load(), saturated=0)
+        case Searching():
+            return replace(bench, searching=True)
+        case DevicesFound(devices):
+            return replace(bench, searching=False, searched=True, devices=devices)
+        case _:
+            return bench
+
+
+def _linked(
+    bench: BenchState, message: m.Connect | m.Device | m.NoDevice | m.LinkDown | m.LinkBack | m.Failed
+) -> BenchState:
+    match message:
+        case m.Connect(uri):
+            return BenchState(link="connecting", uri=uri, devices=bench.devices)
+        case m.Device(info, frame):
+            return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
+        case m.NoDevice():
+            return BenchState(devices=bench.devices, problem=bench.problem)
+        case m.LinkDown(sentence):
+            return replace(bench, link="lost", problem=sentence)
+        case m.LinkBack(info, same):
+            problem = (
+                None if same else tr("another transducer answers now, with serial number {serial}", serial=info.serial)
+            )
+            return replace(bench, link="open" if same else "lost", problem=problem)
+        case m.Failed():
+            return _not_done(bench, message)
+
+
+def _left(bench: BenchState, message: m.SessionEnded | m.Gone) -> BenchState:
+    """Return the bench after a session or the recorder has let go of it."""
+    match message:
+        case m.SessionEnded(end=end) if end.cause == "device":
+            return replace(bench, link="lost", problem=end.reason)
+        case m.Gone(requested=False):
+            return BenchState(devices=bench.devices)  # the recorder's process held the transducer
+        case _:
+            return bench
+
+
+def _tared(bench: BenchState, message: m.Tare | m.Tared | LoggedEvent) -> BenchState:
+    match message:
+        case m.Tare():
+            return replace(bench, taring=True)
+        case m.Tared(mean, spread, _, readings, duration):
+            return _zeroed(replace(bench, taring=False), mean, spread, readings, duration)
+        case LoggedEvent(data=data):
+            return _zeroed(bench, data["mean"], data["spread"], data["readings"], data["duration"])
+
+
+def _not_done(bench: BenchState, failed: m.Failed) -> BenchState:
+    """Return the bench after a request that could not be met."""
+    if failed.request == "Connect":
+        return BenchState(devices=bench.devices, problem=failed.sentence)
+    return replace(bench, taring=False) if failed.request == "Tare" else bench
+
+
+def _zeroed(bench: BenchState, mean: Any, spread: Any, readings: int, duration: float) -> BenchState:  # noqa: ANN401
+    """Return the bench with a zero given in raw units, (6,) each."""
+    if bench.info is None or len(mean) != 6:
+        return bench
+    matrix = bench.info.calibration.matrix
+    force = tuple((matrix @ np.asarray(mean, float)).tolist())
+    # Noise of the axes is taken as independent in raw units: exact where the box has combined the gauges itself.
+    noise = tuple(np.sqrt(matrix**2 @ np.asarray(spread, float) ** 2).tolist())
+    zero = Zero(force, noise, readings, duration)  # type: ignore[arg-type]  # six of each, as `matrix` has rows
+    return replace(bench, zero=zero, first_zero=bench.first_zero or zero)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,11 +79,7 @@ class Quality:
 
 
 def stroke_quality(
-    block: ReadingBlock,
-    plan: SessionPlan,
-    info: TransducerInfo,
-    trial: Trial,
-    settings: AnalysisSettings | None = None,
+    block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial, settings: AnalysisSettings | None = None
 ) -> Quality:
     """Return the quality of the stroke in the readings of one take, judged as the analysis of a recording judges it."""
     analysis = analyse_blocks([(trial, block)], plan, info, settings or AnalysisSettings())

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.recorder import messages as m
-from daq_app.window.bench_state import BenchState
 from daq_app.window.course_state import IN_A_TRIAL, SessionState, TrialState, redo_targets
 from daq_app.window.messages import Message, NewSession
+from daq_app.window.state import BenchState
 from daq_app.window.stroke_quality import Quality
 from daq_app.window.view_trials import Tile, tiles
 from daq_app.wording import tr, tr_noop

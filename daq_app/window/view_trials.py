@@ -66,11 +66,7 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     kind = _kind(session, trial)
     again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
     heading = tr(
-        "Trial {number}, {code}{again}: {state}",
-        number=number,
-        code=trial.code,
-        again=again,
-        state=tr(KINDS[kind][1]),
+        "Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=tr(KINDS[kind][1])
     )
     shown = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in shown:

@@ -14,16 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.edges import APART, brought_back, decision_of, edges_of, history, taken_back, within
+from daq_app.analyst.finger_words import compared, finger_words
 from daq_app.analyst.frame import FIELD_ERRORS, Contact, Finger, Frame, Parts
-from daq_app.analyst.lineage import lineage
-from daq_app.analyst.messages import EDGES
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.seen import compared, finger_words
-from daq_app.analyst.shown import numbers, points, progress_words, row_words, session_pictures
+from daq_app.analyst.session_words import lineage, numbers, points, progress_words, row_words, session_pictures
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
-from daq_app.analyst.transport import Transport
+from daq_app.analyst.stroke import APART, EDGES, brought_back, decision_of, edges_of, history, taken_back, within
 from daq_app.analyst.work import Work
+from daq_app.qt.transport_bar import Transport
 from sessions.recording.derived import set_gain_error
 from sessions.strokes.decisions import Decision, Decisions, read
 from tests.sessions.report_example import example

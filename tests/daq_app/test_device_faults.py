@@ -16,8 +16,8 @@ from daq_app.cli.main import run
 from daq_app.recorder.messages import HealthReport
 from daq_app.simulation import wiring
 from daq_app.simulation.wiring import connected
-from daq_app.window.bench_state import BenchState, bench_after
-from daq_app.window.view_bench import bench_view
+from daq_app.window.state import BenchState, bench_after
+from daq_app.window.view import bench_view
 from drivers.clock import RealClock
 from drivers.transducer import Health
 from sessions.plan.protocols import plan, protocol

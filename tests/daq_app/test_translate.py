@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import pytest
 
 from daq_app.cli.main import run
-from daq_app.window.subject_texts import SubjectText
+from daq_app.window.subject import SubjectText
 from daq_app.wording import translations
 from sessions.plan.protocols import plan, protocol
 from sessions.plan.protocols.planning import VisitSetting

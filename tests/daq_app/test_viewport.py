@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from daq_app.analyst.frame import FIELD_CHOICES, Contact, Frame, Parts, SkinLine, View, automatic_range
-from daq_app.analyst.probe import along_line, along_skin, probe_words, value_at
+from daq_app.analyst.frame import (
+    FIELD_CHOICES,
+    Contact,
+    Frame,
+    Parts,
+    SkinLine,
+    View,
+    along_line,
+    along_skin,
+    automatic_range,
+    probe_words,
+    value_at,
+)
 
 NONE = np.empty(0)
 BY_NAME = {field.name: field for field in FIELD_CHOICES}

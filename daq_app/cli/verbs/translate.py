@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from daq_app.console import DONE, Console, WrongValue
-from daq_app.window.subject_texts import SubjectText, usual_question
+from daq_app.window.subject import SubjectText, usual_question
 from daq_app.wording import EXPERIMENTER, SUBJECT, translations
 from sessions.file_access import write_whole
 from sessions.plan.protocols import protocol

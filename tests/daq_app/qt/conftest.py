@@ -11,7 +11,7 @@ from examples import short_protocol
 from PySide6.QtCore import QEvent, QSettings
 from PySide6.QtWidgets import QApplication
 
-from daq_app.qt.screens import settings
+from daq_app.qt.preferences import settings
 from daq_app.qt.start import opened
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.client import Recorder

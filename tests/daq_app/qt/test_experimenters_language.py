@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from daq_app import wording
 from daq_app.cli.verbs.translate import window_texts
-from daq_app.qt import remembered
+from daq_app.qt import preferences
 from daq_app.wording import EXPERIMENTER, VARIABLE, languages, tr, translations
 from sessions.exchange import FORMATS
 from sessions.plan.protocols import protocol_names
@@ -151,9 +151,9 @@ def test_the_language_chosen_in_the_menu_is_that_of_the_next_start(driver):
     assert names == ["English (en)", "Xx"] or len(names) == len(languages(EXPERIMENTER))
     assert spoken.checkedAction() is spoken.actions()[-1]
     spoken.actions()[0].trigger()
-    assert remembered.language() == "en"
+    assert preferences.language() == "en"
     spoken.actions()[-1].trigger()
-    assert remembered.language() == "xx"
+    assert preferences.language() == "xx"
 
 
 def test_a_process_that_is_started_speaks_the_language_of_the_environment(tmp_path):

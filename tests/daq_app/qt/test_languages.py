@@ -6,9 +6,8 @@ from PySide6.QtGui import QAccessible, QFont
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QLabel
 
-from daq_app.qt import languages
-from daq_app.window.subject_texts import SubjectText
-from daq_app.window.view_subject import SubjectView
+from daq_app.qt.tokens import missing_glyphs
+from daq_app.window.subject import SubjectText, SubjectView, translator
 from daq_app.wording import SUBJECT, translations
 from sessions.plan.protocols import protocol
 
@@ -33,13 +32,13 @@ def test_each_file_has_every_text_with_its_words_in_braces(language):
 
 
 def test_a_language_that_the_program_does_not_speak_leaves_its_own_texts_english():
-    assert languages.translator("nl")(SubjectText.NEXT) == "Next"
+    assert translator("nl")(SubjectText.NEXT) == "Next"
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize("language", ["en", *OTHERS])
 def test_no_text_of_the_page_is_clipped_however_large_the_type(shown, language, scale):
-    words = languages.translator(language)
+    words = translator(language)
     for name in ("sensotact-friction", "magnitude-estimation"):
         block = protocol(name).in_language(language).blocks[1]
         for view in (
@@ -85,13 +84,13 @@ def test_next_stays_at_the_answering_hand_in_every_language(shown):
 
 @pytest.mark.usefixtures("application")
 def test_a_character_that_no_font_draws_is_named():
-    assert languages.missing_glyphs(["Hello, 5"], QFont()) == ""
-    assert languages.missing_glyphs(["a \U000f0000 b"], QFont()) == "\U000f0000"
+    assert missing_glyphs(["Hello, 5"], QFont()) == ""
+    assert missing_glyphs(["a \U000f0000 b"], QFont()) == "\U000f0000"
 
 
 @pytest.mark.parametrize("language", OTHERS)
 def test_screen_readers_speak_the_language_of_the_page_and_tell_the_line_as_a_slider(shown, language):
-    words = languages.translator(language)
+    words = translator(language)
     page = shown(SubjectView("line", "?", ends=("low", "high"), key=(1, 1), language=language))
     named = words(SubjectText.LINE).format(low="low", high="high")
     said = QAccessible.queryAccessibleInterface(page.line)

@@ -20,24 +20,23 @@ from PySide6.QtWidgets import (
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import FIELD_CHOICES
 from daq_app.analyst.state import chosen
-from daq_app.qt import remembered, tokens
+from daq_app.qt import preferences, tokens
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.finger_canvas import FingerCanvas
-from daq_app.qt.languages import translator
 from daq_app.qt.live_panel import PLOTS
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.main_window import MainWindow
-from daq_app.qt.menus import about_box
+from daq_app.qt.plots import ZoomedPlot
+from daq_app.qt.rooms import about_box
 from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.qt.zoomed_plot import ZoomedPlot
 from daq_app.window.course_state import Mark
+from daq_app.window.live_model import ModelWords
 from daq_app.window.live_trace import CHANNELS, Columns
 from daq_app.window.messages import Judged
 from daq_app.window.new_session import SessionForm
-from daq_app.window.preview import preview
+from daq_app.window.subject import preview, translator
 from daq_app.window.view import derive_view
-from daq_app.window.view_model import ModelWords
 from sessions.plan.protocols import protocol, protocol_names
 from tests.daq_app.qt.painted_text import cut_or_colliding, painted_texts
 from tests.daq_app.qt.review.examples import SESSION, Nobody, film
@@ -257,8 +256,8 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
 @pytest.fixture
 def type_size():
     """Return what chooses a size of type; the usual one comes back."""
-    yield remembered.choose_type_scale
-    remembered.choose_type_scale(None)
+    yield preferences.choose_type_scale
+    preferences.choose_type_scale(None)
 
 
 @pytest.mark.parametrize(

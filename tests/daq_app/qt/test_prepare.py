@@ -9,7 +9,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QLabel
 from qt_events import wheel
 
-from daq_app.qt.free_answers import NumberField
+from daq_app.qt.answer_fields import NumberField
 from daq_app.recorder.messages import Connect, Disconnect
 from daq_app.window.messages import DevicesFound, Searching
 from daq_app.window.new_session import Unfinished

@@ -7,12 +7,9 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QPushButton
 
-from daq_app.qt.languages import translator
 from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.window.new_session import SessionForm
-from daq_app.window.preview import PreviewPage, preview
-from daq_app.window.subject_texts import SubjectText
-from daq_app.window.view_subject import SubjectView
+from daq_app.window.subject import PreviewPage, SubjectText, SubjectView, preview, translator
 
 pytestmark = pytest.mark.qt
 PACE = 1.0  # no test here waits for a session

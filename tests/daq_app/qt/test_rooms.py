@@ -8,8 +8,8 @@ from PySide6.QtCore import QSize, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QMenu, QWidget
 
-from daq_app.qt import remembered, tokens
-from daq_app.qt.menus import about_words
+from daq_app.qt import preferences, tokens
+from daq_app.qt.rooms import about_words
 from daq_app.recorder.messages import Stop
 from tests.daq_app.qt.test_session_by_keyboard import begin
 
@@ -48,13 +48,13 @@ def test_theme_and_size_of_type_are_chosen_and_remembered(driver):
         assert plot.grab().toImage().pixelColor(1, 1).name() == tokens.DARK.surface  # what is painted by hand follows
         driver.application.processEvents()
         assert page._picture.toImage().pixelColor(2, 2).name() == tokens.DARK.ground
-        assert remembered.chosen_tokens() == tokens.DARK
+        assert preferences.chosen_tokens() == tokens.DARK
         found["150 %"].trigger()
-        assert remembered.type_scale() == 1.5
+        assert preferences.type_scale() == 1.5
         assert "next start" in window.notice._words.text()
     finally:
         found["System"].trigger()
-        remembered.choose_type_scale(None)
+        preferences.choose_type_scale(None)
 
 
 def test_the_rail_opens_the_rooms_that_can_be_entered_and_says_why_another_cannot(driver, rooms):
@@ -79,7 +79,7 @@ def test_a_session_that_has_ended_is_opened_with_the_mouse_and_a_key_leads_back(
     QTest.mouseClick(window.to_do.second, Qt.MouseButton.LeftButton)
     assert rooms.room == "review"
     assert rooms.analyst.state.folder == folder
-    assert remembered.recent_sessions()[0] == folder.absolute()
+    assert preferences.recent_sessions()[0] == folder.absolute()
     assert rooms.review.recent.item(0).text() == folder.name
     QTest.keyClick(rooms.analyst.trials.list, Qt.Key.Key_F3)  # from wherever the keyboard is
     assert rooms.room == "run"
@@ -98,14 +98,14 @@ def test_a_key_of_the_course_leads_back_from_review_and_does_nothing_unseen(driv
 def test_review_opens_on_the_newest_session_and_a_click_on_another_takes_its_place(driver, rooms, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
-    remembered.remember_session(other)
-    remembered.remember_session(SESSION)
+    preferences.remember_session(other)
+    preferences.remember_session(SESSION)
     driver.window.act("go to review")
     assert rooms.analyst.state.folder == SESSION.absolute()
     rooms.review.recent.itemClicked.emit(rooms.review.recent.item(1))
     assert rooms.analyst.state.folder == other
     other.rmdir()
-    assert other not in remembered.recent_sessions()  # what is gone is not offered
+    assert other not in preferences.recent_sessions()  # what is gone is not offered
 
 
 def test_every_entry_of_the_menu_does_something_and_course_entries_wait_for_a_session(driver, rooms):
@@ -131,21 +131,21 @@ def test_the_window_opens_where_it_was_closed(driver):
     before.setGeometry(60, 40, 444, 333)
     before.show()
     driver.application.processEvents()
-    remembered.save_place(before)
-    remembered.restore_place(after)
+    preferences.save_place(before)
+    preferences.restore_place(after)
     assert after.geometry() == before.geometry()
     before.close()
 
 
 @pytest.mark.usefixtures("application")
 def test_a_window_opens_for_the_first_time_as_large_as_it_likes_where_the_screen_has_room(monkeypatch):
-    monkeypatch.setattr(remembered, "settings", lambda: SimpleNamespace(value=lambda _: None))
+    monkeypatch.setattr(preferences, "settings", lambda: SimpleNamespace(value=lambda _: None))
     window = QWidget()
     screen = window.screen().availableSize()
     for likes, takes in (((0.9, 0.8), (0.9, 0.8)), ((2.0, 0.5), (1.0, 0.5))):
         wanted, taken = (QSize(int(screen.width() * a), int(screen.height() * b)) for a, b in (likes, takes))
         window.sizeHint = lambda wanted=wanted: wanted
-        remembered.restore_place(window)
+        preferences.restore_place(window)
         assert window.size().height() == taken.height()
         assert taken.width() - 16 <= window.width() <= taken.width()
 

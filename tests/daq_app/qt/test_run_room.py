@@ -5,10 +5,10 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
-from daq_app.qt import screens, tokens
-from daq_app.qt.inspected_trial import InspectedTrial, TrialStrip
+from daq_app.qt import preferences, tokens
 from daq_app.qt.live_panel import LivePanel
-from daq_app.qt.remembered import DRAWER, DRAWER_SIZES
+from daq_app.qt.middle import InspectedTrial, TrialStrip
+from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import CHANNELS, LiveTrace
 from daq_app.window.messages import NewSession
@@ -79,7 +79,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         QTest.keyClick(window, Qt.Key.Key_D)
         assert not live.map.isVisible()
         assert live.tab.accessibleName().startswith("open the drawer")
-        assert screens.settings().value(DRAWER) == "no"
+        assert preferences.settings().value(DRAWER) == "no"
         again = LivePanel(window.bridge.feed, window.bridge.model, 1.0)
         assert not again.drawer.open
         click(live.tab)
@@ -99,7 +99,7 @@ def test_the_drawer_is_opened_by_key_and_mouse_and_remembers_that_and_its_width(
         again.hide()
     finally:
         for key in (DRAWER, DRAWER_SIZES):
-            screens.settings().remove(key)
+            preferences.settings().remove(key)
         window.resize(1440, 900)
 
 
@@ -113,7 +113,7 @@ def test_where_there_is_no_room_for_both_the_drawer_takes_the_place_of_the_strok
         assert not live.plots[0].isVisible()
         QTest.keyClick(window, Qt.Key.Key_D)
         assert live.plots[0].isVisible()
-        assert screens.settings().value(DRAWER) is None  # what there was no room for is no wish
+        assert preferences.settings().value(DRAWER) is None  # what there was no room for is no wish
     finally:
         window.resize(1440, 900)
 

@@ -3,7 +3,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from daq_app.qt.shapes import faces, lines
+from daq_app.qt.painting import faces, lines
 
 pytestmark = pytest.mark.qt
 

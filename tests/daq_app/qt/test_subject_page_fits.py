@@ -8,9 +8,9 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QLabel
 
 from daq_app.qt import tokens
-from daq_app.qt.indicators import FULL, PressBar
+from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.subject_window import LARGER
-from daq_app.window.view_subject import SubjectView
+from daq_app.window.subject import SubjectView
 from tests.daq_app.qt.written_text import cut_off
 
 pytestmark = pytest.mark.qt

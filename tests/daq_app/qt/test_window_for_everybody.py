@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt import score_line, screens, tokens
-from daq_app.qt.indicators import FULL, PressBar
+from daq_app.qt import answer_fields, preferences, screens, tokens
+from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
 from daq_app.window.live_trace import CHANNELS, LiveTrace
@@ -175,7 +175,7 @@ def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
 
 def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
     window, model = driver.window, driver.window.bridge.model
-    remembered = screens.settings
+    remembered = preferences.settings
     for kinematics, kept in (("finite", "yes"), ("small", "no")):
         QTest.keyClick(window, Qt.Key.Key_M)
         assert model.kinematics == kinematics
@@ -244,7 +244,7 @@ def shown_line(driver):
 
 def test_a_click_is_answered_where_it_was_seen_at_every_place_of_the_line(driver):
     line = shown_line(driver)
-    half_a_pixel = 100 * 0.5 / (score_line.LENGTH * line._pixels_per_mm)
+    half_a_pixel = 100 * 0.5 / (answer_fields.LENGTH * line._pixels_per_mm)
     for position in (0.0, 12.5, 50.0, 87.5, 100.0):
         QTest.mouseClick(line, Qt.MouseButton.LeftButton, pos=line.place_of(position).toPoint())
         assert line.answer.score == pytest.approx(position, abs=half_a_pixel + 0.06)
@@ -284,7 +284,7 @@ def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
     assert screens.checked(screen, 3.0) is None
-    screens.settings().clear()
+    preferences.settings().clear()
     assert subject.fit_screen().pixels == pytest.approx(before)
 
 
@@ -331,7 +331,7 @@ def _filled(bar):
 
 @pytest.mark.usefixtures("application")
 def test_the_line_is_a_slider_to_assistive_technology_which_may_move_it():
-    line = score_line.ScoreLine(lambda: 0.0)
+    line = answer_fields.ScoreLine(lambda: 0.0)
     line.begin(("not at all", "very"))
     told = QAccessible.queryAccessibleInterface(line)
     assert told.role() == QAccessible.Role.Slider

@@ -5,9 +5,8 @@ import json
 import pytest
 from session_messages import BEGUN, FIRST, PLAN, SCORE, after, logged
 
-from daq_app.tablet.dialogue import Dialogue, event_of
-from daq_app.tablet.messages import Act, Page, Stored, read
-from daq_app.window.view_subject import subject_view
+from daq_app.tablet.dialogue import Act, Dialogue, Page, Stored, event_of, read
+from daq_app.window.subject import subject_view
 from sessions.run import steps
 
 ACTS = [[1000.0, "press", 20.0, "touch"], [1500.0, "drag", 60.0, "touch"], [1600.0, "release", None, "touch"]]

@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from daq_app.tablet import server as module
-from daq_app.tablet.messages import AnswerGiven, Force, Hello
+from daq_app.tablet.dialogue import AnswerGiven, Force, Hello
 from daq_app.tablet.server import NoTabletServer, TabletServer
 
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning")

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLabel
 from tablet_browser import Browser
 
 from daq_app.qt.start import opened
-from daq_app.qt.tablet_screen import TabletScreen
+from daq_app.qt.subject_side import TabletScreen
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel

@@ -1,7 +1,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq_app.window.answer import Answer
+from daq_app.window.subject import Answer
 
 
 def test_an_untouched_line_has_no_answer():

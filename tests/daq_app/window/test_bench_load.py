@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from daq_app.window.bench_load import Load, load_of
+from daq_app.window.live_feed import Load, load_of
 
 RATED = np.array([50.0, 50, 70, 500, 500, 500])
 

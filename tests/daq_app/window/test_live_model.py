@@ -9,9 +9,18 @@ import pytest
 
 from daq_app.recorder.messages import Live
 from daq_app.window.live_follower import Follower, settled_scene
-from daq_app.window.live_model import Forces, Provisional, Settle, Settled, Use, forces_of, joined
+from daq_app.window.live_model import (
+    Forces,
+    ModelTrace,
+    Provisional,
+    Settle,
+    Settled,
+    Use,
+    forces_of,
+    joined,
+    model_words,
+)
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.view_model import ModelTrace, model_words
 from sessions.plan.plan import Frame
 from sessions.plan.protocols import VisitSetting, plan, protocol
 from sessions.strokes import FrictionParameters

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from daq_app.window.new_session import Refused, SessionForm
-from daq_app.window.preview import preview
-from daq_app.window.view_subject import mirror_view, subject_view
+from daq_app.window.subject import mirror_view, preview, subject_view
 from sessions.plan.plan import Shown
 from sessions.plan.protocols import protocol, protocol_names
 from tests.daq_app.session_messages import PLAN, READY, after

@@ -7,8 +7,8 @@ import pytest
 from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, READY, SCORE, SECOND, TARE, TOUCH, after, logged
 
 from daq_app.recorder import messages as m
-from daq_app.window.bench_state import BenchState
 from daq_app.window.messages import Judged
+from daq_app.window.state import BenchState
 from daq_app.window.stroke_quality import StrokePicture
 from daq_app.window.view_course import course_view
 from daq_app.window.view_trials import KINDS, inspection, tiles, verdict

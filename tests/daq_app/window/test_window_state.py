@@ -29,7 +29,7 @@ from session_messages import (
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.bench_load import Load
+from daq_app.window.live_feed import Load
 from daq_app.window.messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
 from daq_app.window.state import AppState
 from daq_app.window.view import derive_view

@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
-from daq_app.analyst.raw import RawReadings
+from daq_app.analyst.stroke import RawReadings
 
 SESSION = Path(__file__).parents[3] / "data" / "sessions" / "version-1" / "sealed"
 

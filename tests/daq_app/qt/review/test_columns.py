@@ -12,9 +12,8 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
 from daq_app.analyst import messages as m
-from daq_app.analyst.lineage import lineage
-from daq_app.analyst.seen import finger_words
-from daq_app.analyst.shown import condition, numbers, points
+from daq_app.analyst.finger_words import finger_words
+from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import chosen, rows
 from daq_app.qt.analyst_window import AnalystWindow, LineageLabel
 from daq_app.qt.tokens import LIGHT

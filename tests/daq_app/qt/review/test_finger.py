@@ -16,7 +16,7 @@ from qt_events import wheel
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import chosen, rows
-from daq_app.qt.field_plot import ALL_TRIALS, FIXED
+from daq_app.qt.plots import ALL_TRIALS, FIXED
 from tests.daq_app.qt.review.examples import ARCS, PARTS, drag, film, frame, until
 from tests.sessions.report_example import example
 
@@ -172,7 +172,7 @@ def test_pictures_are_drawn_only_when_they_are_looked_at_and_saved_in_three_form
     window.model.tabs.setCurrentIndex(1)
     assert [asked.name for asked in window._work.asked if isinstance(asked, m.Draw)] == ["course"]
     window.take(m.Drawn("course", "forces", window.grab().toImage() and b"\x89PNG"))
-    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
+    monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: ("out/picture", ""))
     for made in window.model.picture.save.buttons:
         made.click()
     written = [asked for asked in window._work.asked if isinstance(asked, m.Write)]
@@ -185,7 +185,7 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
     window.take(m.Filmed(chosen(window.state).key, film()))
     window.model.fields.which.setCurrentIndex(len(FIELD_CHOICES) - 1)
     field, canvas = FIELD_CHOICES[-1], window.model.finger
-    monkeypatch.setattr("daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
+    monkeypatch.setattr("daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "u"), ""))
     for made in window.model.save.buttons:
         made.click()
         assert window._words.accessibleName().startswith("Saved: ")
@@ -202,7 +202,7 @@ def test_a_field_other_than_the_sed_is_saved_as_it_is_shown_and_marked_as_simula
     table = np.array([line.split(",") for line in numbers], float)
     np.testing.assert_allclose(table, np.column_stack([shown.nodes, field.of(shown)]), rtol=1e-8)
     monkeypatch.setattr(
-        "daq_app.qt.picture_view.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
+        "daq_app.qt.pictures.QFileDialog.getSaveFileName", lambda *_: (str(tmp_path / "none" / "u"), "")
     )
     window.model.save.buttons[0].click()
     assert window._words.accessibleName().endswith("choose another folder.")

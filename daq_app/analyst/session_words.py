@@ -1,7 +1,8 @@
-"""What the analyst's window shows of its state: words, numbers, points, names of pictures."""
+"""What the analyst's window says of a session: lines, numbers, tables, points, and the way back to the readings."""
 
 import re
 from dataclasses import dataclass
+from typing import Literal
 
 from daq_app.analyst.messages import Step
 from daq_app.analyst.state import AnalystState, Row, chosen, rows
@@ -9,6 +10,8 @@ from daq_app.wording import errors_words, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
+
+Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +80,7 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
             (
                 tr("model: normal force {condition}", condition=condition(state.report, said)),
                 _value(
-                    said.normal_force,
-                    "{:.2f} N" + errors_words(said.normal_force_error),
-                    said.reasons,
-                    "normal_force",
+                    said.normal_force, "{:.2f} N" + errors_words(said.normal_force_error), said.reasons, "normal_force"
                 ),
             ),
         ]
@@ -303,3 +303,61 @@ def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
 
 def _or_dash(value: float | None, form: str) -> str:
     return "–" if value is None else form.format(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One element of the way: what it says, where it leads, and more of it for who asks."""
+
+    words: str
+    place: Place
+    more: str = ""
+
+
+def lineage(state: AnalystState) -> tuple[Link, ...]:
+    """Return the way from the chosen trial's SED, or its friction where it has none, to its readings."""
+    row = chosen(state)
+    if row is None:
+        return ()
+    links = [Link(state.folder.name, "session", str(state.folder))]
+    if row.trial is not None:
+        links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
+    said, stroke = row.prediction, row.stroke
+    if said is not None and said.sed is not None:
+        links.append(
+            Link(
+                f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
+                "prediction",
+                tr("averaged over the ending"),
+            )
+        )
+    if stroke is None:
+        return tuple(links)
+    links.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))
+    if stroke.steady is not None:
+        begin, end = stroke.steady
+        links.append(
+            Link(
+                tr("steady window {begin:.3f} to {end:.3f} s", begin=begin, end=end),
+                "window",
+                tr("of stroke {number}, device's clock", number=stroke.number),
+            )
+        )
+    read = state.read
+    if read is not None and read.stroke == stroke.number:
+        links.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
+    else:
+        links.append(
+            Link(tr("raw readings"), "readings", tr("counts, sequence and device counter, as they were recorded"))
+        )
+    return tuple(links)
+
+
+def _friction(stroke: StrokeFinding, friction: tuple[float, str] | None) -> Link:
+    if friction is not None:
+        mu, rule = friction
+        tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
+        return Link(f"µ {mu:.3f}{tau}", "friction", tr("the model was given the {rule}", rule=tr(rule)))
+    if stroke.mu_dynamic is None:
+        return Link("µ –", "friction", stroke.reasons.get("mu_dynamic", ""))
+    return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", tr("mean over the steady window"))

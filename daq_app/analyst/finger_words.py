@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.frame import FieldChoice, Finger, Frame, Range, automatic_range
-from daq_app.analyst.shown import greatest_errors, sed_words
+from daq_app.analyst.session_words import greatest_errors, sed_words
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
@@ -101,10 +101,7 @@ def finger_words(state: AnalystState | None) -> str:
         why = said.reasons.get("sed", tr("no reason is known"))
         return tr("No settled finger. {why}", why=why)
     finger = state.fingers.get(row.key)
-    parts = [
-        tr("Finger of {name}, settled", name=name),
-        sed_words(state.report, said),
-    ]
+    parts = [tr("Finger of {name}, settled", name=name), sed_words(state.report, said)]
     if finger is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)

@@ -1,13 +1,12 @@
-"""What the window remembers from one start to the next: its place, theme, size of type, and recent sessions."""
+"""What the window remembers from one start to the next: looks, language, place and recent sessions."""
 
 import json
 import os
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QSize
+from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize, Qt
 from PySide6.QtWidgets import QWidget
 
-from daq_app.qt.screens import settings
 from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
 from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr_noop
 
@@ -94,3 +93,24 @@ def restore_place(window: QWidget) -> None:
         window.restoreGeometry(kept)
     else:
         window.resize(window.sizeHint().boundedTo(window.screen().availableSize() - FRAME))
+
+
+def settings() -> QSettings:
+    """Return what the window remembers on this computer: its looks, the screens' sizes, and folders of sessions."""
+    # A file on every system: the format that follows the system cannot be led elsewhere by a test.
+    return QSettings(QSettings.Format.IniFormat, QSettings.Scope.UserScope, "daq-app", "window")
+
+
+def direction(language: str) -> Qt.LayoutDirection:
+    """Return which way a language is read."""
+    return QLocale(language).textDirection()
+
+
+def name_of(language: str) -> str:
+    """Return what a language calls itself, with its code.
+
+    >>> name_of("de")
+    'Deutsch (de)'
+    """
+    own = "English" if language == ENGLISH else QLocale(language).nativeLanguageName()
+    return f"{own[:1].upper()}{own[1:]} ({language})" if own else language

@@ -1,0 +1,206 @@
+"""A stroke: its readings as they were recorded, the edges of its windows, and the decisions that move them."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+from daq_app.wording import tr, tr_noop
+from drivers.readings import ReadingBlock
+from sessions.recording import Recording
+from sessions.recording.schema import LIVE_FILE, SEALED_FILE
+from sessions.report.contents import StrokeFinding, same_fields
+from sessions.strokes.decisions import Decision, Decisions
+from sessions.strokes.forces import in_face_frame
+
+Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+AROUND = 1.0  # before and after a stroke of a recording without trials [s]
+MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]
+Edge = Literal["onset", "lift", "steady begin", "steady end"]
+EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
+APART = 0.02  # edges keep so far from each other [s]
+STEP, LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
+WHAT: dict[Edge, str] = {"onset": "onset", "lift": "lift", "steady begin": "steady", "steady end": "steady"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawReadings:
+    """n readings and where they lie."""
+
+    place: str  # file, data set and rows
+    unit: str  # of `raw`
+    sequence: Whole  # (n,)
+    counter: Whole  # (n,)
+    status: Whole  # (n,)
+    received_ns: Whole  # (n,)
+    time: Array  # (n,) [s, device time]
+    raw: Array  # (n, 6)
+    normal: Array  # (n,) unfiltered, `zero` taken off [N]
+    tangential: Array  # (n,) likewise [N]
+    zero: str  # which zero was taken off, for people
+
+    def __len__(self) -> int:
+        """Return the number of readings."""
+        return len(self.time)
+
+
+class RawFile:
+    """The readings of a recording, with the rows they have in its file; what is needed again is kept."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._whole: ReadingBlock | None = None  # of a recording without trials
+        self._before: dict[tuple[int, int], int] | None = None  # rows before the block that begins so
+
+    def around(self, stroke: StrokeFinding) -> RawReadings:
+        """Return the readings of the take that holds a stroke, or of a recording without trials those around it."""
+        block = self._block(stroke)
+        return _with_forces(self._recording, stroke, block, self._place(block))
+
+    def _block(self, stroke: StrokeFinding) -> ReadingBlock:
+        if stroke.trial is not None:
+            return self._recording.readings(stroke.trial)
+        if self._whole is None:
+            self._whole = self._recording.readings()
+        begin = -np.inf if stroke.onset is None else stroke.onset - AROUND
+        end = np.inf if stroke.lift is None else stroke.lift + AROUND
+        return self._whole.between(*np.searchsorted(self._whole.time, [begin, end]).tolist())
+
+    def _place(self, block: ReadingBlock) -> str:
+        """Return file and data set of readings, with the rows they have there."""
+        folder = self._recording.folder
+        if not len(block):
+            return tr("{name}: no readings", name=folder.name)
+        first = self._row(int(block.sequence[0]), int(block.received_ns[0]))
+        rows = "" if first is None else tr(", rows {first} to {last}", first=first, last=first + len(block) - 1)
+        if (folder / SEALED_FILE).is_file():
+            return tr("{name}/{file}, data sets readings/…{rows}", name=folder.name, file=SEALED_FILE, rows=rows)
+        return tr("{name}/{file}, table blocks{rows}", name=folder.name, file=LIVE_FILE, rows=rows)
+
+    def _row(self, sequence: int, received_ns: int) -> int | None:
+        """Return the row of a reading; None where its block is damaged or gone."""
+        if self._before is None:
+            self._before, count = {}, 0
+            for block in self._recording.blocks():
+                self._before[int(block.sequence[0]), int(block.received_ns[0])] = count
+                count += len(block)
+        for block in self._recording.blocks(between=(received_ns, received_ns + 1)):
+            matches = np.flatnonzero((block.sequence == sequence) & (block.received_ns == received_ns))
+            if len(matches):
+                return self._before[int(block.sequence[0]), int(block.received_ns[0])] + int(matches[0])
+        return None
+
+
+def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBlock, place: str) -> RawReadings:
+    """Return readings with the forces that they are, the mean of what came before contact taken off."""
+    assert recording.info is not None  # there is a stroke, so there is a transducer
+    calibration, rate, onset = recording.info.calibration, recording.info.rate, stroke.onset
+    before = np.flatnonzero(block.time < (-np.inf if onset is None else onset))
+    free = before[-max(round(MOST_FOR_ZERO * rate), 1) :]
+    zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
+    words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
+    wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
+    return RawReadings(
+        place=place,
+        unit=calibration.raw_unit,
+        **same_fields(block, RawReadings),
+        normal=-wrench[:, 2],
+        tangential=np.hypot(wrench[:, 0], wrench[:, 1]),
+        zero=words,
+    )
+
+
+class History(Struct, frozen=True):
+    """The decisions that can be undone, the last one first, and those that can be redone, the first one first."""
+
+    done: tuple[str, ...] = ()  # each in words
+    undone: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """One edge."""
+
+    edge: Edge
+    time: float  # [s, device time]
+    present: bool  # False where there is none yet and this is only where one could be
+    decided: str  # who decided it and why; "" where the analysis found it
+
+
+def edges_of(stroke: StrokeFinding) -> tuple[Placed, ...]:
+    """Return the edges in order of time; of a stroke without a steady window where one could lie."""
+    if stroke.onset is None and stroke.trace is None:
+        return ()
+    begin = stroke.onset if stroke.onset is not None else 0.0 if stroke.trace is None else stroke.trace.origin
+    end = stroke.lift
+    if end is None:
+        end = begin if stroke.trace is None or not stroke.trace.time else begin + stroke.trace.time[-1]
+    steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
+    times = dict(zip(EDGES, (begin, *steady, end), strict=True))
+    there = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
+    return tuple(Placed(e, times[e], there[WHAT[e]], stroke.decided.get(WHAT[e], "")) for e in EDGES)
+
+
+def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:
+    """Return the instant nearest to `time` [s] at which an edge may lie: between its neighbours."""
+    times = {placed.edge: placed.time for placed in edges_of(stroke)}
+    at = EDGES.index(edge)
+    low = times[EDGES[at - 1]] + APART if at > 0 else float("-inf")
+    high = times[EDGES[at + 1]] - APART if at + 1 < len(EDGES) else float("inf")
+    return min(max(time, low), high)
+
+
+def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: str) -> Decision:
+    """Return the decision that moves an edge."""
+    what, new = WHAT[edge], within(stroke, edge, time)
+    old: object = getattr(stroke, what)
+    if what == "steady":
+        times = {placed.edge: placed.time for placed in edges_of(stroke)} | {edge: new}
+        span = (times["steady begin"], times["steady end"])
+        return Decision(by, why, what, stroke.trial, stroke.within, stroke.steady, span)
+    assert old is None or isinstance(old, float)
+    return Decision(by, why, what, stroke.trial, stroke.within, old, new)
+
+
+def taken_back(decisions: Decisions, by: str) -> Decision | None:
+    """Return the line that undoes the last decision in force; None where there is none."""
+    last = _last(_standing(decisions))
+    return None if last is None else Decision(by, "undone in the window", undoes=last.number)
+
+
+def brought_back(decisions: Decisions, by: str) -> Decision | None:
+    """Return the line that redoes what was undone last; None where nothing was undone since the last decision."""
+    last = _last(_undone(decisions))
+    return None if last is None else Decision(by, "redone in the window", undoes=last.number)
+
+
+def history(decisions: Decisions) -> History:
+    """Return which decisions can be undone, and which redone."""
+    undone = [decision_meant(decisions, line) for line in reversed(_undone(decisions))]
+    return History(*(tuple(f"{one.what} of {one.of}" for one in lines) for lines in (_standing(decisions), undone)))
+
+
+def _standing(decisions: Decisions) -> list[Decision]:
+    return [line for line in decisions.standing if line.undoes is None]
+
+
+def _undone(decisions: Decisions) -> list[Decision]:
+    """Return the lines that undo a decision, and have come since the last one."""
+    decided = {line.number for line in decisions.lines if line.undoes is None}
+    return [line for line in decisions.standing if line.undoes in decided and line.number > max(decided)]
+
+
+def _last(lines: list[Decision]) -> Decision | None:
+    return lines[-1] if lines else None
+
+
+def decision_meant(decisions: Decisions, line: Decision) -> Decision:
+    """Return the decision that a line undoes or redoes, however often it was undone and redone before."""
+    by_number = {one.number: one for one in decisions.lines}
+    while line.undoes is not None:
+        line = by_number[line.undoes]
+    return line

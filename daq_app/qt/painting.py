@@ -1,0 +1,182 @@
+"""What is painted by hand: arrays as shapes, a widget whose ground is painted once, and small marks of a state."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import ceil
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QByteArray, QDataStream, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen, QPixmap, QPolygonF, QResizeEvent
+from PySide6.QtWidgets import QSizePolicy, QWidget
+from shiboken6 import VoidPtr
+
+from daq_app.qt.tokens import GRID, LIGHT, Tokens, theme_of
+
+Array = NDArray[np.float64]
+
+_ELEMENT = np.dtype([("kind", ">i4"), ("x", ">f8"), ("y", ">f8")])  # of a path in Qt's own serial form
+_TAIL = (0).to_bytes(4, "big") + (1).to_bytes(4, "big")  # where the last part begins; overlaps are filled
+Grade = Literal["off", "on", "well", "look", "wrong"]
+
+
+def blank(widget: QWidget, colour: str) -> QPixmap:
+    """Return a picture as large as a widget, in the pixels of its screen: never a pixel short where scaling is odd."""
+    ratio = widget.devicePixelRatioF()
+    pixmap = QPixmap(ceil(widget.width() * ratio), ceil(widget.height() * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(QColor(colour))
+    return pixmap
+
+
+def sheer(colour: str, alpha: int) -> QColor:
+    """Return a colour that lets what is behind it through, from 0 all of it to 255 nothing."""
+    shown = QColor(colour)
+    shown.setAlpha(alpha)
+    return shown
+
+
+def fine(colour: str | QColor, style: Qt.PenStyle = Qt.PenStyle.SolidLine) -> QPen:
+    """Return a pen one pixel of the screen wide, whatever the scaling."""
+    pen = QPen(QColor(colour), 1, style)
+    pen.setCosmetic(True)
+    return pen
+
+
+def draw_line(painter: QPainter, x: Array, y: Array) -> None:
+    """Draw the line through points (n,) with a fine pen, two pixels of the screen high.
+
+    It is drawn twice, a pixel apart: a pen of two pixels takes a hundred times as long.
+    """
+    pieces = lines(x, y)
+    pixel = 1.0 / painter.device().devicePixelRatio()
+    for down in (0.0, pixel):
+        painter.translate(0.0, down)
+        for piece in pieces:
+            painter.drawPolyline(piece)
+    painter.translate(0.0, -pixel)
+
+
+def lines(x: Array, y: Array) -> list[QPolygonF]:
+    """Return the line through points (n,) in pieces: it is broken where a coordinate is nan."""
+    points = np.empty((len(x), 2))
+    points[:, 0], points[:, 1] = x, y
+    known = np.zeros(len(x) + 2, np.bool_)
+    known[1:-1] = np.isfinite(x) & np.isfinite(y)
+    edges = np.flatnonzero(known[1:] != known[:-1])
+    return [_polygon(points[a:b]) for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)]
+
+
+def _polygon(points: Array) -> QPolygonF:
+    """Return points (n, 2), n > 0, as Qt holds them: written into its own memory, as pyqtgraph does it."""
+    polygon = QPolygonF()
+    polygon.resize(len(points))
+    memory: Any = VoidPtr(polygon.data(), points.nbytes, True)  # pyright: ignore[reportCallIssue]  its stub knows none
+    np.frombuffer(memory, np.float64).reshape(-1, 2)[:] = points
+    return polygon
+
+
+def faces(corners: Array, shades: NDArray[np.int64]) -> Iterator[tuple[int, QPainterPath]]:
+    """Return closed polygons (f, k, 2) as one path for each of their shades (f,), to be filled at once."""
+    order = np.argsort(shades, kind="stable")
+    sorted_shades = shades[order]
+    elements = np.empty(corners.shape[:2], _ELEMENT)
+    elements["kind"] = 1  # draws a line to it ...
+    elements["kind"][:, 0] = 0  # ... or begins anew there
+    elements["x"], elements["y"] = corners[order, :, 0], corners[order, :, 1]
+    edges = np.flatnonzero(np.diff(sorted_shades, prepend=-1, append=-1)).tolist()
+    for begin, end in pairwise(edges):
+        part = elements[begin:end]
+        path = QPainterPath()
+        stream = QDataStream(QByteArray(part.size.to_bytes(4, "big") + part.tobytes() + _TAIL))
+        stream >> path  # pyright: ignore[reportUnusedExpression]  it reads into `path`
+        yield int(sorted_shades[begin]), path
+
+
+class PaintedWidget(QWidget):
+    """Takes all the room there is; a subclass paints the ground, and in its `paintEvent` upon it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._ground: QPixmap | None = None  # what stands still ...
+        self.theme = LIGHT  # ... and the theme in which it was painted
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+        """Paint the ground for the new size."""
+        super().resizeEvent(event)
+        self.forget_ground()
+
+    def forget_ground(self) -> None:
+        """Draw what stands still once more when the widget is next painted."""
+        self._ground = None
+
+    def redraw(self) -> None:
+        """Paint everything anew, the ground too."""
+        self.forget_ground()
+        self.update()
+
+    def painter_on_ground(self) -> QPainter:
+        """Return a painter at work on the widget, the ground already there."""
+        ratio, theme = self.devicePixelRatioF(), theme_of(self)
+        if self._ground is None or self._ground.devicePixelRatio() != ratio or theme is not self.theme:
+            self.theme = theme
+            self._ground = self.draw_ground()
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._ground)
+        return painter
+
+    def draw_ground(self) -> QPixmap:
+        """Return what stands still, as large as the widget."""
+        raise NotImplementedError
+
+
+class Lamp(QWidget):
+    """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
+
+    def __init__(self, name: str) -> None:
+        """Start switched off; `name` is said to screen readers."""
+        super().__init__()
+        self._grade: Grade = "off"
+        self._name = name
+        self.setFixedSize(2 * GRID + 4, 2 * GRID + 4)
+        self.show_grade("off", "off")
+
+    def show_grade(self, grade: Grade, words: str) -> None:
+        """Show a state and its words."""
+        self.setAccessibleName(f"{self._name}: {words}")
+        self.setToolTip(words)
+        if grade != self._grade:
+            self._grade = grade
+            self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
+        """Paint the shape of the state."""
+        t = theme_of(self)
+        colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        box = QRectF(self.rect()).adjusted(3, 3, -3, -3)
+        painter.setPen(QPen(QColor(colour), 2))
+        if self._grade != "off":
+            painter.setBrush(QColor(colour))
+        match self._grade:
+            case "look":
+                middle = box.center().x()
+                painter.drawPolygon(QPolygonF([QPointF(middle, box.top()), box.bottomRight(), box.bottomLeft()]))
+            case "wrong":
+                painter.drawRect(box)
+            case _:
+                painter.drawEllipse(box)
+
+
+def paint_lost(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
+    """Mark the place of a failed solve, on any ground: a ring with a cross."""
+    painter.setBrush(Qt.BrushStyle.NoBrush)
+    for colour, width in ((tokens.surface, 5.0), (tokens.wrong, 2.5)):
+        painter.setPen(QPen(QColor(colour), width))
+        painter.drawEllipse(at, 11.0, 11.0)
+        painter.drawLine(at + QPointF(-7, -7), at + QPointF(7, 7))
+        painter.drawLine(at + QPointF(-7, 7), at + QPointF(7, -7))

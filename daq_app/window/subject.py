@@ -1,0 +1,378 @@
+"""The subject: texts and pages, all pages before there is a session, an answer as it is given, and whose a key is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from enum import StrEnum
+from math import isfinite
+from typing import Literal
+
+from daq_app.recorder.messages import SessionBegun
+from daq_app.window.course_state import SessionState, session_after, session_begun
+from daq_app.window.new_session import PILOT, Bench, Refused, SessionForm, checked
+from daq_app.wording import SUBJECT, tr, tr_noop, translations
+from sessions.plan.plan import Frame, Hand, SessionPlan
+from sessions.plan.protocols.languages import ENGLISH
+from sessions.run import machine, states, steps
+from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
+
+Translate = Callable[[str], str]  # an English text -> that in the subject's language
+Kind = Literal["read", "line", "number", "choice"]
+EXAMPLES = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
+OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page is the block's own
+NAMES = {
+    "mounting": tr_noop("the surface is changed"),
+    "settling": tr_noop("the finger is still on"),
+    "resting": tr_noop("rest"),
+    "paused": tr_noop("pause"),
+    "closing": tr_noop("end"),
+}
+Device = Literal["mouse", "touch", "pen", "keyboard"]
+Which = Literal["first", "second"]
+
+MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
+STEP = 1.0  # an arrow moves the mark by so much ...
+LEAP = 10.0  # ... and Page Up or Page Down by this
+PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
+DIGITS = 1  # of a score: a mark can be placed no finer
+Owner = Literal["text", "answer", "course"]
+GIVES = frozenset({"Enter", "Space"})  # the answer that stands
+PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
+TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
+CHOOSES = frozenset({"1", "2", "Left", "Right"})  # one of two
+ANSWER_KEYS: dict[Kind, frozenset[str]] = {
+    "read": frozenset(),
+    "line": PLACES | GIVES,
+    "number": TYPES | GIVES,
+    "choice": CHOOSES | GIVES,
+}
+
+
+class SubjectText(StrEnum):
+    """Every text of the subject's page that no protocol gives. Words in braces are put in."""
+
+    WELCOME = "Welcome"
+    BEGINS = "The experimenter will begin in a moment."
+    HANDS_OFF = "Keep your fingers off the surface."
+    WAIT = "Please wait"
+    THANKS = "Thank you"
+    REST_HAND = "You can rest your hand now."
+    LIFT = "Please lift your finger off the surface."
+    REST = "Rest"
+    RESTING = "Rest your hand. The experimenter will go on with you."
+    PAUSE = "Pause"
+    GOES_ON = "The experimenter will go on in a moment."
+    STROKE = "Stroke the surface once"
+    STROKES = "Stroke the surface up to {number} times"
+    PRACTICE = "This one is for practice."
+    COUNT = "Surface {number} of {count}."
+    SAMPLE = "Sample {code}."
+    JUDGE = "Judge the surface"
+    NUMBER = "Give a number above 0, on your own scale."
+    WHICH = "Which one?"
+    NEXT = "Next"
+    FIRST = "The first"
+    SECOND = "The second"
+    OFFLINE = "No connection. Your answer is kept on this device."
+    # What a screen reader tells:
+    LINE = "Line from {low} to {high}"
+    UNANSWERED = "No answer yet. The arrow keys move the mark."
+    ANSWERED = "Answer at {score} of 100. The arrow keys move the mark."
+    OWN_NUMBER = "Your number, above 0"
+    OF_TWO = "Which of the two: 1 for the first, 2 for the second"
+    PRESSING = "How hard you press"
+
+
+def usual_question(descriptor: str) -> str:
+    """Return what is asked in English where a block has no question."""
+    return f"Judge the {descriptor} of the surface"
+
+
+def translator(language: str) -> Translate:
+    """Return what makes a subject's language of the English texts; a text without a translation stays English."""
+    texts = translations(SUBJECT, language)
+    return lambda text: texts.get(text, str(text))
+
+
+@dataclass(frozen=True, slots=True)
+class SubjectView:
+    """One page for the subject."""
+
+    kind: Kind  # something to read, or a way to answer
+    title: str
+    text: str = ""
+    ends: tuple[str, str] = ("", "")  # of the line
+    ticks: int = 0  # on the line, between its ends
+    key: tuple[int, int] = (0, 0)  # trial and take: another one begins with an empty answer
+    hand: Hand = "right"  # that answers: where Next stands
+    language: str = ENGLISH
+    force: bool = False  # how hard the finger presses is shown; never how hard it drags, which tells the surface
+
+    @property
+    def asks(self) -> bool:
+        """Say whether an answer is waited for."""
+        return self.kind != "read"
+
+
+def subject_view(session: SessionState | None, translate: Translate = str, language: str = ENGLISH) -> SubjectView:
+    """Return what is shown to the subject now, in the language that `translate` makes of English.
+
+    `language` is the code of the one that is chosen before there is a session, which has its own.
+    """
+    if session is None:
+        return SubjectView("read", translate(SubjectText.WELCOME), translate(SubjectText.BEGINS), language=language)
+    return replace(_Page(session, translate).view(), language=session.plan.language)
+
+
+def mirror_view(session: SessionState, translate: Translate = str) -> SubjectView:
+    """Return what the experimenter sees of the subject's page, without what the protocol keeps from the experimenter.
+
+    The bar of the force is left out too: in a picture that stands still it would show none.
+    """
+    plan = session.plan
+    kept = {"forces", *({"trial count"} - set(plan.shown.experimenter))}
+    shown = replace(plan.shown, subject=tuple(one for one in plan.shown.subject if one not in kept))
+    return subject_view(replace(session, plan=replace(plan, shown=shown)), translate)
+
+
+@dataclass(frozen=True, slots=True)
+class _Page:
+    """What a session in hand shows."""
+
+    session: SessionState
+    say: Translate
+
+    def view(self) -> SubjectView:
+        session, shown = self.session, self.session.plan.shown.subject
+        match session.phase:
+            case "idle":
+                return self._read(self.say(SubjectText.WELCOME), self.say(SubjectText.BEGINS))
+            case "mounting" | "taring":
+                return self._read(self.say(SubjectText.WAIT), self._notice(self.say(SubjectText.HANDS_OFF)))
+            case "ready" | "stroking":
+                force = session.plan.forces and "forces" in shown
+                instruction = session.block.instruction if session.block and "instruction" in shown else ""
+                return replace(self._read(self._stroke(), self._notice(instruction)), force=force)
+            case "scoring":
+                return self._question()
+            case "settling":
+                return self._read(self.say(SubjectText.THANKS), self.say(SubjectText.LIFT))
+            case "resting":
+                return self._read(self.say(SubjectText.REST), self.say(SubjectText.RESTING))
+            case "paused" | "resuming":
+                return self._read(self.say(SubjectText.PAUSE), self.say(SubjectText.GOES_ON))
+            case "closing" | "ended" if session.resumable:
+                return self._read(self.say(SubjectText.PAUSE), self.say(SubjectText.GOES_ON))
+            case "closing" | "ended":
+                return self._read(self.say(SubjectText.THANKS), self.say(SubjectText.REST_HAND))
+
+    def _read(self, title: str, text: str = "") -> SubjectView:
+        return SubjectView("read", title, text, hand=self.session.plan.answering_hand or "right")
+
+    def _stroke(self) -> str:
+        trial = self.session.of(self.session.trial)
+        allowed = 1 if trial is None else self.session.plan.strokes_allowed(trial.trial)
+        return self.say(SubjectText.STROKE) if allowed == 1 else self.say(SubjectText.STROKES).format(number=allowed)
+
+    def _notice(self, to_do: str) -> str:
+        """Return what to do with the finger, and what the protocol lets the subject know beside it."""
+        session = self.session
+        shown, trial = session.plan.shown.subject, session.of(session.trial)
+        parts = [to_do]
+        if session.block is not None and session.block.phase == "practice":
+            parts.insert(0, self.say(SubjectText.PRACTICE))
+        if trial is not None and "trial count" in shown:
+            parts.append(self.say(SubjectText.COUNT).format(number=trial.trial.number, count=len(session.trials)))
+        if trial is not None and "code" in shown:
+            parts.append(self.say(SubjectText.SAMPLE).format(code=trial.trial.stimulus.code))
+        return " ".join(part for part in parts if part)
+
+    def _question(self) -> SubjectView:
+        trial, hand = self.session.of(self.session.trial), self.session.plan.answering_hand or "right"
+        if trial is None:
+            return self._read(self.say(SubjectText.WAIT))
+        key = (trial.trial.number, trial.takes)
+        match self.session.command:
+            case steps.AskScore(_, ends, ticks, question):
+                title = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("line", title, "", ends, ticks, key, hand)
+            case steps.AskNumber(_, question):
+                title = question or self._judge(trial.trial.stimulus.descriptor)
+                return SubjectView("number", title, self.say(SubjectText.NUMBER), key=key, hand=hand)
+            case steps.AskChoice(_, _, question):
+                return SubjectView("choice", question or self.say(SubjectText.WHICH), "", key=key, hand=hand)
+            case _:
+                return self._read(self.say(SubjectText.WAIT))
+
+    def _judge(self, descriptor: str) -> str:
+        """Return the usual question; a descriptor is a word of the protocol's own language."""
+        if self.session.plan.language == ENGLISH:
+            return usual_question(descriptor)
+        return self.say(SubjectText.JUDGE)
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewPage:
+    """One page, with what it is called in a list."""
+
+    name: str
+    view: SubjectView
+
+
+def preview(form: SessionForm, translate: Translate = str) -> tuple[PreviewPage, ...] | Refused:
+    """Return every page of the form's protocol in the form's language, each once, or what is wrong with the form.
+
+    The session's own machine is led through every trial, and each page is what the window would show the subject then.
+    Codes and orders are those of one example.
+    """
+    folder = form.folder if form.study.strip() else "."  # nothing is written
+    plain = replace(
+        form, subject=PILOT, folder=folder, seed="", height="", normal="", area="", simulated=False, pilot=True
+    )
+    session_plan = checked(plain, Bench(connected=True, simulated=True, frame=Frame()), datetime.now(), 0)
+    if isinstance(session_plan, Refused):
+        return session_plan
+    language = session_plan.plan.language
+    first = PreviewPage(tr("before the session"), subject_view(None, translate, language))
+    thanks = SubjectView("read", translate(SubjectText.THANKS), language=language)
+    *course, end = _pages(session_plan.plan, translate)
+    return (first, *course, PreviewPage(tr("an answer was given"), thanks), end)
+
+
+def _pages(plan: SessionPlan, translate: Translate) -> tuple[PreviewPage, ...]:
+    pages: dict[str, SubjectView] = {}
+    session: SessionState = session_begun(SessionBegun("", plan, "people", None, 0, 1.0), 0.0)
+    step = machine.start(plan)
+    while not isinstance(step[0], states.Ended):
+        state, commands = step
+        for command in commands:
+            session = session_after(session, command, 0.0)
+        if isinstance(state, states.Settling):
+            session = replace(session, phase="settling")
+        if session.phase in OF_A_BLOCK or session.phase in NAMES:
+            pages.setdefault(_name(session), replace(subject_view(session, translate), key=(len(pages) + 1, 1)))
+        step = machine.advance(state, _next_event(state))
+    pages[NAMES["paused"]] = subject_view(replace(session, phase="paused"), translate)
+    pages[NAMES["closing"]] = pages.pop(NAMES["closing"])  # the last one
+    return tuple(PreviewPage(tr(name), view) for name, view in pages.items())
+
+
+def _name(session: SessionState) -> str:
+    if session.phase in NAMES or session.block is None:
+        return NAMES.get(session.phase, session.phase)
+    return f"{session.block.name}: {tr(OF_A_BLOCK[session.phase])}"
+
+
+def _next_event(state: states.State) -> steps.Event:
+    """Return what brings a session on from a state."""
+    match state:
+        case states.Idle():
+            return steps.Begin()
+        case states.Mounting(place):
+            return steps.StimulusMounted(place.trial.stimulus.code)
+        case states.Taring():
+            return steps.Zeroed()
+        case states.Ready(place):
+            return steps.ContactOnset() if place.plan.forces else steps.StrokeDone()
+        case states.Stroking():
+            return steps.FingerLifted()
+        case states.Scoring(place):
+            return EXAMPLES.get(place.trial.answer, steps.Scored(50.0))
+        case states.Settling(touching=touching):
+            return steps.FingerLifted() if touching else steps.Settled()
+        case states.Resting():
+            return steps.RestOver()
+        case _:
+            return steps.Finish()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An answer so far; empty until the line was touched."""
+
+    positions: tuple[tuple[float, float], ...] = ()  # (session clock [s], 0 to 100)
+    corrections: int = 0  # how often an answer that stood was changed
+    device: Device | None = None  # that gave the last position
+    down: bool = False  # a finger or button is down
+
+    @property
+    def score(self) -> float | None:
+        """Return where the mark stands; None before the first touch."""
+        return round(self.positions[-1][1], DIGITS) if self.positions else None
+
+    def pressed(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after the line was touched, clicked or tapped on [s, 0 to 100]."""
+        again = self.corrections + bool(self.positions)
+        return replace(self._moved(time, position, device), corrections=again, down=True)
+
+    def dragged(self, time: float, position: float, device: Device) -> "Answer":
+        """Return the answer after what is held down has moved; one answer, however far it goes."""
+        return self._moved(time, position, device) if self.down else self
+
+    def released(self) -> "Answer":
+        """Return the answer after the finger or button has left."""
+        return replace(self, down=False)
+
+    def stepped(self, time: float, by: float) -> "Answer":
+        """Return the answer after a key moved the mark by so much; the first key puts it in the middle."""
+        if not self.positions:
+            return self._moved(time, MIDDLE, "keyboard")
+        last, before = self.positions[-1]
+        again = self.corrections + (time - last > PAUSE or self.device != "keyboard")
+        return replace(self._moved(time, before + by, "keyboard"), corrections=again)
+
+    def scored(self, hand: Hand | None) -> Scored:
+        """Return the event of an answer that is given."""
+        first = self.positions[0][0] if self.positions else None
+        return Scored(self.score, self.positions, first, self.corrections, hand, self.device)
+
+    def _moved(self, time: float, position: float, device: Device) -> "Answer":
+        place = min(max(position, 0.0), 100.0)
+        if self.positions and self.positions[-1][1] == place:
+            return replace(self, device=device)
+        return replace(self, positions=(*self.positions, (time, place)), device=device)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A number, or one of two, as it is given: what stands, and how it came to stand."""
+
+    value: float | Which | None = None
+    first_touch: float | None = None  # [s, session clock]
+    corrections: int = 0  # how often another value took the place of one
+    device: Device | None = None
+
+    def chosen(self, time: float, value: Which, device: Device) -> "Choice":
+        """Return the answer with one of two at `time` [s]."""
+        first = time if self.first_touch is None else self.first_touch
+        return Choice(value, first, self.corrections + (self.value not in (None, value)), device)
+
+    def typed(self, time: float, number: float | None) -> "Choice":
+        """Return the answer with another number in the field at `time` [s]; one that is not above 0 is none.
+
+        What stands while a number is typed is not yet an answer that is corrected.
+        """
+        value = number if number is not None and number > 0.0 and isfinite(number) else None
+        first = time if self.first_touch is None else self.first_touch
+        return Choice(value, first, self.corrections, "keyboard")
+
+    def judgement(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
+        """Return the event of an answer that is given."""
+        if self.value in ("first", "second"):
+            return PairedChoice(self.value, self.first_touch, self.corrections, hand, self.device)
+        number = self.value if isinstance(self.value, float) else None
+        return MagnitudeEstimate(number, self.first_touch, self.corrections, hand, self.device)
+
+
+def owner(key: str, asks: Kind, *, typing: bool, from_subject: bool = False) -> Owner:
+    """Return whose a key is while the subject is asked for `asks`, whichever window has the keyboard.
+
+    While the experimenter types, every key is the text's, also one that reached the subject's window; of those that
+    the text leaves to its own window, none is an answer.
+
+    >>> owner("1", "choice", typing=False), owner("1", "choice", typing=True), owner("1", "line", typing=False)
+    ('answer', 'text', 'course')
+    """
+    if typing and (from_subject or key in ANSWER_KEYS[asks]):
+        return "text"
+    return "answer" if key in ANSWER_KEYS[asks] else "course"
