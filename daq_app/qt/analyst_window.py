@@ -8,13 +8,11 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
-    QFrame,
     QHBoxLayout,
     QLabel,
     QListWidget,
     QMainWindow,
     QProgressBar,
-    QScrollArea,
     QSizePolicy,
     QTabWidget,
     QWidget,
@@ -52,7 +50,6 @@ class LineageLabel(QLabel):
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.setTextInteractionFlags(Qt.TextInteractionFlag.LinksAccessibleByMouse)
         self.setTextInteractionFlags(
             Qt.TextInteractionFlag.LinksAccessibleByMouse | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
         )
@@ -66,12 +63,9 @@ class LineageLabel(QLabel):
         if links == self._links:
             return
         self._links = links
-        colour = self._tokens.act
-        self.setText(
-            " &nbsp;→&nbsp; ".join(
-                f'<a href="{link.place}" style="color: {colour}">{escape(link.words)}</a>' for link in links
-            )
-        )
+        style = f"color: {self._tokens.act}"
+        elements = (f'<a href="{link.place}" style="{style}">{escape(link.words)}</a>' for link in links)
+        self.setText(" &nbsp;→&nbsp; ".join(elements))
         whole = " → ".join(link.words for link in links)
         self.setAccessibleName(tr("from the number back to its readings: {whole}", whole=whole))
 
@@ -110,12 +104,13 @@ class AnalystWindow(QMainWindow):
             tr("Go on"), tr("have the model answer the trials that are left"), lambda: self.ask(m.GoOn())
         )
         self.report = button(tr("Report…"), tr("write the report"), self.write_report)
-        self.format, self.export = (
-            choice(tr("format of the export"), sorted(FORMATS)),
-            button(tr("Export…"), tr("write an export"), self.write_export),
-        )
-        self._scrolled: list[QScrollArea] = []
-        self._parts = [self._panel(name, column) for name, column in self._named()]
+        self.format = choice(tr("format of the export"), sorted(FORMATS))
+        self.export = button(tr("Export…"), tr("write an export"), self.write_export)
+        self._columns = {tr("Trials"): self.trials, tr("Stroke"): self.stroke, tr("Model"): self.model}
+        self._areas = [scrolled(column) for column in self._columns.values()]  # one that is too high is never cut
+        self._panels = [Panel(name.lower()) for name in self._columns]
+        for panel, area in zip(self._panels, self._areas, strict=True):
+            vbox(area, on=panel, margins=GRID)
         self._pages = QTabWidget()
         self._pages.setAccessibleName(tr("trials, stroke or model"))
         self._panes = QWidget()
@@ -143,10 +138,6 @@ class AnalystWindow(QMainWindow):
             return
         self._work.ask(request)
         self.take(request)
-
-    def write(self, what: str, path: str) -> None:
-        """Have a report, an export or a picture written."""
-        self.ask(m.Write(what, path))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Stop the work with Esc; undo and redo with the keys that the system has for it."""
@@ -204,14 +195,14 @@ class AnalystWindow(QMainWindow):
         """Ask for a file, and have the report written."""
         name, _ = QFileDialog.getSaveFileName(self, tr("Report"), str(self.state.folder / "report.html"), "*.html")
         if name:
-            self.write("report", name)
+            self.ask(m.Write("report", name))
 
     def write_export(self) -> None:
         """Ask for a folder, and have the chosen export written."""
         what = self.format.currentText()
         name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{what}")
         if name:
-            self.write(what, name)
+            self.ask(m.Write(what, name))
 
     def _choose_other(self) -> None:
         name = QFileDialog.getExistingDirectory(self, tr("Session to compare with"), str(self.state.folder.parent))
@@ -260,31 +251,22 @@ class AnalystWindow(QMainWindow):
             column.show_state(state)
         QTimer.singleShot(0, self, self._place_columns)  # once the layouts inside of the columns have followed
 
-    def _named(self) -> tuple[tuple[str, QWidget], ...]:
-        return (tr("Trials"), self.trials), (tr("Stroke"), self.stroke), (tr("Model"), self.model)
-
-    def _panel(self, name: str, column: QWidget) -> QFrame:
-        frame, area = Panel(name.lower()), scrolled(column)  # a column that is too high is scrolled, never cut
-        vbox(area, on=frame, margins=GRID)
-        self._scrolled.append(area)
-        return frame
-
     def _place_columns(self) -> None:
-        least = [column.minimumSizeHint().width() + 2 * GRID for _, column in self._named()]
+        least = [column.minimumSizeHint().width() + 2 * GRID for column in self._columns.values()]
         narrow = self.width() < sum(width + 4 * GRID for width in least)
-        for area, width in zip(self._scrolled, least, strict=True):
+        for area, width in zip(self._areas, least, strict=True):
             area.setMinimumWidth(0 if narrow else width)
         if narrow == self._narrow:
             return
         self._narrow = narrow
         self._pages.setVisible(narrow)
         self._panes.setVisible(not narrow)
-        for (name, _), part, stretch in zip(self._named(), self._parts, (3, 6, 6), strict=True):
+        for name, panel, stretch in zip(self._columns, self._panels, (3, 6, 6), strict=True):
             if narrow:
-                self._pages.addTab(part, name)
+                self._pages.addTab(panel, name)
             else:
-                self._row.addWidget(part, stretch)
-                part.show()
+                self._row.addWidget(panel, stretch)
+                panel.show()
         if narrow and self.state.compared is not None:  # what has just come stays in sight
             self._pages.setCurrentIndex(2)
 
@@ -324,7 +306,12 @@ class TrialsColumn(QWidget):
             self.responses.addItem(f"{tr(shown.label)} [{shown.unit}]", shown.name)
         self.responses.activated.connect(lambda: self.responded.emit(m.Respond(self.responses.currentData())))
         self.errors = Wrapped("quiet")
-        self.relation, self.points = self._relation()
+        self.relation = ZoomedPlot(tokens)
+        self.relation.setAccessibleName(tr("prediction against score: a point chooses its trial"))
+        self.relation.setLabel("bottom", tr("mean score"))
+        self.points: Any = pg.ScatterPlotItem()
+        self.points.sigClicked.connect(self._point_clicked)
+        self.relation.addItem(self.points)
         vbox(
             label(tr("Trials"), "section"),
             (self.list, 3),
@@ -357,14 +344,8 @@ class TrialsColumn(QWidget):
         ring = pg.mkPen(QColor(self._tokens.text))
         self.points.setData(
             [
-                {
-                    "pos": (p.score, p.response),
-                    "data": p.row,
-                    "size": 18 if p.row == state.row else 11,
-                    "symbol": "s" if p.row == state.row else "o",
-                    "brush": MODEL,
-                    "pen": ring,
-                }
+                {"pos": (p.score, p.response), "data": p.row, "brush": MODEL, "pen": ring}
+                | ({"size": 18, "symbol": "s"} if p.row == state.row else {"size": 11, "symbol": "o"})
                 for p in points(state)
             ]
         )
@@ -372,15 +353,6 @@ class TrialsColumn(QWidget):
     def _chosen(self, row: int) -> None:
         if row >= 0:
             self.requested.emit(m.Choose(row))
-
-    def _relation(self) -> tuple[Any, Any]:
-        plot = ZoomedPlot(self._tokens)
-        plot.setAccessibleName(tr("prediction against score: a point chooses its trial"))
-        plot.setLabel("bottom", tr("mean score"))
-        scatter = pg.ScatterPlotItem()
-        scatter.sigClicked.connect(self._point_clicked)
-        plot.addItem(scatter)
-        return plot, scatter
 
     def _point_clicked(self, _item: object, clicked: Any, *_: object) -> None:  # noqa: ANN401  pyqtgraph has no types
         if len(clicked) and clicked[0].data() is not None:

@@ -12,8 +12,12 @@ from daq_app.analyst.frame import FIELD_CHOICES, Frame, Line, Parts, View, probe
 from daq_app.qt.finger_painter import FingerPainter, Look, whole_box
 from daq_app.qt.plots import name_axis, pg, style_axis
 from daq_app.qt.tokens import SMALL, Tokens, font
-from daq_app.wording import tr
+from daq_app.wording import tr, tr_noop
 
+HELP = tr_noop(
+    "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
+    "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
+)
 NO_PARTS = Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64))
 SHADES = 64
 ZOOM = 1.25  # of a key [-]: three of them double the picture
@@ -67,8 +71,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def __init__(self, tokens: Tokens, scale: float, sight: Sight | None = None) -> None:
         """Show nothing yet; canvases with the same `sight` move together."""
-        base: Any = super()
-        base.__init__()
+        pg.GraphicsLayoutWidget.__init__(self)
         self.sight = sight or Sight()
         self._tokens, self._font = tokens, font(SMALL, scale)
         self.frame: Frame | None = None
@@ -83,18 +86,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self._least = round(LEAST * scale)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setToolTip(
-            tr(
-                "Wheel, + and −: zoom. Drag or arrows: move. Home or double-click: all. Shift and drag: draw a line. "
-                "By keys, Shift and arrows move its end, Ctrl and arrows its beginning, and Del takes it away."
-            )
-        )
+        self.setToolTip(tr(HELP))
         self.setAccessibleName(tr("finger of the model: none"))
-        self._box = _Box(self.sight)
-        self._bar = self._colour_bar()
+        self._box, self._bar, self._item = _Box(self.sight), self._colour_bar(), _FingerItem(self)
         self.ci.addItem(self._box, 0, 0)
         self.ci.addItem(self._bar, 1, 0)
-        self._item = _FingerItem(self)
         self.scene().addItem(self._item)
         self._box.sigResized.connect(self._place)
         self.sight.changed.connect(self._place)
@@ -130,13 +126,14 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         return "" if self.frame is None else probe_words(self.frame, self._parts, self.look.field, *place)
 
     def draw(self, painter: QPainter, head: str) -> None:
-        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it."""
+        """Draw what is shown on paper of the window's colour, with a `head` such as SIMULATED over it, and end."""
         above = self.size_with(head).height() - self.height()
         painter.fillRect(QRectF(0, 0, self.width(), above), QColor(self._tokens.surface))
         painter.setFont(self._font)
         painter.setPen(QColor(self._tokens.look))
         painter.drawText(QRectF(4, 0, self.width() - 8, above), int(Qt.TextFlag.TextWordWrap), head)
         self.render(painter, QRectF(0, above, self.width(), self.height()), self.rect())
+        painter.end()
 
     def size_with(self, head: str) -> QSize:
         """Return the size of what is drawn with a `head` over it."""
@@ -159,8 +156,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802  Qt's name
         """Draw a ring around all of it while it has the keyboard."""
-        base: Any = super()
-        base.paintEvent(event)
+        pg.GraphicsLayoutWidget.paintEvent(self, event)
         if self.hasFocus():
             painter = QPainter(self.viewport())
             painter.setPen(QPen(QColor(self._tokens.act), 2))
@@ -169,13 +165,11 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Take hold of the picture, or begin a line."""
         self._box.draws = self.sight.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
-        base: Any = super()
-        base.mousePressEvent(event)
+        pg.GraphicsLayoutWidget.mousePressEvent(self, event)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Say what is under the pointer."""
-        base: Any = super()
-        base.mouseMoveEvent(event)
+        pg.GraphicsLayoutWidget.mouseMoveEvent(self, event)
         self._pointer = event.position()
         self._probe()
 
@@ -188,8 +182,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         """Say nothing of a place any more."""
         self._pointer = None
         self._probe()
-        base: Any = super()
-        base.leaveEvent(event)
+        pg.GraphicsLayoutWidget.leaveEvent(self, event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
@@ -205,8 +198,7 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         elif key in ARROWS and event.modifiers() & LINE_KEYS:
             self._move_end(key, begins=bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
         elif key in ARROWS:
-            across, up = ARROWS[key]
-            self._box.move(across, up)
+            self._box.move(*ARROWS[key])
         else:
             event.ignore()
 
@@ -277,8 +269,7 @@ class _Box(pg.ViewBox):
     """Moves and zooms the finger as every plot, true to scale; with Shift, or where lines are drawn, a drag is one."""
 
     def __init__(self, sight: Sight) -> None:
-        base: Any = super()
-        base.__init__(lockAspect=True, enableMenu=False, defaultPadding=0.0)
+        pg.ViewBox.__init__(self, lockAspect=True, enableMenu=False, defaultPadding=0.0)
         self._sight = sight
         self.draws = False  # what is dragged is the end of a line
         self.setLimits(minXRange=NEAREST, maxXRange=FARTHEST)
@@ -298,8 +289,7 @@ class _Box(pg.ViewBox):
     def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:  # noqa: ANN401, N802  pyqtgraph's name
         """Move the picture, or draw a line."""
         if not self.draws:
-            base: Any = super()
-            base.mouseDragEvent(ev, axis)
+            pg.ViewBox.mouseDragEvent(self, ev, axis)
             return
         ev.accept()
         begin, end = (self.mapToView(at) for at in (ev.buttonDownPos(), ev.pos()))
@@ -313,8 +303,7 @@ class _FingerItem(pg.GraphicsObject):
     """The finger in the scene of its canvas, over the view box."""
 
     def __init__(self, canvas: FingerCanvas) -> None:
-        base: Any = super()
-        base.__init__()
+        pg.GraphicsObject.__init__(self)
         self._canvas = canvas
 
     def boundingRect(self) -> QRectF:  # noqa: N802  Qt's name

@@ -101,30 +101,14 @@ ANALYST_KEYS = (
     Key("F1", "keys", tr_noop("show or hide these keys")),
 )
 
-_NAMED = {
-    Qt.Key.Key_Space: "Space",
-    Qt.Key.Key_Return: "Space",
-    Qt.Key.Key_Enter: "Space",
-    Qt.Key.Key_0: "0",
-    Qt.Key.Key_Plus: "+",
-    Qt.Key.Key_Equal: "+",
-    Qt.Key.Key_Minus: "-",
-    Qt.Key.Key_F1: "F1",
-    Qt.Key.Key_F2: "F2",
-    Qt.Key.Key_F3: "F3",
-    Qt.Key.Key_F4: "F4",
-    Qt.Key.Key_F5: "F5",
-    Qt.Key.Key_F6: "F6",
-    Qt.Key.Key_F7: "F7",
-    Qt.Key.Key_Escape: "Esc",
-}
+SAME = {"Return": "Space", "Enter": "Space", "=": "+"}  # keys that do what another does
+PLAIN = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier  # change nothing of a key's meaning
 
 
 def act_of(event: QKeyEvent) -> str | None:
     """Return the act a key stands for; None where it stands for none."""
-    key = Qt.Key(event.key())
-    name = _NAMED.get(key) or (chr(key) if Qt.Key.Key_A <= key <= Qt.Key.Key_Z else "")
-    modifiers = event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier)
+    name, modifiers = QKeySequence(event.key()).toString(), event.modifiers() & ~PLAIN
+    name = SAME.get(name, name)
     if modifiers == Qt.KeyboardModifier.ControlModifier:
         name = f"Ctrl+{name}"
     elif modifiers != Qt.KeyboardModifier.NoModifier:
@@ -134,7 +118,7 @@ def act_of(event: QKeyEvent) -> str | None:
 
 def name_of(event: QKeyEvent) -> str:
     """Return the name of a key that is pressed without Ctrl, Alt or the like; empty where it is held with one."""
-    if event.modifiers() & ~(Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.KeypadModifier):
+    if event.modifiers() & ~PLAIN:
         return ""
     return "Enter" if event.key() == Qt.Key.Key_Return else QKeySequence(event.key()).toString()
 
@@ -184,10 +168,7 @@ class Keyboard(QObject):
     def __init__(self, window: QMainWindow, plan: QWidget, subject: SubjectWindow, act: Callable[[str], None]) -> None:
         """Watch the subject's window and the experimenter's plan; `act` does what a key of the course stands for."""
         super().__init__(window)
-        self._window = window
-        self._plan = plan
-        self._subject = subject
-        self._act = act
+        self._window, self._plan, self._subject, self._act = window, plan, subject, act
         self._since_answer = QElapsedTimer()
         for watched in (plan, subject, *subject.findChildren(QWidget)):
             watched.installEventFilter(self)

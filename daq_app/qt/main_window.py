@@ -201,7 +201,7 @@ class MainWindow(QMainWindow):
             return
         save_place(self)
         self.bridge.end()
-        self.rooms.leave()
+        self.rooms.review.leave()
         if self.tablet is not None:
             self.tablet.close()
         self.subject.hide()
@@ -220,8 +220,6 @@ class MainWindow(QMainWindow):
             self.bridge.send(steps.UndoRedo())
 
     def _start_session(self) -> None:
-        if self.bridge.view.course is not None:
-            return
         bench = bench_of(self.bridge.state.bench)
         cards = self.page.check(bench, anew=True)
         missing = first_missing(cards)

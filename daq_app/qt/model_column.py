@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFileDialog, QHBoxLayout, QTabWidget, QWidget
+from PySide6.QtWidgets import QFileDialog, QTabWidget, QWidget
 
 from daq_app.analyst import messages as m
 from daq_app.analyst.finger_words import (
@@ -19,10 +19,10 @@ from daq_app.analyst.finger_words import (
 )
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, automatic_range
 from daq_app.analyst.session_words import picture_errors, scene_table, session_pictures
-from daq_app.analyst.state import AnalystState, chosen
+from daq_app.analyst.state import AnalystState, Row, chosen
 from daq_app.qt.finger_canvas import NO_PARTS, FingerCanvas
 from daq_app.qt.finger_painter import Look
-from daq_app.qt.parts import Wrapped, button, choice, fill, hbox, vbox
+from daq_app.qt.parts import Wrapped, button, choice, hbox, vbox
 from daq_app.qt.pictures import (
     FILM_SUFFIXES,
     PICTURE,
@@ -84,7 +84,7 @@ class ModelColumn(QWidget):
         self._filming = False
         self.save = SaveButtons(tr("the finger"), self._save_finger)
         self.player = TransportBar(tr("the history"), tells_time=False)
-        self.player.moved.connect(self._moved)
+        self.player.moved.connect(self._show_step)
         self.why = Wrapped("value", "look")
         self.errors.show_text(tr(FIELD_ERRORS))
         self.which, self.picture = choice(tr("picture of the session")), PictureView(tr("the picture"), self._save)
@@ -92,22 +92,16 @@ class ModelColumn(QWidget):
         self.session_errors = Wrapped("quiet")
         self.compared = ComparedView(self.other_wanted.emit, self._save)
         self.scene = TextTable(tr("scene and model"), (tr("of the model"), tr("value"), tr("remark")))
+        session = QWidget()
+        vbox(self.which, self.session_errors, (self.picture, 1), on=session)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName(tr("pictures"))
-        for name, page in (
-            (tr("Finger"), self._finger_page()),
-            (tr("Session"), self._session_page()),
-            (tr("Comparison"), self.compared),
-            (tr("Scene"), self.scene),
-        ):
-            self.tabs.addTab(page, name)
+        self.tabs.addTab(self._finger_page(), tr("Finger"))
+        self.tabs.addTab(session, tr("Session"))
+        self.tabs.addTab(self.compared, tr("Comparison"))
+        self.tabs.addTab(self.scene, tr("Scene"))
         self.tabs.currentChanged.connect(lambda: self._show_session())
         vbox(self.tabs, on=self)
-
-    def _session_page(self) -> QWidget:
-        page = QWidget()
-        vbox(self.which, self.session_errors, (self.picture, 1), on=page)
-        return page
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""
@@ -119,13 +113,13 @@ class ModelColumn(QWidget):
             count = 0 if film is None else len(film.film.instants)
             self.player.set_times([number / STEPS_A_SECOND for number in range(count)], max(count - 1, 0))
         row = chosen(state)
-        said = None if row is None else row.prediction
+        said, stroke = (None, None) if row is None else (row.prediction, row.stroke)
         self.history.setEnabled(film is None and said is not None and said.mu is not None)
         self.why.show_text(film_words(film))
-        self.why.setVisible(bool(film_words(film)))
-        self._ask_where(state, film)
-        drawable = row is not None and row.stroke is not None and (film is not None or row.key in state.fingers)
-        self._name = f" {row.stroke.number}" if drawable and row is not None and row.stroke is not None else ""
+        if film is None:
+            self._ask_where(row, state.version)
+        drawable = film is not None or (row is not None and row.key in state.fingers)
+        self._name = f" {stroke.number}" if drawable and stroke is not None else ""
         self.together.setVisible(state.compared is not None)
         self._paint()
         self.scene.show_lines(scene_table(state))
@@ -140,9 +134,8 @@ class ModelColumn(QWidget):
 
     def _show_compared(self, state: AnalystState, other: m.Compared) -> None:
         assert state.report is not None  # nothing is compared before this session is open
-        reports = (state.report, other.report)
-        first, second = map(named_errors, reports)
-        self.compared.show_rows(compared(*reports), (first, second))
+        names = (named_errors(state.report), named_errors(other.report))
+        self.compared.show_rows(compared(state.report, other.report), names)
         self.together.setChecked(True)
         self._paint()
         self.tabs.setCurrentIndex(COMPARISON)
@@ -164,17 +157,13 @@ class ModelColumn(QWidget):
         name, words = names[self.which.currentIndex()]
         self.session_errors.show_text(picture_errors(state.report, name))
         drawn = state.drawn.get(name)
-        if drawn is None:
-            self.picture.show_picture("", tr("Drawing: {words}", words=words), b"")
-            self._draw(name, state.version)
-        else:
-            self.picture.show_picture(
-                name, drawn.title or tr("There are no numbers yet for: {words}", words=words), drawn.png
-            )
-
-    def _draw(self, name: str, version: int) -> None:
-        if self._drawing != (name, version):
-            self._drawing = (name, version)
+        if drawn is not None:
+            title = drawn.title or tr("There are no numbers yet for: {words}", words=words)
+            self.picture.show_picture(name, title, drawn.png)
+            return
+        self.picture.show_picture("", tr("Drawing: {words}", words=words), b"")
+        if self._drawing != (name, state.version):
+            self._drawing = (name, state.version)
             self.requested.emit(m.Draw(name))
 
     def _paint(self) -> None:
@@ -203,7 +192,10 @@ class ModelColumn(QWidget):
             canvas.show_frame(frame, parts, said, look if canvas is self.finger else replace(look, lost=None), shown)
         self.other.setVisible(bool(other_words))
         self.plot.show_field((finger, other) if other_words else (finger,), field, self.finger.sight.line)
-        self._name_saves()
+        kind = "contact" if self.near.isChecked() else "finger"
+        self.film.setEnabled(bool(self._name) and film is not None)
+        step = "" if film is None or at is None else f" {at}"  # of the history that is shown
+        self.save.set_name(f"{kind}{self._name}{step}" if self._name else "")
 
     def _draw_line(self) -> None:
         """Let the mouse draw a line, and plot along it."""
@@ -223,7 +215,7 @@ class ModelColumn(QWidget):
         said = [] if place is None else [canvas.words_at(place) for canvas in canvases]
         self.probe.show_text("  |  ".join(filter(None, said)))
 
-    def _moved(self, at: int) -> None:
+    def _show_step(self, at: int) -> None:
         self._at = at
         self._paint()
 
@@ -233,22 +225,14 @@ class ModelColumn(QWidget):
             self.requested.emit(m.ShowHistory(row.key))
             self.player.slider.setFocus()
 
-    def _ask_where(self, state: AnalystState, film: m.Filmed | None) -> None:
+    def _ask_where(self, row: Row | None, version: int) -> None:
         """Ask how far a solve without an answer came, once."""
-        row = chosen(state)
         said = None if row is None else row.prediction
-        if row is None or said is None or film is not None or said.sed is not None or not was_tried(said):
+        if row is None or said is None or said.sed is not None or not was_tried(said):
             return
-        wanted = (row.key, state.version)
-        if wanted != self._followed:
-            self._followed = wanted
+        if (row.key, version) != self._followed:
+            self._followed = row.key, version
             self.requested.emit(m.ShowHistory(row.key))
-
-    def _name_saves(self) -> None:
-        kind = "contact" if self.near.isChecked() else "finger"
-        at = "" if self._film is None or self._at is None else f" {self._at}"  # of the history that is shown
-        self.film.setEnabled(bool(self._name) and self._film is not None)
-        self.save.set_name(f"{kind}{self._name}{at}" if self._name else "")
 
     def _save(self, name: str, path: str) -> None:
         self.requested.emit(m.Write(f"picture {name}", path))
@@ -287,7 +271,7 @@ class ModelColumn(QWidget):
         """Begin to write the history that is shown as a film; `said` tells what came of it."""
         assert self._film is not None
         before, self._filming = self._at, True
-        writer = FilmWriter(self.finger, self._head(), self._moved, len(self._film.film.frames))
+        writer = FilmWriter(self.finger, self._head(), self._show_step, len(self._film.film.frames))
 
         def ended(sentence: str) -> None:
             self._filming, self._at = False, before
@@ -300,11 +284,9 @@ class ModelColumn(QWidget):
 
     def _finger_page(self) -> QWidget:
         page = QWidget()
-        fingers = QHBoxLayout()
-        fill(fingers, (self.finger, 1), (self.other, 1))
         vbox(
             self.fields,
-            (fingers, 3),
+            (hbox((self.finger, 1), (self.other, 1)), 3),
             self.probe,
             (self.plot, 1),
             self.errors,

@@ -53,10 +53,10 @@ class SaveButtons(QWidget):
             widget.setEnabled(bool(name))
 
     def _ask(self, kind: str) -> None:
-        proposed = f"{self._name.replace(' ', '-')}.{kind.lower()}"
+        ending = f".{kind.lower()}"
+        proposed = self._name.replace(" ", "-") + ending
         path, _ = QFileDialog.getSaveFileName(self, tr("Save as {kind}", kind=kind), proposed)
         if path:
-            ending = f".{kind.lower()}"
             self._save(self._name, path if path.lower().endswith(ending) else path + ending)
 
 
@@ -161,7 +161,7 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
             drawing.setSize(canvas.size_with(head))
             drawing.setViewBox(QRect(QPoint(), canvas.size_with(head)))
             drawing.setTitle(canvas.accessibleName())
-            _draw(canvas, QPainter(drawing), head)
+            canvas.draw(QPainter(drawing), head)
             write_whole(path, bytes(buffer.data().data()))
         case _:
             buffer = QBuffer()
@@ -172,13 +172,8 @@ def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:
 def _image(canvas: FingerCanvas, density: float, head: str) -> QImage:
     image = QImage(canvas.size_with(head) * density, QImage.Format.Format_RGB888)
     image.setDevicePixelRatio(density)
-    _draw(canvas, QPainter(image), head)
+    canvas.draw(QPainter(image), head)
     return image
-
-
-def _draw(canvas: FingerCanvas, painter: QPainter, head: str) -> None:
-    canvas.draw(painter, head)
-    painter.end()
 
 
 class FilmWriter(QObject):
@@ -224,11 +219,8 @@ class FilmWriter(QObject):
             self._writing = self._pool.submit(_write_film, self._path, self._frames)
         elif self._writing.done():
             error = self._writing.exception()
-            self._end(
-                tr("Saved: {path}", path=self._path)
-                if error is None
-                else tr("The film could not be written: {error}", error=error)
-            )
+            failed = tr("The film could not be written: {error}", error=error)
+            self._end(tr("Saved: {path}", path=self._path) if error is None else failed)
 
     def _end(self, sentence: str) -> None:
         self._timer.stop()

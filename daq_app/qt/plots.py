@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent
 from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
 
@@ -54,8 +54,7 @@ class ZoomedPlot(pg.PlotWidget):
     read: Callable[[float], str] | None = None
 
     def __init__(self, tokens: Tokens) -> None:
-        base: Any = super()
-        base.__init__(background=tokens.surface)
+        pg.PlotWidget.__init__(self, background=tokens.surface)
         scale = type_scale()
         self._names: Any = None
         self._text = tokens.text
@@ -106,8 +105,7 @@ class ZoomedPlot(pg.PlotWidget):
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Say what stands at the pointer, as far as the plot knows it."""
-        base: Any = super()
-        base.mouseMoveEvent(event)
+        pg.PlotWidget.mouseMoveEvent(self, event)
         item: Any = self.getPlotItem()
         box = item.getViewBox()
         scene = self.mapToScene(event.position().toPoint())
@@ -129,8 +127,7 @@ class ZoomedPlot(pg.PlotWidget):
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
         """Say nothing of a place any more."""
         self._hide_words()
-        base: Any = super()
-        base.leaveEvent(event)
+        pg.PlotWidget.leaveEvent(self, event)
 
     def _hide_words(self) -> None:
         self.words.hide()
@@ -150,9 +147,8 @@ class FieldPlot(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         super().__init__()
         self.source = choice(tr("what is plotted under the finger"), map(tr, SOURCES))
-        self.draw = button(
-            tr("Line"), tr("draw a line over the finger with the mouse"), lambda: None, "small", checkable=True
-        )
+        name = tr("draw a line over the finger with the mouse")
+        self.draw = button(tr("Line"), name, lambda: None, "small", checkable=True)
         self.plot = ZoomedPlot(tokens)
         self.plot.read = self._read
         self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
@@ -194,10 +190,8 @@ class FieldPlot(QWidget):
     def _read(self, at: float) -> str:
         """Return what each curve says at a place [mm]."""
         names = NAMES if len(self.values) > 1 else ("",)
-        said = [
-            read_out("mm", place, at, [(name, self._unit, values)])
-            for name, (place, values) in zip(names, self.values, strict=True)
-        ]
+        curves = zip(names, self.values, strict=True)
+        said = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)
         return "   ".join(filter(None, said))
 
 
@@ -265,11 +259,10 @@ class FieldBar(QWidget):
         """Begin fixed colours with those that were shown."""
         for number, end in zip((self.low, self.high), self._automatic, strict=True):
             number.setVisible(self.mode == FIXED)
-            number.blockSignals(True)
-            number.setSuffix(f" {self.field.unit}".removesuffix(" -"))
-            number.setSingleStep((self._automatic[1] - self._automatic[0]) / 20.0)
-            number.setValue(end)
-            number.blockSignals(False)
+            with QSignalBlocker(number):
+                number.setSuffix(f" {self.field.unit}".removesuffix(" -"))
+                number.setSingleStep((self._automatic[1] - self._automatic[0]) / 20.0)
+                number.setValue(end)
         self.changed.emit()
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from PySide6.QtCore import Qt, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
@@ -32,6 +32,7 @@ from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 if TYPE_CHECKING:
     from daq_app.qt.analyst_window import AnalystWindow
 
+V = TypeVar("V")
 Room = Literal["prepare", "run", "review"]
 ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
 WHY_NOT = {
@@ -96,7 +97,6 @@ class Menus:
 
     def __init__(self, window: QMainWindow, act: Callable[[str], None], theme: Callable[[str], None]) -> None:
         """Build the menu; `act` does what an entry stands for, `theme` takes a theme's name."""
-        self._window = window
         self._act = act
         bar = window.menuBar()
         if (more := bar.findChild(QToolButton)) is not None:
@@ -121,19 +121,14 @@ class Menus:
         for room in ROOMS:
             self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
         view.addSeparator()
-        self.themes = self._choices(view.addMenu(tr("Theme")), preferences.THEMES, preferences.theme(), theme)
+        themes = {name: name for name in preferences.THEMES}
+        self.themes = self._choices(view.addMenu(tr("Theme")), themes, preferences.theme(), theme)
         sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
-        now = next((words for words, scale in sizes.items() if scale == preferences.type_scale()), "")
-        self.sizes = self._choices(
-            view.addMenu(tr("Font size")), tuple(sizes), now, lambda words: self._size(sizes[words])
-        )
-        spoken = {name_of(code): code for code in languages(EXPERIMENTER)}
-        self.languages = self._choices(
-            view.addMenu(tr("Language")),
-            tuple(spoken),
-            name_of(preferences.language()),
-            lambda words: self._speak(spoken[words]),
-        )
+        take, now = preferences.choose_type_scale, preferences.type_scale()
+        self.sizes = self._choices(view.addMenu(tr("Font size")), sizes, now, take, "type size")
+        codes = {name_of(code): code for code in languages(EXPERIMENTER)}
+        speak, spoken = preferences.choose_language, preferences.language()
+        self.languages = self._choices(view.addMenu(tr("Language")), codes, spoken, speak, "language")
         panels = view.addMenu(tr("Panels"))
         for name, words in PANELS:
             self._add(panels, name, tr(words))
@@ -157,22 +152,17 @@ class Menus:
         key = next((known.key for known in KEYS if known.act == name), "")
         return menu.addAction(f"{words}\t{key}" if key else words, lambda: self._act(name))
 
-    def _choices(self, menu: QMenu, names: tuple[str, ...], now: str, take: Callable[[str], None]) -> QActionGroup:
+    def _choices(
+        self, menu: QMenu, values: Mapping[str, V], now: V, take: Callable[[V], None], act: str = ""
+    ) -> QActionGroup:
+        """Return an entry for each value, by its name, that gives it to `take` and then does an `act`."""
         group = QActionGroup(menu)
-        for name in names:
-            action = menu.addAction(tr(name).capitalize(), lambda name=name: take(name))
+        for name, value in values.items():
+            action = menu.addAction(tr(name).capitalize(), lambda value=value: (take(value), act and self._act(act)))
             action.setCheckable(True)
-            action.setChecked(name == now)
+            action.setChecked(value == now)
             group.addAction(action)
         return group
-
-    def _size(self, scale: float) -> None:
-        preferences.choose_type_scale(scale)
-        self._act("type size")
-
-    def _speak(self, code: str) -> None:
-        preferences.choose_language(code)
-        self._act("language")
 
     def _list_recent(self) -> None:
         self.recent.clear()
@@ -280,9 +270,7 @@ class Rooms(QStackedWidget):
     def __init__(self, bridge: Bridge, scale: float, rail: Rail, menus: Menus) -> None:
         """Show nothing yet: the room of the session in hand is the first widget that is added."""
         super().__init__()
-        self._bridge = bridge
-        self._rail = rail
-        self._menus = menus
+        self._bridge, self._rail, self._menus = bridge, rail, menus
         self._kept: str | None = None  # folder of the session that was put among the recent ones
         self.review = ReviewRoom(scale)  # added when it is first entered
 
@@ -336,10 +324,6 @@ class Rooms(QStackedWidget):
         in_hand = self._bridge.view.course is not None
         self._rail.show_room(self.room, in_hand=in_hand, over=self.over)
         self._menus.show_state(in_hand=in_hand, over=self.over, opened=self.analyst is not None)
-
-    def leave(self) -> None:
-        """End the work on the session that is looked at."""
-        self.review.leave()
 
     def _entered(self) -> ReviewRoom:
         if self.count() == 1:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QSettings, Qt, Signal
+from PySide6.QtCore import QSettings, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
@@ -35,6 +35,7 @@ class StrokeColumn(QWidget):
     def __init__(self, tokens: Tokens) -> None:
         super().__init__()
         self._stroke: StrokeFinding | None = None
+        self._play_next = False
         self._moving = False  # an edge was let go elsewhere, and what came of it is not known yet
         self._read: m.Read | None = None
         self._wanted: tuple[int, int] | None = None  # readings that were asked for: stroke, and version of the report
@@ -84,15 +85,17 @@ class StrokeColumn(QWidget):
             self.save.set_name("" if stroke is None else f"stroke {stroke.number}")
             self._read = None
         elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
-            self.stroke.put_back()
+            self.stroke.show_edges()
         self._moving = self._moving and state.step is not None
         self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()), state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
-        lines = numbers(state)
-        if lines != self._lines:
+        if (lines := numbers(state)) != self._lines:
             self._lines = lines
-            self._show_numbers()
+            while self._numbers.rowCount():
+                self._numbers.removeRow(0)
+            for name, value in lines:
+                self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
 
     def go_to_window(self) -> None:
         """Go to the handle where the steady window begins."""
@@ -115,8 +118,6 @@ class StrokeColumn(QWidget):
         """Play the readings from their beginning as soon as they are there."""
         self._play_next = True
 
-    _play_next = False
-
     def _choose(self, row: int) -> None:
         self.requested.emit(m.Choose(row))
 
@@ -136,18 +137,11 @@ class StrokeColumn(QWidget):
         self.stroke.show_readings(readings)
         self.readings.show_readings(readings, None if stroke is None else stroke.steady)
         times: list[float] = [] if readings is None else readings.time.tolist()
-        self.player.blockSignals(True)
-        self.player.set_times(times, max(len(times) - 1, 0))
-        self.player.blockSignals(False)
+        with QSignalBlocker(self.player):
+            self.player.set_times(times, max(len(times) - 1, 0))
         if times and self._play_next:
             self._play_next = False
             self.player.toggle()
-
-    def _show_numbers(self) -> None:
-        while self._numbers.rowCount():
-            self._numbers.removeRow(0)
-        for name, value in self._lines:
-            self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
 
     def _dragged(self, edge: Edge, time: float) -> None:
         if self._stroke is not None:
@@ -168,15 +162,14 @@ class DecisionStack(QUndoStack):
 
     def show_history(self, history: History) -> None:
         """Show what can be undone and redone; nothing is asked for by it."""
-        words = [self.text(at) for at in range(self.count())]
-        if (*history.done, *history.undone) == tuple(words) and len(history.done) == self.index():
+        decisions = [*history.done, *history.undone]
+        if decisions == [self.text(at) for at in range(self.count())] and len(history.done) == self.index():
             return
-        self.blockSignals(True)  # each command that is pushed is done, and one that is left is undone
-        self.clear()
-        for one in (*history.done, *history.undone):
-            self.push(_Decision(one, self.wanted.emit))
-        self.setIndex(len(history.done))
-        self.blockSignals(False)
+        with QSignalBlocker(self):  # each command that is pushed is done, and one that is left is undone
+            self.clear()
+            for words in decisions:
+                self.push(_Decision(words, self.wanted.emit))
+            self.setIndex(len(history.done))
         self.indexChanged.emit(self.index())
 
 
@@ -215,20 +208,9 @@ class DecisionsBar(QWidget):
         self.redo = button(tr("Redo"), "", self.stack.redo, "small")
         self._show_next()
         self.sentences_label = Wrapped("value", "look")
-        vbox(
-            hbox(
-                label(tr("by"), "quiet"),
-                self.by,
-                label(tr("why"), "quiet"),
-                (self.why, 1),
-                self.undo,
-                self.redo,
-                spacing=GRID // 2,
-            ),
-            self.sentences_label,
-            on=self,
-            spacing=GRID // 2,
-        )
+        by, why = label(tr("by"), "quiet"), label(tr("why"), "quiet")
+        row = hbox(by, self.by, why, (self.why, 1), self.undo, self.redo, spacing=GRID // 2)
+        vbox(row, self.sentences_label, on=self, spacing=GRID // 2)
 
     def who(self) -> str:
         """Return the code of who decides."""

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent
+from PySide6.QtGui import QFocusEvent, QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSizePolicy, QWidget
 
 from daq_app.analyst.frame import read_out
@@ -146,18 +146,14 @@ class StrokeView(QWidget):
         other = self._stroke is None or stroke is None or stroke.number != self._stroke.number
         self._stroke = stroke
         self._origin = 0.0 if trace is None else trace.origin
-        self.setAccessibleName(
-            tr(
-                "forces and friction of {word}",
-                word=tr("no stroke") if stroke is None else tr("stroke {number}", number=stroke.number),
-            )
-        )
+        word = tr("no stroke") if stroke is None else tr("stroke {number}", number=stroke.number)
+        self.setAccessibleName(tr("forces and friction of {word}", word=word))
         values = ((), (), ()) if trace is None else (trace.normal, trace.tangential, trace.mu)
         self._time = np.array(() if trace is None else trace.time, np.float64)
         self._columns = [np.array([np.nan if v is None else v for v in column], np.float64) for column in values]
-        self._show_edges()
+        self.show_edges()
         if other:
-            self.show_readings(None)
+            self._raw = None
         self._draw(None)
         if other:
             self.show_all()
@@ -179,10 +175,6 @@ class StrokeView(QWidget):
         curves = [(name, unit, column) for (name, unit), column in zip(names, self._columns, strict=True)]
         return read_out("s", self._time, time, curves)
 
-    def put_back(self) -> None:
-        """Show every edge where it is."""
-        self._show_edges()
-
     def show_readings(self, readings: RawReadings | None) -> None:
         """Show the readings as they were recorded, thin, behind the stroke."""
         self._raw = readings
@@ -201,16 +193,15 @@ class StrokeView(QWidget):
             curve.setData(self._time[:until], column[:until])
         stop = 0 if raw is None else len(raw) if at is None else at + 1
         for curve, name in zip(self._recorded, ("normal", "tangential"), strict=True):
-            if raw is None:
-                curve.setData([], [])
-            else:
-                curve.setData(raw.time[:stop] - self._origin, getattr(raw, name)[:stop])
+            shown = () if raw is None else (raw.time[:stop] - self._origin, getattr(raw, name)[:stop])
+            curve.setData(*(shown or ([], [])))
         for line in self._now:
             line.setVisible(now is not None)
             if now is not None:
                 line.setPos(now)
 
-    def _show_edges(self) -> None:
+    def show_edges(self) -> None:
+        """Show every edge where it is."""
         placed = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
         for edge in EDGES:
             one = placed.get(edge)
@@ -245,21 +236,11 @@ class StrokeView(QWidget):
         self._fill()
 
     def _line(self, edge: Edge, plot: Any) -> Any:  # noqa: ANN401  pyqtgraph has no types
-        first = plot is self._plots[0]
-        side = 1.0 if edge in ("lift", "steady end") else 0.0  # on the side where there is room
-        options = {
-            "position": 0.92 if edge in ("onset", "lift") else 0.8,
-            "color": QColor(self._tokens.act),
-            "anchors": [(side, 0.5), (side, 0.5)],
-        }
-        line: Any = pg.InfiniteLine(
-            angle=90,
-            movable=True,
-            hoverPen=pg.mkPen(self._tokens.text, width=3),
-            label=tr(edge) if first else None,
-            labelOpts=options if first else None,
-        )
-        if first:
+        line: Any = pg.InfiniteLine(angle=90, movable=True, hoverPen=pg.mkPen(self._tokens.text, width=3))
+        if plot is self._plots[0]:
+            side = 1.0 if edge in ("lift", "steady end") else 0.0  # on the side where there is room
+            place, anchors = 0.92 if edge in ("onset", "lift") else 0.8, [(side, 0.5)] * 2
+            line.label = pg.InfLineLabel(line, tr(edge), position=place, color=self._tokens.act, anchors=anchors)
             line.label.setFont(font(SMALL, type_scale()))
         line.sigDragged.connect(lambda: self._try(edge, float(line.value()) + self._origin))
         line.sigPositionChangeFinished.connect(lambda: self.moved.emit(edge, float(line.value()) + self._origin))

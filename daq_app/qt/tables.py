@@ -4,7 +4,15 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QPersistentModelIndex, QSortFilterProxyModel, Qt, Signal
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QSignalBlocker,
+    QSortFilterProxyModel,
+    Qt,
+    Signal,
+)
 from PySide6.QtGui import QFont, QGuiApplication, QKeyEvent, QKeySequence, QShowEvent, QStandardItem, QStandardItemModel
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
 
@@ -15,14 +23,7 @@ from daq_app.wording import tr, tr_noop
 
 NUMBER = re.compile(r"[-−+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?", re.IGNORECASE)
 Index = QModelIndex | QPersistentModelIndex
-HEAD = (
-    tr_noop("window"),
-    tr_noop("sequence"),
-    tr_noop("counter"),
-    tr_noop("status"),
-    tr_noop("time [s]"),
-    tr_noop("received [ns]"),
-)
+HEAD = tr_noop(("window", "sequence", "counter", "status", "time [s]", "received [ns]"))
 
 
 class CopiedTable(QTableView):
@@ -84,19 +85,17 @@ class TextTable(CopiedTable):
 
     def show_lines(self, lines: tuple[tuple[str, ...], ...], at: int = -1) -> None:
         """Show lines, and stand at one of them."""
-        self.selectionModel().blockSignals(True)
         if lines != self._shown:
             self._shown = lines
-            self._cells.setRowCount(0)
-            for cells in lines:
-                self._cells.appendRow([_item(words) for words in cells])
-            self.resizeColumnsToContents()
-        self.selectionModel().blockSignals(False)
+            with QSignalBlocker(self.selectionModel()):
+                self._cells.setRowCount(0)
+                for cells in lines:
+                    self._cells.appendRow([_item(words) for words in cells])
+                self.resizeColumnsToContents()
         now = self._sorted.mapToSource(self.currentIndex())
         if 0 <= at < len(lines) and at != now.row():
-            self.blockSignals(True)
-            self.go_to(at, max(now.column(), 0))
-            self.blockSignals(False)
+            with QSignalBlocker(self):
+                self.go_to(at, max(now.column(), 0))
 
     def go_to(self, line: int, column: int = 0) -> None:
         """Stand at a cell of a line, which is numbered as before any sorting."""
@@ -138,19 +137,14 @@ class ReadingsTable(QWidget):
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
         """Show readings, those of the steady window marked by a word and by bold type."""
         self._model.show_readings(readings, steady)
-        if readings is None:
-            self.place.show_text(tr("Not read yet."))
-            self._fit_columns()
-            return
-        self.place.show_text(
-            tr(
-                ("{place}. raw 1 to 6 as the device sent them [{unit}]; N and T unfiltered, zero taken off: {zero}."),
-                place=readings.place,
-                unit=readings.unit,
-                zero=readings.zero,
-            )
-        )
         self._fit_columns()
+        words = tr("Not read yet.")
+        if readings is not None:
+            words = tr(
+                "{place}. raw 1 to 6 as the device sent them [{unit}]; N and T unfiltered, zero taken off: {zero}.",
+                place=readings.place, unit=readings.unit, zero=readings.zero,
+            )  # fmt: skip
+        self.place.show_text(words)
 
     def _fit_columns(self) -> None:
         """Make each column as wide as its head and a few of its lines need: there may be a hundred thousand."""
@@ -220,12 +214,10 @@ class _Model(QAbstractTableModel):
         match column:
             case 0:
                 return tr("steady") if inside else ""
-            case 1 | 2 | 3:
-                return str((r.sequence, r.counter, r.status)[column - 1][at])
-            case 5:
-                return str(r.received_ns[at])
             case 4:
                 return f"{r.time[at]:.6f}"
+            case 1 | 2 | 3 | 5:
+                return str((r.sequence, r.counter, r.status, r.time, r.received_ns)[column - 1][at])
             case 12 | 13:
                 return f"{(r.normal, r.tangential)[column - 12][at]:.4f}"
             case _:

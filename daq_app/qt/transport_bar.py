@@ -5,7 +5,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QSignalBlocker, Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QSizePolicy, QSlider, QWidget
 
@@ -90,7 +90,7 @@ class TransportBar(QWidget):
         self.speed = choice(tr("speed of {what}", what=what), (f"× {value:g}" for value in SPEEDS))
         self.speed.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.speed.setCurrentIndex(SPEEDS.index(1.0))
-        self.speed.activated.connect(self._at_speed)
+        self.speed.activated.connect(self._change_speed)
         self.place = label("", "quiet")
         self.place.setVisible(tells_time)
         hbox(self.play, self.back, self.forward, (self.slider, 1), self.place, self.speed, on=self, spacing=GRID)
@@ -111,10 +111,9 @@ class TransportBar(QWidget):
         place = times[at] if len(times) else 0.0
         self._transport = Transport(*ends, place, self._transport.speed)
         self._timer.stop()
-        self.slider.blockSignals(True)
-        self.slider.setRange(0, max(len(times) - 1, 0))
-        self.slider.setPageStep(max(len(times) // 20, 1))
-        self.slider.blockSignals(False)
+        with QSignalBlocker(self.slider):
+            self.slider.setRange(0, max(len(times) - 1, 0))
+            self.slider.setPageStep(max(len(times) // 20, 1))
         self._shown = -1
         self._enable()
         if len(times):
@@ -128,10 +127,7 @@ class TransportBar(QWidget):
             return
         now = time.monotonic()
         self._transport = self._transport.paused(now) if self.playing else self._transport.played(now)
-        if self.playing:
-            self._timer.start()
-        else:
-            self._timer.stop()
+        (self._timer.start if self.playing else self._timer.stop)()
         self._enable()
 
     def step(self, by: int) -> None:
@@ -166,7 +162,7 @@ class TransportBar(QWidget):
         if at != self._shown and len(self._times):
             self.seek(at)
 
-    def _at_speed(self, at: int) -> None:
+    def _change_speed(self, at: int) -> None:
         self._transport = self._transport.at_speed(SPEEDS[at], time.monotonic())
 
     def _tick(self) -> None:
@@ -181,9 +177,8 @@ class TransportBar(QWidget):
         if at == self._shown:
             return
         self._shown = at
-        self.slider.blockSignals(True)
-        self.slider.setValue(at)
-        self.slider.blockSignals(False)
+        with QSignalBlocker(self.slider):
+            self.slider.setValue(at)
         say(self.place, f"{self._times[at] - self._times[0]:.3f} s")
         self.moved.emit(at)
 
@@ -192,6 +187,5 @@ class TransportBar(QWidget):
         for part in (self.play, self.back, self.forward, self.slider, self.speed):
             part.setEnabled(there)
         self.play.setText("❚❚" if self.playing else "▶")
-        self.play.setAccessibleName(
-            tr("pause {what}", what=self._what) if self.playing else tr("play {what}", what=self._what)
-        )
+        words = tr("pause {what}", what=self._what) if self.playing else tr("play {what}", what=self._what)
+        self.play.setAccessibleName(words)

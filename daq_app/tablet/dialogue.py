@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from daq_app.window.course_state import SessionState
 from daq_app.window.subject import Answer, Choice, Device, Kind, SubjectView, Translate, Which
@@ -25,19 +25,10 @@ ANSWERS: Mapping[Kind, tuple[type, ...]] = {
     "number": (MagnitudeEstimate,),
     "choice": (PairedChoice,),
 }
-WORDS = (
-    Text.NEXT,
-    Text.FIRST,
-    Text.SECOND,
-    Text.THANKS,
-    Text.OFFLINE,
-    Text.LINE,
-    Text.UNANSWERED,
-    Text.ANSWERED,
-    Text.OWN_NUMBER,
-    Text.OF_TWO,
-    Text.PRESSING,
-)  # of the page itself
+WORDS = (  # of the page itself
+    Text.NEXT, Text.FIRST, Text.SECOND, Text.THANKS, Text.OFFLINE, Text.LINE, Text.UNANSWERED, Text.ANSWERED,
+    Text.OWN_NUMBER, Text.OF_TWO, Text.PRESSING,
+)  # fmt: skip
 
 
 class Hello(Struct, frozen=True, tag="hello"):
@@ -153,20 +144,11 @@ class Dialogue:
             self._waiting.clear()  # what the recorder has not stored is sent again
         for key in tuple(self._waiting):
             self._acknowledge(key)
+        key = _key(session, *view.key) if view.asks and session is not None else ""
         page = Page(
-            view.kind,
-            _key(session, *view.key) if view.asks and session is not None else "",
-            view.title,
-            view.text,
-            view.ends,
-            view.ticks,
-            view.hand,
-            view.language,
-            "rtl" if mirrored else "ltr",
-            view.force,
-            session is None,
-            {word.name.lower(): say(word) for word in WORDS},
-        )
+            view.kind, key, view.title, view.text, view.ends, view.ticks, view.hand, view.language,
+            "rtl" if mirrored else "ltr", view.force, session is None, {word.name.lower(): say(word) for word in WORDS},
+        )  # fmt: skip
         if page != self._page:
             self._page = page
             self._send(page)
@@ -185,7 +167,7 @@ class Dialogue:
             self._waiting.add(key)
             return event
         self._send(Stored(key))
-        return Note(f"The tablet gave an answer that was no longer asked for ({key}): {_value(event)}")
+        return Note(f"The tablet gave an answer that was no longer asked for ({key}): {structs.astuple(event)[0]}")
 
     def _acknowledge(self, key: str) -> bool:
         """Tell the tablet that an answer is stored, where it is; return whether it is."""
@@ -220,17 +202,6 @@ def event_of(acts: Sequence[Act], clock: Callable[[float], float], hand: Hand | 
             case _:
                 pass  # a value that does not go with its act
     return choice.judgement(hand) if choice != Choice() else line.released().scored(hand)
-
-
-def _value(event: Answered) -> float | str | None:
-    """Return what an answer says."""
-    match event:
-        case Scored(score):
-            return score
-        case MagnitudeEstimate(number):
-            return number
-        case PairedChoice(choice):
-            return choice
 
 
 def _key(session: SessionState, trial: int, take: int) -> str:

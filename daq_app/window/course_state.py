@@ -15,19 +15,9 @@ from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
 
 Phase = Literal[
-    "idle",
-    "resting",
-    "mounting",
-    "taring",
-    "ready",
-    "stroking",
-    "scoring",
-    "settling",
-    "paused",
-    "closing",
-    "ended",
+    "idle", "resting", "mounting", "taring", "ready", "stroking", "scoring", "settling", "paused", "closing", "ended",
     "resuming",
-]
+]  # fmt: skip
 REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases that the recorder tells
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
@@ -125,15 +115,8 @@ class SessionState:
 
 def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
     """Return a session that has just begun, or goes on, at `now` [s]."""
-    session = SessionState(
-        begun.folder,
-        begun.plan,
-        begun.people,
-        begun.simulated,
-        tuple(TrialState(t, chosen=t.standard or not b.candidates) for b in begun.plan.blocks for t in b.trials),
-        now,
-        since=now,
-    )
+    trials = tuple(TrialState(t, chosen=t.standard or not b.candidates) for b in begun.plan.blocks for t in b.trials)
+    session = SessionState(begun.folder, begun.plan, begun.people, begun.simulated, trials, now, since=now)
     for event in begun.events:
         session = _logged(session, event)
     return replace(session, marks=())  # theirs is the clock of a stream that has ended
@@ -235,7 +218,7 @@ def _noticed(session: SessionState, message: Message) -> SessionState:
         case steps.ShowInstruction(block):
             return replace(session, block=block)
         case steps.StartTake(trial, take):
-            return replace(session.with_trial(trial, takes=take, outcome="coming", quality=None))
+            return session.with_trial(trial, takes=take, outcome="coming", quality=None)
         case steps.Tell(sentence) | steps.Refuse(sentence):
             return replace(session, notice=sentence)
         case steps.EndSession():

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.recorder.messages import Live
-from daq_app.window.live_trace import Columns, LiveTrace
+from daq_app.window.live_trace import LiveTrace
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.plan.plan import Frame, SessionPlan
 from sessions.strokes import FrictionParameters
@@ -136,13 +136,8 @@ def forces_of(live: Live, frame: Frame) -> Forces | None:
 
 def joined(batches: list[Forces]) -> Forces:
     """Return several batches of one stream as one."""
-    return Forces(
-        np.concatenate([b.time for b in batches]),
-        np.concatenate([b.normal for b in batches]),
-        np.concatenate([b.pull for b in batches]),
-        batches[-1].received_ns,
-        batches[-1].stream,
-    )
+    time, normal, pull = (np.concatenate([getattr(b, name) for b in batches]) for name in ("time", "normal", "pull"))
+    return Forces(time, normal, pull, batches[-1].received_ns, batches[-1].stream)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,19 +159,15 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
     if said.beyond:
         return ModelWords(tr("These forces are beyond the reach of the model."), "beyond")
     if said.sed[-1] <= 0.0:
-        return ModelWords(
-            tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics])), "none"
-        )
+        words = tr("Model at {kinematics}: nothing touches.", kinematics=tr(KINEMATICS[said.kinematics]))
+        return ModelWords(words, "none")
     known = tr(
         "PROVISIONAL  SED {kpa}{errors} · at the measured force, {depth:.1f} mm deep · ",
-        kpa=_kpa(float(said.sed[-1])),
-        errors=errors_words(None),
-        depth=said.depth,
-    )
+        kpa=_kpa(float(said.sed[-1])), errors=errors_words(None), depth=said.depth,
+    )  # fmt: skip
     if said.instead[-1]:
-        return ModelWords(
-            tr("{told}small strain: these forces are beyond the reach of finite strain", told=known), "instead"
-        )
+        words = tr("{told}small strain: these forces are beyond the reach of finite strain", told=known)
+        return ModelWords(words, "instead")
     return ModelWords(known + tr(KINEMATICS[said.kinematics]), "provisional")
 
 
@@ -190,9 +181,8 @@ def _of_settled(settled: Settled) -> str:
             marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
             kept = tr(
                 " Shown is the last state that was followed, {depth:.1f} mm deep{marked}.",
-                depth=settled.depth,
-                marked=marked,
-            )
+                depth=settled.depth, marked=marked,
+            )  # fmt: skip
         return tr(
             "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
         )
@@ -201,36 +191,25 @@ def _of_settled(settled: Settled) -> str:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
     return tr(
         "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",
-        kpa=_kpa(settled.sed),
-        errors=errors_words(settled.error, settled.effect),
-        how=how,
-        shown=shown,
-    )
+        kpa=_kpa(settled.sed), errors=errors_words(settled.error, settled.effect), how=how, shown=shown,
+    )  # fmt: skip
 
 
 def _kpa(sed: float) -> str:
     return f"{1000 * sed:.2f} kPa"
 
 
-class ModelTrace:
-    """The SED at the receptor over the last minute, for a plot."""
+class ModelTrace(LiveTrace):
+    """The SED at the receptor over the last minute [kPa], for a plot."""
 
     def __init__(self) -> None:
-        self._trace = LiveTrace(1.0 / STEP, channels=len(MODEL_CHANNELS), gap=GAP)
+        super().__init__(1.0 / STEP, channels=len(MODEL_CHANNELS), gap=GAP)
         self._stream: int | None = None
 
-    def add(self, said: Provisional) -> None:
+    def predicted(self, said: Provisional) -> None:
         """Take another prediction."""
         if said.stream != self._stream:
             self._stream = said.stream
-            self._trace.clear()
+            self.clear()
         sed = 1000.0 * said.sed
-        self._trace.add(said.time, np.stack([np.where(said.instead, np.nan, sed), np.where(said.instead, sed, np.nan)]))
-
-    def holds(self, first: float) -> bool:
-        """Return whether nothing said since `first` [s] was dropped."""
-        return self._trace.holds(first)
-
-    def columns(self, first: float, last: float, count: int) -> Columns:
-        """Return the SED [kPa] from `first` to `last` [s, device time] in about `count` columns; a gap stays a gap."""
-        return self._trace.columns(first, last, count)
+        self.add(said.time, np.stack([np.where(said.instead, np.nan, sed), np.where(said.instead, sed, np.nan)]))

@@ -92,7 +92,8 @@ class LiveTrace:
         """
         a, b = self._positions(first, last)
         if b - a <= 2 * count:
-            return _one_by_one(self._time[a:b], self._values[:, a:b], self._gap)
+            time, values = self._time[a:b].copy(), self._values[:, a:b].astype(np.float64)
+            return _with_gaps(time, values, np.flatnonzero(np.diff(time) > self._gap), 1)
         width = (last - first) / count
         if self._columns.width != width or self._columns.first > first:
             self._columns = self._no_columns(width, first)
@@ -151,11 +152,6 @@ def _pairs(values: NDArray[np.float32], starts: NDArray[np.int64]) -> NDArray[np
     pairs[:, 0::2] = np.where(rising, least, greatest)
     pairs[:, 1::2] = np.where(rising, greatest, least)
     return pairs
-
-
-def _one_by_one(time: Array, values: NDArray[np.float32], gap: float) -> Columns:
-    gaps = np.flatnonzero(np.diff(time) > gap)
-    return _with_gaps(time.copy(), values.astype(np.float64), gaps, 1)
 
 
 def _with_gaps(time: Array, values: Array, gaps: NDArray[np.int64], each: int) -> Columns:

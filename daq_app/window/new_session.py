@@ -13,7 +13,7 @@ from daq_app.wording import sentence, tr
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
-from sessions.plan.study import StudyError, enrol, is_study, open_study, study_key
+from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
 from sessions.recording.storage import check_room, need
@@ -110,35 +110,21 @@ def checked(
     `new_seed` is used where the form names none; `settings` are kept with the session beside the page's own. In a
     study, protocol, seed and the subject's own finger are those that were decided at its enrolment.
     """
-    wrong = _refusals(form, bench)
-    if wrong:
+    if wrong := _refusals(form, bench):
         return Refused(wrong)
+    phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
+    phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
+    frame, area = (bench.frame, _number(form.area)) if form.forces else (None, None)
+    setting = VisitSetting(frame, area, form.stroking_hand, form.answering_hand, form.language or None)
     try:
         chosen, seed, body, place = _decided(form, new_seed)
+        planned = plan(
+            chosen, form.subject.strip(), seed, forces=form.forces, setting=setting,
+            phases=phases if len(phases) > 1 else None, body=body, place=place,
+        )  # fmt: skip
     except StudyError as error:
         return Refused({"subject": _sentence(error)})
     except (SettingsError, OSError) as error:
-        return Refused({"protocol": _sentence(error)})
-    phases_wanted: dict[Phase, bool] = {"pre-evaluation": form.pre_evaluation, "practice": form.practice, "main": True}
-    phases: list[Phase] = [phase for phase, wanted in phases_wanted.items() if wanted]
-    try:
-        planned = plan(
-            chosen,
-            form.subject.strip(),
-            seed,
-            forces=form.forces,
-            setting=VisitSetting(
-                bench.frame if form.forces else None,
-                _number(form.area) if form.forces else None,
-                form.stroking_hand,
-                form.answering_hand,
-                form.language or None,
-            ),
-            phases=phases if len(phases) > 1 else None,
-            body=body,
-            place=place,
-        )
-    except SettingsError as error:
         return Refused({"protocol": _sentence(error)})
     if form.forces and form.height.strip():
         face = replace(planned.frame, height=_number(form.height) or 0.0, height_origin="measured")
@@ -147,8 +133,10 @@ def checked(
         planned = replace(planned, frame=replace(planned.frame, normal=form.normal, normal_origin="set"))
     # In a study the folder's name tells what the visit is for: the protocol is the same in all.
     what = planned.protocol if place is None else "forces" if planned.forces else "scores"
-    folder = session_folder(form, what, now)
-    people = People(_kind(form, bench), seed, chosen.planted_friction)
+    parent = Path(form.folder.strip() or ".").expanduser() / PILOTS if form.pilot else place_of(form)
+    folder = parent / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
+    hand: Kind = "simulated hand" if form.forces and bench.simulated else "people"
+    people = People("simulated people" if form.simulated else hand, seed, chosen.planted_friction)
     own = [Setting("seed", seed, "", "set" if form.seed.strip() and place is None else "default")]
     if form.study.strip() and not form.pilot:
         own.append(Setting("study", form.study.strip(), "", "set"))
@@ -194,10 +182,8 @@ def is_code(subject: str) -> bool:
 
 def offered(form: SessionForm) -> tuple[Phase, ...]:
     """Return what may come before the trials that count, as the study's protocol or the form's has it."""
-    folder = place_of(form)
     try:
-        in_study = form.study.strip() and is_study(folder)
-        return phases_before(open_study(folder).protocol if in_study else protocol(form.protocol))
+        return phases_before(_protocol(form))
     except (StudyError, SettingsError, OSError):
         return ()
 
@@ -205,8 +191,7 @@ def offered(form: SessionForm) -> tuple[Phase, ...]:
 def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the languages that the form's protocol has, its own first, and what of it is read in the form's."""
     try:
-        in_study = form.study.strip() and is_study(place_of(form))
-        chosen = open_study(place_of(form)).protocol if in_study else protocol(form.protocol)
+        chosen = _protocol(form)
         read = chosen.in_language(form.language) if form.language in chosen.languages else chosen
     except (StudyError, SettingsError, OSError):
         return (), ()
@@ -216,38 +201,28 @@ def subject_texts(form: SessionForm) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def enrolment(form: SessionForm) -> Enrolment | None:
     """Return what the study that the form names says of the subject; None where it names none that was made."""
-    folder = place_of(form)
-    if not form.study.strip() or not is_study(folder):
-        return None
     try:
-        study = open_study(folder)
+        study = _study(form)
     except (StudyError, SettingsError) as error:
         return Enrolment("", _sentence(error))
+    if study is None:
+        return None
     subject, name = form.subject.strip(), study.protocol.name
     if not is_code(subject):
         return Enrolment(name, tr("A study of protocol {name}: give the code of one of its subjects.", name=name))
     if subject not in study.members:
-        return Enrolment(
-            name,
-            tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name),
-            may_enrol=True,
-        )
+        words = tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name)
+        return Enrolment(name, words, may_enrol=True)
     try:
         member = study.member(subject)
     except StudyError as error:
         return Enrolment(name, _sentence(error))
     blinded = "" if study.key_sha256 is None or study.unblinded else tr("; blinded: codes alone are shown")
-    return Enrolment(
-        name,
-        tr(
-            "{subject} is enrolled: protocol {name}, row {row}{blinded}.",
-            subject=subject,
-            name=name,
-            row=study.row(member.slot),
-            blinded=blinded,
-        ),
-        enrolled=True,
-    )
+    words = tr(
+        "{subject} is enrolled: protocol {name}, row {row}{blinded}.",
+        subject=subject, name=name, row=study.row(member.slot), blinded=blinded,
+    )  # fmt: skip
+    return Enrolment(name, words, enrolled=True)
 
 
 def enrolled(form: SessionForm) -> str:
@@ -259,12 +234,6 @@ def enrolled(form: SessionForm) -> str:
     return ""
 
 
-def session_folder(form: SessionForm, what: str, now: datetime) -> Path:
-    """Return the folder the session will be in: a new one for every visit."""
-    place = Path(form.folder.strip() or ".").expanduser() / PILOTS if form.pilot else place_of(form)
-    return place / f"{form.subject.strip()}_{what}_{now.strftime('%Y%m%dT%H%M%S')}"
-
-
 def place_of(form: SessionForm) -> Path:
     """Return the folder in which the session gets its own."""
     return Path(form.folder.strip() or ".").expanduser() / form.study.strip()
@@ -272,41 +241,45 @@ def place_of(form: SessionForm) -> Path:
 
 def _decided(form: SessionForm, new_seed: int) -> tuple[Protocol, int, Body | None, StudyPlace | None]:
     """Return protocol, seed, the subject's own and its place, as a study or the form decides them."""
-    folder = place_of(form)
-    if not form.study.strip() or not is_study(folder):
+    study = _study(form)
+    if study is None:
         return protocol(form.protocol), int(form.seed) if form.seed.strip() else new_seed, None, None
-    study = open_study(folder)
     if form.pilot:
         return study.protocol, new_seed, None, None
-    member = study.member(form.subject.strip())
-    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, study_key(folder))
+    member, key = study.member(form.subject.strip()), study_key(place_of(form))
+    return study.protocol, study.session_seed(member.slot), member.body, study.place(member, key)
+
+
+def _study(form: SessionForm) -> Study | None:
+    """Return the study that a form names; None where it names none that was made."""
+    folder = place_of(form)
+    return open_study(folder) if form.study.strip() and is_study(folder) else None
+
+
+def _protocol(form: SessionForm) -> Protocol:
+    """Return the protocol of the study that a form names, or else its own."""
+    study = _study(form)
+    return protocol(form.protocol) if study is None else study.protocol
 
 
 def unfinished(folder: Path) -> tuple[Unfinished, ...]:
     """Return the sessions below a folder (or a study in it) that were cut short, the newest first."""
     unfinished: list[Unfinished] = []
-    places = sorted(
-        (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite")), key=lambda place: -place.stat().st_mtime
-    )
-    for place in places:
-        session = place.parent
+    places = (*folder.glob("*/session.sqlite"), *folder.glob("*/*/session.sqlite"))
+    for place in sorted(places, key=lambda place: -place.stat().st_mtime):
         if len(unfinished) == SHOWN:
             break
-        if is_sealed(session):
+        if is_sealed(place.parent):
             continue
         try:
-            recording = Recording.open(session)
+            recording = Recording.open(place.parent)
             check_resumable(recording)
         except (RecordingError, OSError):
             continue
-        done = sum(record.outcome != "open" for record in recording.trials)
-        words = tr(
-            "{subject}: trials done {done} of {count}",
-            subject=recording.plan.subject,
-            done=done,
-            count=len(recording.trials),
-        )
-        unfinished.append(Unfinished(session, words))
+        subject, trials = recording.plan.subject, recording.trials
+        done = sum(record.outcome != "open" for record in trials)
+        words = tr("{subject}: trials done {done} of {count}", subject=subject, done=done, count=len(trials))
+        unfinished.append(Unfinished(place.parent, words))
     return tuple(unfinished)
 
 
@@ -350,12 +323,6 @@ def _number(text: str) -> float | None:
         return float(text.strip().replace(",", "."))
     except ValueError:
         return None
-
-
-def _kind(form: SessionForm, bench: Bench) -> Kind:
-    if form.simulated:
-        return "simulated people"
-    return "simulated hand" if form.forces and bench.simulated else "people"
 
 
 def _sentence(error: Exception) -> str:

@@ -79,11 +79,8 @@ class Judge:
             return
         if error := done.exception():
             self._worker = None  # the next stroke gets another
-            self._say(
-                DrawingFailed(
-                    tr("the last stroke was not looked at: {name} {error}", name=type(error).__name__, error=error)
-                )
-            )
+            name = type(error).__name__
+            self._say(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
             return
         self._say(Judged(number, take, done.result()))
 

@@ -18,17 +18,8 @@ from drivers.transducer import TransducerInfo
 NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
 UNITS = ("N", "N", "N", "N mm", "N mm", "N mm")
 COUNTED = (
-    "lost",
-    "repeated",
-    "late",
-    "malformed",
-    "stalled",
-    "restarted",
-    "saturated",
-    "doubtful",
-    "noted",
-    "off_units",
-)
+    "lost", "repeated", "late", "malformed", "stalled", "restarted", "saturated", "doubtful", "noted", "off_units",
+)  # fmt: skip
 LAGGING = 100.0  # a reading handed over later than this is worth a look [ms]
 ENDED = {  # by how far the sealing is
     "no": tr_noop("ended"), "running": tr_noop("ended, being sealed"),
@@ -235,11 +226,9 @@ def _tare(bench: BenchState) -> str:
     fx, fy, fz, tx, ty, tz = (f"{axis} {text}".replace("-", "−") for axis, text in zip(AXES, texts, strict=True))
     return tr(
         "{forces}\n{torques}\nover {duration:.1f} s, n = {readings}",
-        forces=f"{fx}, {fy}, {fz} mN",
-        torques=f"{tx}, {ty}, {tz} N mm",
-        readings=zero.readings,
-        duration=zero.duration,
-    )
+        forces=f"{fx}, {fy}, {fz} mN", torques=f"{tx}, {ty}, {tz} N mm",
+        readings=zero.readings, duration=zero.duration,
+    )  # fmt: skip
 
 
 def _drift(bench: BenchState) -> str:
@@ -299,10 +288,11 @@ def derive_view(state: AppState, translate: Translate = str) -> View:
     simulated = session.simulated if session else None
     if session is None and state.bench.info is not None and state.bench.info.simulated:
         simulated = tr("SIMULATED transducer")
+    heading = tr("new session")
+    if session is not None:
+        heading = tr("subject {subject} · {protocol}", subject=session.plan.subject, protocol=session.plan.protocol)
     return View(
-        heading=tr("new session")
-        if session is None
-        else tr("subject {subject} · {protocol}", subject=session.plan.subject, protocol=session.plan.protocol),
+        heading=heading,
         simulated=simulated,
         lamp=_lamp(state),
         banner=_banner(state),
@@ -354,19 +344,14 @@ def _banner(state: AppState) -> Banner | None:
     if running and state.heard is not None and state.now - state.heard > SILENT:
         return Banner("wrong", tr("Nothing was heard from the recorder for {age:.0f} s.", age=state.now - state.heard))
     if over := bench.peak.over:
-        words = tr(
-            "Overload on {axes}: take the load off and check the transducer.", axes=", ".join(tr(axis) for axis in over)
-        )
+        axes = ", ".join(tr(axis) for axis in over)
+        words = tr("Overload on {axes}: take the load off and check the transducer.", axes=axes)
         return Banner("wrong", words, tr("Acknowledge"), m.AcknowledgeOverloads())
     if state.failed is not None:
         return Banner("look", sentence(state.failed.sentence), tr("Dismiss"), Dismissed())
     if state.drawing is not None:
-        return Banner(
-            "look",
-            tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing),
-            tr("Dismiss"),
-            Dismissed(),
-        )
+        words = tr("Something in the window failed ({problem}); the recording goes on.", problem=state.drawing)
+        return Banner("look", words, tr("Dismiss"), Dismissed())
     if bench.link == "none" and bench.problem is not None:
         return Banner("look", tr("No transducer: {problem}", problem=bench.problem))
     return None

@@ -1,5 +1,6 @@
 """The course of a session as the experimenter sees it: what to do now, the plan, and the last stroke."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +14,11 @@ from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
 
+NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
+    steps.AskScore: steps.Scored(None),
+    steps.AskNumber: steps.MagnitudeEstimate(None),
+    steps.AskChoice: steps.PairedChoice(None),
+}
 WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
 
 
@@ -71,16 +77,15 @@ class CourseView:
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
     """Return what is shown of a session."""
-    headline, primary = _to_do(session, bench)
-    over = session.over
+    (headline, primary), over = _to_do(session, bench), session.over
     again = redo_targets(session)
     stroke = _stroke(session, again)
-    trial = session.of(session.trial)
+    trial, waited = session.of(session.trial), max(int(now - session.since), 0)
     return CourseView(
         headline=headline,
         primary=primary,
         direction=trial.trial.direction if trial is not None and session.phase in IN_A_TRIAL else 0,
-        timer="" if over else _clock(now - session.since),
+        timer="" if over else f"{waited // 60}:{waited % 60:02d}",
         notice=tr("It is kept in {folder}", folder=session.folder) if over else session.notice or _undo_words(session),
         rows=_rows(session),
         tiles=tiles(session),
@@ -88,10 +93,20 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         redo=_redo(again, stroke.redo),
         undo=_undo(session),
         skip=Button(tr("Skip"), "S", session.phase in IN_A_TRIAL, question=tr("Why is it left out?")),
-        pause=_pause(session),
+        pause=Button(tr("Resume"), "P", sends=steps.Resume())
+        if session.phase == "paused"
+        else Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause()),
         note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
-        no_answer=_no_answer_button(session),
-        end=_end(over=over),
+        # While a number is due, 0 is a digit of it.
+        no_answer=Button(
+            tr("No answer"),
+            "" if isinstance(session.command, steps.AskNumber) else "0",
+            session.phase == "scoring",
+            NO_ANSWER.get(type(session.command)),
+        ),
+        end=Button(tr("New"), "Ctrl+N", sends=NewSession())
+        if over
+        else Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?")),
         no_forces=_no_forces(session.plan),
     )
 
@@ -134,12 +149,6 @@ def _named(trials: tuple[TrialState, ...]) -> str:
     return tr("trial {named}", named=named) if len(trials) == 1 else tr("trials {named}", named=named)
 
 
-def _end(*, over: bool) -> Button:
-    if over:
-        return Button(tr("New"), "Ctrl+N", sends=NewSession())
-    return Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?"))
-
-
 def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None]:
     """Return the one sentence, and the one button that does what it says."""
     match session.phase:
@@ -173,11 +182,8 @@ def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
             practice = "" if trial.phase == "main" else f"{trial.phase.capitalize()}: "
             words = tr(
                 "{practice}mount sample {code}, its arrow {way}. Then press Space {then}.",
-                practice=practice,
-                code=code,
-                way=tr(WAYS[trial.direction]),
-                then=then,
-            )
+                practice=practice, code=code, way=tr(WAYS[trial.direction]), then=then,
+            )  # fmt: skip
             return words[:1].upper() + words[1:], Button(label, "Space", sends=steps.StimulusMounted(code))
         case "taring":
             return tr("Hands off: zero is being measured with sample {code} on.", code=code), None
@@ -197,32 +203,10 @@ def _answer_sentence(session: SessionState, code: str) -> str:
         case steps.AskNumber():
             return tr("The subject gives sample {code} a number.", code=code)
         case steps.AskChoice(first, second):
-            return tr(
-                "The subject chooses between {first} and {second}.",
-                first=first.stimulus.code,
-                second=second.stimulus.code,
-            )
+            codes = first.stimulus.code, second.stimulus.code
+            return tr("The subject chooses between {first} and {second}.", first=codes[0], second=codes[1])
         case _:
             return tr("The subject scores sample {code}.", code=code)
-
-
-def _no_answer_button(session: SessionState) -> Button:
-    """Return the button for a subject who cannot say; while a number is due, 0 is a digit of it."""
-    key = "" if isinstance(session.command, steps.AskNumber) else "0"
-    return Button(tr("No answer"), key, session.phase == "scoring", _no_answer(session.command))
-
-
-def _no_answer(command: steps.Command | None) -> steps.Event | None:
-    """Return the event of a subject who cannot say."""
-    match command:
-        case steps.AskScore():
-            return steps.Scored(None)
-        case steps.AskNumber():
-            return steps.MagnitudeEstimate(None)
-        case steps.AskChoice():
-            return steps.PairedChoice(None)
-        case _:
-            return None
 
 
 def _rest(session: SessionState) -> tuple[str, Button]:
@@ -239,11 +223,8 @@ def _stroke_sentence(session: SessionState, trial: Trial) -> str:
     often = tr("once") if allowed == 1 else tr("at most {allowed}×", allowed=allowed)
     sentence = tr(
         "Subject strokes {code} {often}, {way}, with the {finger}.",
-        code=trial.stimulus.code,
-        often=often,
-        way=way,
-        finger=finger,
-    )
+        code=trial.stimulus.code, often=often, way=way, finger=finger,
+    )  # fmt: skip
     return sentence if session.plan.forces else tr("{sentence} Then press Space.", sentence=sentence)
 
 
@@ -256,12 +237,6 @@ def _ended(session: SessionState) -> tuple[str, Button | None]:
     done = sum(t.outcome == "done" for t in session.trials)
     sentence = tr("Session ended. Trials done: {done} of {count}.", done=done, count=len(session.trials))
     return sentence, Button(tr("New session"), "Space", sends=NewSession())
-
-
-def _pause(session: SessionState) -> Button:
-    if session.phase == "paused":
-        return Button(tr("Resume"), "P", sends=steps.Resume())
-    return Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause())
 
 
 def _rows(session: SessionState) -> tuple[PlanRow, ...]:
@@ -319,14 +294,8 @@ def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
         parts.append(f"{quality.speed:.0f} mm/s")
     if quality.fell is not None:
         share = 100 * quality.fell
-        parts.append(
-            tr("N fell {share:.0f} %", share=share) if share >= 0 else tr("N rose {share:.0f} %", share=-share)
-        )
+        fell, rose = tr("N fell {share:.0f} %", share=share), tr("N rose {share:.0f} %", share=-share)
+        parts.append(fell if share >= 0 else rose)
     parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
     redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
     return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
-
-
-def _clock(seconds: float) -> str:
-    whole = max(int(seconds), 0)
-    return f"{whole // 60}:{whole % 60:02d}"

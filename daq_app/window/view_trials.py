@@ -63,11 +63,9 @@ def inspection(session: SessionState, number: int) -> Inspection | None:
     trial = session.of(number)
     if trial is None:
         return None
-    kind = _kind(session, trial)
     again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
-    heading = tr(
-        "Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=tr(KINDS[kind][1])
-    )
+    state = tr(KINDS[_kind(session, trial)][1])
+    heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=state)
     shown = session.plan.shown.experimenter
     if trial.answer is not None and "answer" in shown:
         heading = f"{heading}, {trial.answer}"

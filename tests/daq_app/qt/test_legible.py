@@ -289,7 +289,7 @@ def test_no_text_of_review_and_about_is_cut_off(application, type_size, size, sc
             settle(application)
             assert cut_off(window) == []
             assert cut_axes(window) == []
-            assert [scrolled.width() for scrolled in window._scrolled if is_too_narrow(scrolled)] == []
+            assert [scrolled.width() for scrolled in window._areas if is_too_narrow(scrolled)] == []
     assert cut_off(about) == []
     about.close()
     window.close()

@@ -22,7 +22,7 @@ SESSION = Path(__file__).parents[2] / "data" / "sessions" / "version-1" / "seale
 @pytest.fixture
 def rooms(driver):
     yield driver.window.rooms
-    driver.window.rooms.leave()
+    driver.window.rooms.review.leave()
     driver.window.go_to("prepare")
 
 

@@ -97,7 +97,7 @@ def test_finite_strain_tells_within_its_reach_and_small_strain_is_marked_where_i
     assert beyond.sed[first:].tolist() == small.sed[first:].tolist()
     assert model_words(beyond, None, "").state == "instead"
     trace = ModelTrace()
-    trace.add(beyond)
+    trace.predicted(beyond)
     told = np.isfinite(trace.columns(5.0, 8.0, 2000).values)
     assert (told[0] != told[1]).all()
     finite.take(lifted)
@@ -215,7 +215,7 @@ def test_every_state_of_the_model_has_words(said, settled, problem, state):
 def test_a_gap_in_the_readings_is_a_gap_in_the_curve(follower):
     trace = ModelTrace()
     for start in (0.0, 1.0):
-        trace.add(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
+        trace.predicted(follower.take(forces_of(live(start + np.arange(20) / 200, np.zeros((20, 6))), FRAME)))
     columns = trace.columns(0.0, 2.0, 600)
     assert np.isnan(columns.values[0]).sum() == 1
     assert np.flatnonzero(np.isnan(columns.values[0])).tolist() == [20]

@@ -304,7 +304,7 @@ def test_the_window_fits_every_screen_and_nothing_is_laid_over_anything_else(app
         window.resize(*size)
         application.processEvents()
         assert (window.width(), window.height()) == size
-        parts = [w for w in (window.way, *window._parts, window.report, window.stop, window.export) if w.isVisible()]
+        parts = [w for w in (window.way, *window._panels, window.report, window.stop, window.export) if w.isVisible()]
         boxes = [w.rect().translated(w.mapTo(window, w.rect().topLeft())) for w in parts]
         for i, box in enumerate(boxes):
             assert window.rect().contains(box)

@@ -213,11 +213,11 @@ def test_a_history_is_saved_as_a_film_of_all_its_states_with_one_range_of_colour
     window.take(m.Filmed(chosen(window.state).key, film()))
     for _ in range(5):  # the columns have found their widths
         application.processEvents()
-    ranges, show = set(), window.model._moved
-    window.model._moved = lambda at: (show(at), ranges.add(window.model.finger.look.range))
+    ranges, show = set(), window.model._show_step
+    window.model._show_step = lambda at: (show(at), ranges.add(window.model.finger.look.range))
     window.model.write_film(tmp_path / "film.gif")
     until(application, lambda: "Saved" in window._words.accessibleName())
-    window.model._moved = show
+    window.model._show_step = show
     with Image.open(tmp_path / "film.gif") as written:
         assert (written.n_frames, written.info["duration"]) == (4, 100)
         assert written.size == window.model.finger.size_with(window.model._head()).toTuple()
