@@ -98,11 +98,9 @@ def finger_words(state: AnalystState | None) -> str:
             return tr("The finger of {name} was not solved: the work was stopped. 'Go on' solves it.", name=name)
         return tr("The finger of {name} is being solved.", name=name)
     if said.sed is None:
-        why = said.reasons.get("sed", tr("no reason is known"))
-        return tr("No settled finger. {why}", why=why)
-    finger = state.fingers.get(row.key)
+        return tr("No settled finger. {why}", why=said.reasons.get("sed", tr("no reason is known")))
     parts = [tr("Finger of {name}, settled", name=name), sed_words(state.report, said)]
-    if finger is not None:
+    if (finger := state.fingers.get(row.key)) is not None:
         parts.append(_contact_words(finger.frame))
     return " · ".join(parts)
 
@@ -141,27 +139,16 @@ def film_words(film: m.Filmed | None, at: int | None = None) -> str:
         return tr(
             "No settled state. The last good one, before tissue folds, is step {step}: at {time:.3f} s, "
             "{depth:.3g} mm deep after {slid:.3g} mm of sliding; ⊗ marks its most squeezed tissue. {why}",
-            step=len(film.film.instants),
-            time=last.time,
-            depth=last.depth,
-            slid=abs(last.travel),
-            why=film.why,
-        )
-    now, frame = film.film.instants[at], film.film.frames[at]
-    count = len(film.film.instants)
+            step=len(film.film.instants), time=last.time, depth=last.depth, slid=abs(last.travel), why=film.why,
+        )  # fmt: skip
+    now = film.film.instants[at]
     return tr(
         "Step {at} of {count}, {time:.3f} s · {phase} · {depth:.2f} mm deep, {slid:.2f} mm slid · "
         "SED {sed:.3f} kPa at small strain{errors} · {contact}",
-        at=at + 1,
-        count=count,
-        time=now.time,
-        phase=tr(PHASES[now.phase]),
-        depth=now.depth,
-        slid=abs(now.travel),
-        sed=1000.0 * now.sed,
+        at=at + 1, count=len(film.film.instants), time=now.time, phase=tr(PHASES[now.phase]), depth=now.depth,
+        slid=abs(now.travel), sed=1000.0 * now.sed, contact=_contact_words(film.film.frames[at]),
         errors=errors_words(None),  # a course is not solved again for each of its steps
-        contact=_contact_words(frame),
-    )
+    )  # fmt: skip
 
 
 def named_errors(report: Report) -> str:
@@ -173,8 +160,6 @@ def _contact_words(frame: Frame) -> str:
     states = frame.contact.state
     touching = sum(state != "open" for state in states)
     slipping = sum(state in ("slip", "cap") for state in states)
-    return (
-        tr("touching points that slip: {slipping} of {touching}", slipping=slipping, touching=touching)
-        if touching
-        else tr("nothing touches")
-    )
+    if not touching:
+        return tr("nothing touches")
+    return tr("touching points that slip: {slipping} of {touching}", slipping=slipping, touching=touching)

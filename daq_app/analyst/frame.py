@@ -21,6 +21,7 @@ Range = tuple[float, float]
 FIELD_ERRORS = tr_noop(
     "Fields, at every place: no estimate of the mesh's or the model's error. The SED over the finger has both."
 )
+UNITS = {"MPa": ("kPa", 1000.0)}  # as people read them, and the factor
 NEVER_NEGATIVE = (SED.name, "von_mises", "displacement")
 Line = tuple[tuple[float, float], tuple[float, float]]  # its ends [mm]
 
@@ -135,14 +136,12 @@ def step_above(value: float) -> float:
     return float(next((s * power for s in STEPS if s * power >= value * (1.0 - 1e-9)), 10.0 * power))
 
 
-def seen(
-    nodes: Array, values: Array, triangles: Indices, box: tuple[float, float, float, float]
-) -> tuple[Array, Array, Indices]:
-    """Return nodes (n, 2), their values and those of the triangles (t, 3) that reach into left, right, below, above."""
+def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
+    """Return those of the triangles (t, 3) between nodes (n, 2) that reach into a box."""
     left, right, below, above = box
     x, y = nodes[triangles, 0], nodes[triangles, 1]
     inside = (x.max(axis=1) >= left) & (x.min(axis=1) <= right) & (y.max(axis=1) >= below) & (y.min(axis=1) <= above)
-    return nodes, values, triangles[inside]
+    return triangles[inside]
 
 
 def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, Indices]:
@@ -222,13 +221,7 @@ class FieldChoice:
 
 FIELD_CHOICES = (
     *(
-        FieldChoice(
-            one.name,
-            one.label,
-            "kPa" if one.unit == "MPa" else one.unit,
-            1000.0 if one.unit == "MPa" else 1.0,
-            one.name not in NEVER_NEGATIVE,
-        )
+        FieldChoice(one.name, one.label, *UNITS.get(one.unit, (one.unit, 1.0)), one.name not in NEVER_NEGATIVE)
         for one in FIELDS
     ),
     FieldChoice("displacement", tr_noop("displacement from the bone"), "mm", 1.0, signed=False),

@@ -70,14 +70,8 @@ class Compared(Struct, frozen=True, eq=False):
     fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])  # the settled ones
 
 
-class Written(Struct, frozen=True):
-    """A report, an export or a picture is whole."""
-
-    path: str
-
-
-class Decided(Struct, frozen=True):
-    """A decision is recorded, undone or redone, and every number follows."""
+class Done(Struct, frozen=True):
+    """A file is whole, or a decision is recorded, undone or redone, and every number follows."""
 
     sentence: str
 
@@ -168,5 +162,5 @@ class Stop(Struct, frozen=True):
 
 
 Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
-Said = Step | ReportReady | Answered | Drawn | Filmed | Read | Compared | Written | Decided | Problem | Cancelled | Idle
+Said = Step | ReportReady | Answered | Drawn | Filmed | Read | Compared | Done | Problem | Cancelled | Idle
 Message = Ask | Said | Respond

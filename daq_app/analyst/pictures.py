@@ -82,13 +82,5 @@ def _frame(drawn: Fields, skin: Skin, row: "np.ndarray[tuple[int], np.dtype[np.f
 def _instant(still: Still) -> Instant:
     at, force = still.instant, still.instant.state.force
     states = still.skin.state
-    return Instant(
-        at.time,
-        at.depth,
-        at.travel,
-        still.sed,
-        float(force[1]),
-        float(force[0]),
-        sum(state == "stick" for state in states),
-        sum(state in ("slip", "cap") for state in states),
-    )
+    sticking, slipping = states.count("stick"), states.count("slip") + states.count("cap")
+    return Instant(at.time, at.depth, at.travel, still.sed, float(force[1]), float(force[0]), sticking, slipping)

@@ -12,6 +12,12 @@ from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
 
 Place = Literal["session", "trial", "prediction", "friction", "window", "readings"]
+PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
+RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
+FRICTION_HEAD = tr_noop(
+    ("trial", "stimulus", "µ steady", "95 %", "µ greatest", "τ max [kPa]", "V [mm/s]", "N [N]", "way", "flaws")
+)
+WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +46,7 @@ def marks_of(row: Row) -> str:
     """Return what the marks of a line mean, for who hovers and for screen readers."""
     remarks: list[str] = []
     if row.stroke is not None and row.stroke.flaws:
-        remarks.append(tr("! has flaws: ") + ", ".join(flaw.replace("_", " ") for flaw in row.stroke.flaws))
+        remarks.append(tr("! has flaws: ") + _flaws(row.stroke))
     if row.stroke is not None and row.stroke.decided:
         remarks.append(tr("✎ somebody decided something about it"))
     if row.prediction is not None and row.prediction.sed is None:
@@ -55,34 +61,24 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
         return ()
     lines: list[tuple[str, str]] = []
     if (stroke := row.stroke) is not None:
-        why = stroke.reasons
         interval = "" if stroke.mu_interval is None else f"  [{stroke.mu_interval[0]:.3f}, {stroke.mu_interval[1]:.3f}]"
         lines += [
-            (tr("µ over the steady window"), _value(stroke.mu_dynamic, "{:.3f}" + interval, why, "mu_dynamic")),
-            (tr("µ at its greatest"), _value(stroke.mu_max, "{:.3f}", why, "mu_max")),
-            (tr("traction bound"), _value(_kpa(stroke.tau_max), "{:.1f} kPa", why, "tau_max")),
-            (tr("speed"), _value(stroke.speed, "{:.1f} mm/s", why, "speed")),
-            (tr("normal force"), _value(stroke.normal_force, "{:.2f} N", why, "normal_force")),
-            (tr("flaws"), ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws) or tr("none")),
+            (tr("µ over the steady window"), _value(stroke, "mu_dynamic", "{:.3f}" + interval)),
+            (tr("µ at its greatest"), _value(stroke, "mu_max", "{:.3f}")),
+            (tr("traction bound"), _value(stroke, "tau_max", "{:.1f} kPa", 1000.0)),
+            (tr("speed"), _value(stroke, "speed", "{:.1f} mm/s")),
+            (tr("normal force"), _value(stroke, "normal_force", "{:.2f} N")),
+            (tr("flaws"), _flaws(stroke) or tr("none")),
         ]
     if (said := row.prediction) is not None:
+        under, errors = condition(state.report, said), errors_words(said.normal_force_error)
+        sed = _value(said, "sed", "") if said.sed is None else sed_with_errors(state.report, said)
         lines += [
-            (
-                tr("SED {condition}, averaged over the ending", condition=condition(state.report, said)),
-                sed_with_errors(state.report, said) if said.sed is not None else _value(None, "", said.reasons, "sed"),
-            ),
+            (tr("SED {condition}, averaged over the ending", condition=under), sed),
             *_other_response(state, said),
-            (tr("model: µ"), _value(said.mu, "{:.3f} (" + tr(said.mu_rule) + ")", said.reasons, "mu")),
-            (
-                tr("model: indentation"),
-                _value(said.indentation, "{:.2f} mm, " + tr("prescribed"), said.reasons, "indentation"),
-            ),
-            (
-                tr("model: normal force {condition}", condition=condition(state.report, said)),
-                _value(
-                    said.normal_force, "{:.2f} N" + errors_words(said.normal_force_error), said.reasons, "normal_force"
-                ),
-            ),
+            (tr("model: µ"), _value(said, "mu", "{:.3f} (" + tr(said.mu_rule) + ")")),
+            (tr("model: indentation"), _value(said, "indentation", "{:.2f} mm, " + tr("prescribed"))),
+            (tr("model: normal force {condition}", condition=under), _value(said, "normal_force", "{:.2f} N" + errors)),
         ]
     elif state.stage == "analysed":
         lines.append(("SED", tr("– stopped before this trial") if state.halted else tr("not predicted yet")))
@@ -97,13 +93,9 @@ def _other_response(state: AnalystState, said: PredictionFinding) -> list[tuple[
         return []
     value, *error = response
     mesh = error[0] / abs(value) if error and value else None
-    text = shown.text(shown.factor * value) + errors_words(mesh)
-    name = tr(
-        "{response} {condition}, averaged over the ending",
-        response=tr(shown.label),
-        condition=condition(state.report, said),
-    )
-    return [(name, text)]
+    under, words = condition(state.report, said), tr(shown.label)
+    name = tr("{response} {condition}, averaged over the ending", response=words, condition=under)
+    return [(name, shown.text(shown.factor * value) + errors_words(mesh))]
 
 
 def sed_with_errors(report: Report | None, said: PredictionFinding) -> str:
@@ -128,16 +120,10 @@ def greatest_errors(report: Report | None, response: str = SED.name) -> str:
     if not known:
         return ""
     mesh = [value[1] / abs(value[0]) for _, value in known if len(value) > 1 and value[0]]
-    errors = errors_words(
-        max(mesh) if len(mesh) == len(known) else None, _effect(report) if response == SED.name else ""
-    )
-    conditions = {condition(report, said) for said, _ in known}
-    return tr(
-        "{response} {condition}{errors}",
-        response=tr(shown.label),
-        condition=" / ".join(sorted(conditions)),
-        errors=errors,
-    )
+    effect = _effect(report) if response == SED.name else ""
+    errors = errors_words(max(mesh) if len(mesh) == len(known) else None, effect)
+    under = " / ".join(sorted({condition(report, said) for said, _ in known}))
+    return tr("{response} {condition}{errors}", response=tr(shown.label), condition=under, errors=errors)
 
 
 def picture_errors(report: Report | None, picture: str) -> str:
@@ -162,23 +148,6 @@ def condition(report: Report | None, said: PredictionFinding) -> str:
     return ", ".join(part for part in (depth, strain) if part)
 
 
-PLAIN = re.compile(r"[0-9]+(?:[.][0-9]+)?")
-RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names which mu the model is given
-FRICTION_HEAD = (
-    tr_noop("trial"),
-    tr_noop("stimulus"),
-    tr_noop("µ steady"),
-    "95 %",
-    tr_noop("µ greatest"),
-    tr_noop("τ max [kPa]"),
-    "V [mm/s]",
-    "N [N]",
-    tr_noop("way"),
-    tr_noop("flaws"),
-)
-WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
-
-
 def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
     """Return a line of `FRICTION_HEAD` for each stroke, in order of time; "–" where honesty allows no number."""
     return () if report is None else tuple(_friction_line(stroke) for stroke in report.strokes)
@@ -192,17 +161,12 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     if said is not None:
         way = "" if said.direction is None else tr("{way}, as measured", way=tr(WAYS[said.direction]))
         facts += [
-            (tr("µ of this trial"), _value(said.mu, "{:.4f}", said.reasons, "mu"), tr(said.mu_rule)),
-            (tr("τ max of this trial"), _value(_kpa(said.tau_max), "{:.2f} kPa", said.reasons, "tau_max"), ""),
-            (
-                tr("indentation"),
-                _value(said.indentation, "{:.3g} mm", said.reasons, "indentation"),
-                tr("of the block's plan"),
-            ),
+            (tr("µ of this trial"), _value(said, "mu", "{:.4f}"), tr(said.mu_rule)),
+            (tr("τ max of this trial"), _value(said, "tau_max", "{:.2f} kPa", 1000.0), ""),
+            (tr("indentation"), _value(said, "indentation", "{:.3g} mm"), tr("of the block's plan")),
             (tr("way"), way or "–", ""),
         ]
-    report = state.report
-    if report is not None:
+    if (report := state.report) is not None:
         facts += [(fact.name, fact.value, fact.remark) for fact in (*report.modelled, *report.left_out)]
     return tuple(facts)
 
@@ -259,12 +223,9 @@ def progress_words(step: Step | None) -> str:
     if step is None:
         return ""
     left = "" if step.left is None else tr(", about {seconds} s left", seconds=int(step.left) + 1)
-    steps = step.load_steps
-    done = (
-        tr("load step {step} of {steps}", step=round(step.part * steps), steps=steps)
-        if steps
-        else f"{100 * step.part:.0f} %"
-    )
+    done = f"{100 * step.part:.0f} %"
+    if steps := step.load_steps:
+        done = tr("load step {step} of {steps}", step=round(step.part * steps), steps=steps)
     return f"{tr(step.words)}  {done}{left}"
 
 
@@ -274,35 +235,30 @@ def _named(of: StrokeFinding | PredictionFinding) -> str:
     return f"{of.trial}  {of.experiment} {of.code if of.index is None else of.index}"
 
 
-def _kpa(mpa: float | None) -> float | None:
-    return None if mpa is None else 1000.0 * mpa
+def _flaws(stroke: StrokeFinding) -> str:
+    return ", ".join(flaw.replace("_", " ") for flaw in stroke.flaws)
 
 
-def _value(value: float | None, form: str, reasons: dict[str, str], name: str) -> str:
-    return form.format(value) if value is not None else f"–  {reasons.get(name, '')}".rstrip()
+def _value(of: StrokeFinding | PredictionFinding, name: str, form: str, factor: float = 1.0) -> str:
+    """Return a number of a finding in a form, or why there is none."""
+    value: float | None = getattr(of, name)
+    return form.format(factor * value) if value is not None else f"–  {of.reasons.get(name, '')}".rstrip()
 
 
 def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
     stimulus = f"{s.experiment} {s.code if s.index is None else s.index}".strip()
-    interval = (
-        "–" if s.mu_interval is None else tr("{low:.3f} to {high:.3f}", low=s.mu_interval[0], high=s.mu_interval[1])
-    )
+    low, high = s.mu_interval or (None, None)
+    tau = None if s.tau_max is None else 1000.0 * s.tau_max
+    forms = (s.mu_max, 3), (tau, 1), (s.speed, 1), (s.normal_force, 2)
     return (
         tr("stroke {number}", number=s.number) if s.trial is None else str(s.trial),
         stimulus or "–",
-        _or_dash(s.mu_dynamic, "{:.3f}"),
-        interval,
-        _or_dash(s.mu_max, "{:.3f}"),
-        _or_dash(_kpa(s.tau_max), "{:.1f}"),
-        _or_dash(s.speed, "{:.1f}"),
-        _or_dash(s.normal_force, "{:.2f}"),
+        "–" if s.mu_dynamic is None else f"{s.mu_dynamic:.3f}",
+        "–" if low is None else tr("{low:.3f} to {high:.3f}", low=low, high=high),
+        *("–" if value is None else f"{value:.{digits}f}" for value, digits in forms),
         "–" if s.direction is None else tr(WAYS[s.direction]),
-        ", ".join(flaw.replace("_", " ") for flaw in s.flaws),
+        _flaws(s),
     )
-
-
-def _or_dash(value: float | None, form: str) -> str:
-    return "–" if value is None else form.format(value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,40 +280,27 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
         links.append(Link(tr("trial {trial}", trial=row.trial), "trial"))
     said, stroke = row.prediction, row.stroke
     if said is not None and said.sed is not None:
-        links.append(
-            Link(
-                f"SED {condition(state.report, said)} {sed_with_errors(state.report, said)}",
-                "prediction",
-                tr("averaged over the ending"),
-            )
-        )
+        links.append(Link(sed_words(state.report, said), "prediction", tr("averaged over the ending")))
     if stroke is None:
         return tuple(links)
-    links.append(_friction(stroke, None if said is None or said.mu is None else (said.mu, said.mu_rule)))
+    links.append(_friction(stroke, said))
     if stroke.steady is not None:
-        begin, end = stroke.steady
-        links.append(
-            Link(
-                tr("steady window {begin:.3f} to {end:.3f} s", begin=begin, end=end),
-                "window",
-                tr("of stroke {number}, device's clock", number=stroke.number),
-            )
-        )
+        words = tr("steady window {begin:.3f} to {end:.3f} s", begin=stroke.steady[0], end=stroke.steady[1])
+        links.append(Link(words, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
     read = state.read
     if read is not None and read.stroke == stroke.number:
         links.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
     else:
-        links.append(
-            Link(tr("raw readings"), "readings", tr("counts, sequence and device counter, as they were recorded"))
-        )
+        more = tr("counts, sequence and device counter, as they were recorded")
+        links.append(Link(tr("raw readings"), "readings", more))
     return tuple(links)
 
 
-def _friction(stroke: StrokeFinding, friction: tuple[float, str] | None) -> Link:
-    if friction is not None:
-        mu, rule = friction
+def _friction(stroke: StrokeFinding, said: PredictionFinding | None) -> Link:
+    if said is not None and said.mu is not None:
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
-        return Link(f"µ {mu:.3f}{tau}", "friction", tr("the model was given the {rule}", rule=tr(rule)))
+        rule = tr("the model was given the {rule}", rule=tr(said.mu_rule))
+        return Link(f"µ {said.mu:.3f}{tau}", "friction", rule)
     if stroke.mu_dynamic is None:
         return Link("µ –", "friction", stroke.reasons.get("mu_dynamic", ""))
     return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", tr("mean over the steady window"))

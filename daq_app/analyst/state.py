@@ -67,23 +67,19 @@ def fold(state: AnalystState, message: m.Message) -> AnalystState:
             return replace(state, response=response)
         case m.Compared():
             return replace(state, compared=message, outcome="")
-        case m.Step() | m.Idle() | m.Written() | m.Decided() | m.Problem() | m.Cancelled():
+        case m.Step() | m.Idle() | m.Done() | m.Problem() | m.Cancelled():
             return _gone_on(state, message)
         case _:
             return _on_request(state, message)
 
 
-def _gone_on(
-    state: AnalystState, said: m.Step | m.Idle | m.Written | m.Decided | m.Problem | m.Cancelled
-) -> AnalystState:
+def _gone_on(state: AnalystState, said: m.Step | m.Idle | m.Done | m.Problem | m.Cancelled) -> AnalystState:
     match said:
         case m.Step():
             return replace(state, step=said)
         case m.Idle():
             return replace(state, step=None)
-        case m.Written(path):
-            return replace(state, outcome=tr("Written: {path}", path=path))
-        case m.Decided(sentence):
+        case m.Done(sentence):
             return replace(state, outcome=sentence)
         case m.Problem(sentence):
             return replace(state, step=None, outcome=sentence)
@@ -136,14 +132,9 @@ def _on_report(state: AnalystState, message: m.ReportReady) -> AnalystState:
         kept = tuple(p for p in before.predictions if p.stroke in numbers)
         report = replace(report, predictions=kept)
         fingers = {key: finger for key, finger in fingers.items() if key[1] in numbers}
+    version, history = state.version + 1, message.history
     after = replace(
-        state,
-        stage=message.stage,
-        report=report,
-        history=message.history,
-        version=state.version + 1,
-        fingers=fingers,
-        drawn={},
+        state, stage=message.stage, report=report, history=history, version=version, fingers=fingers, drawn={}
     )
     return replace(after, row=max(0, min(state.row, len(rows(after)) - 1)))
 

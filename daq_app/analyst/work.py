@@ -88,7 +88,7 @@ class Work:
             case m.Compare(folder):
                 self._compare(Path(folder))
             case m.Write():
-                self._say(m.Written(self._write(request)))
+                self._say(m.Done(tr("Written: {path}", path=self._write(request))))
             case _:
                 pass
 
@@ -118,7 +118,7 @@ class Work:
         stroke = self._report.strokes[request.stroke - 1]
         record = append(self._recording, decision_of(stroke, request.edge, request.time, request.by, request.why))
         self._analyse()
-        self._say(m.Decided(tr("Recorded: {sentence}", sentence=record.sentence)))
+        self._say(m.Done(tr("Recorded: {sentence}", sentence=record.sentence)))
 
     def _undo(self, by: str, *, again: bool) -> None:
         decisions = read(self._recording.folder)
@@ -127,17 +127,9 @@ class Work:
             raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
         record = append(self._recording, line)
         self._analyse()
-        meant = decision_meant(decisions, line)
-        self._say(
-            m.Decided(
-                tr(
-                    "{act}, as decision {number}: {sentence}",
-                    act=tr("Redone") if again else tr("Undone"),
-                    number=record.number,
-                    sentence=meant.sentence,
-                )
-            )
-        )
+        act, number, meant = tr("Redone") if again else tr("Undone"), record.number, decision_meant(decisions, line)
+        words = tr("{act}, as decision {number}: {sentence}", act=act, number=number, sentence=meant.sentence)
+        self._say(m.Done(words))
 
     def _first(self) -> int | None:
         """Return the position among predicted rows of the trial that is chosen."""
@@ -258,11 +250,11 @@ class Work:
             return
         if prediction.prediction is not None or way.scene.materials.relax:
             raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
-        film, why = lost_film(way, sketch, self.timed(tr("drawing the history")))
-        first = prediction.reasons.get("sed", "")
-        self._filmed = m.Filmed(
-            key, film, tr("{first} Followed from first touch: {why}", first=first, why=why) if why else first
-        )
+        film, stop = lost_film(way, sketch, self.timed(tr("drawing the history")))
+        why = prediction.reasons.get("sed", "")
+        if stop:
+            why = tr("{first} Followed from first touch: {why}", first=why, why=stop)
+        self._filmed = m.Filmed(key, film, why)
         self._say(self._filmed)
 
     def _read(self, number: int) -> None:
@@ -304,9 +296,8 @@ class Work:
             pages.write_report(findings(self._recording, self._analysis, self._prediction), path)
             return str(path)
         made_by = {"made_by": software_versions()}
-        source = ExportSource(
-            self._recording, made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
-        )
+        documents = made_by | analysis_document(self._analysis), made_by | self._prediction.to_dict()
+        source = ExportSource(self._recording, *documents)
         progress = self.timed(tr("writing {what}", what=request.what))
 
         def shown(part: float) -> None:
@@ -353,16 +344,9 @@ def _options(recording: Recording) -> PredictionOptions:
 
 def sentence_of(error: Exception) -> str:
     """Return a failure in a sentence."""
-    known: tuple[type[Exception], ...] = (
-        RecordingError,
-        ExportError,
-        DecisionError,
-        Blinded,
-        SceneError,
-        NothingToShow,
-    )
+    known: tuple[type[Exception], ...] = (RecordingError, ExportError, DecisionError, Blinded, SceneError)
     with suppress(ImportError):
         from sessions.report.pages import ReportError
 
         known = (*known, ReportError)
-    return str(error) if isinstance(error, known) else f"{type(error).__name__}: {error}"
+    return str(error) if isinstance(error, (*known, NothingToShow)) else f"{type(error).__name__}: {error}"

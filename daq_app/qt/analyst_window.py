@@ -277,14 +277,9 @@ class AnalystWindow(QMainWindow):
         window = QWidget()
         window.setObjectName("window")
         window.setMinimumSize(*LEAST)  # the columns find room in less than they would like
-        vbox(
-            hbox((self.way, 1), self._head),
-            (self._panes, 1),
-            (self._pages, 1),
-            hbox((self._words, 1), self.progress, self.stop, self.go_on, self.report, self.format, self.export),
-            on=window,
-            margins=GRID,
-        )
+        acts = self.progress, self.stop, self.go_on, self.report, self.format, self.export
+        head, foot = hbox((self.way, 1), self._head), hbox((self._words, 1), *acts)
+        vbox(head, (self._panes, 1), (self._pages, 1), foot, on=window, margins=GRID)
         return window
 
 
@@ -312,15 +307,8 @@ class TrialsColumn(QWidget):
         self.points: Any = pg.ScatterPlotItem()
         self.points.sigClicked.connect(self._point_clicked)
         self.relation.addItem(self.points)
-        vbox(
-            label(tr("Trials"), "section"),
-            (self.list, 3),
-            label(tr("At the plan's depth, against the score"), "section"),
-            self.responses,
-            self.errors,
-            (self.relation, 2),
-            on=self,
-        )
+        head, below = label(tr("Trials"), "section"), label(tr("At the plan's depth, against the score"), "section")
+        vbox(head, (self.list, 3), below, self.responses, self.errors, (self.relation, 2), on=self)
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""

@@ -20,10 +20,7 @@ SHOWN_COUNTERS = tr_noop(
 )
 
 FIELDS = tr_noop(("serial", "calibration", "rate", "tare", "drift"))
-SPOKEN = {
-    "tare": tr_noop("mean of the zero"),
-    "drift": tr_noop("drift of the zero"),
-}  # where a caption alone does not say of what
+SPOKEN = {"tare": tr_noop("mean of the zero"), "drift": tr_noop("drift of the zero")}  # where a caption does not say
 
 
 class BenchPanel(Panel):
@@ -200,16 +197,7 @@ class LoadBar(QWidget):
         peak = "" if bar.peak is None else tr(", at most {peak:.0f} %", peak=100 * bar.peak)
         state = tr(", OVERLOAD") if bar.over else ""
         noise = tr(", noise {noise}", noise=bar.noise) if bar.noise else ""
-        self.setAccessibleName(
-            tr(
-                "load on {name}: {now}{peak}{state}{noise}",
-                name=tr(bar.name),
-                now=now,
-                peak=peak,
-                state=state,
-                noise=noise,
-            )
-        )
+        self.setAccessibleName(tr("load on {name}: {words}", name=tr(bar.name), words=f"{now}{peak}{state}{noise}"))
         self.setToolTip(self.accessibleName())
         self.update()
 

@@ -34,7 +34,6 @@ class Client(Protocol):
 
     def send(self, request: Request) -> None:
         """Ask for something."""
-        ...
 
     def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
         """Return what has come since the last call."""
@@ -42,11 +41,9 @@ class Client(Protocol):
 
     def close(self) -> None:
         """End it, and what it does."""
-        ...
 
     def leave(self) -> None:
         """Let go of it: a session in hand gets an end from which it can be resumed."""
-        ...
 
 
 class Bridge(QObject):
@@ -60,9 +57,7 @@ class Bridge(QObject):
     ) -> None:
         """Speak to a recorder; `start` makes another should it go, `clock` is the machine's monotonic one [s]."""
         super().__init__()
-        self._start = start
-        self._clock = clock
-        self._client = client
+        self._client, self._start, self._clock = client, start, clock
         self._ticked = -1.0
         self._load = Load()  # the greatest since the last tick
         self._from_threads: SimpleQueue[Message] = SimpleQueue()
@@ -114,8 +109,10 @@ class Bridge(QObject):
         """Do what somebody asked for: fold it, and tell the recorder where it is for it."""
         self._fold(message)
         if isinstance(message, REQUESTS) and (self.state.gone is None or isinstance(message, BEGINNING)):
-            if self.state.gone is not None:
-                self._begin_again()
+            if self.state.gone is not None:  # another recorder takes its place
+                self._client.close()
+                self._client = self._start()
+                self._fold(m.Gone(True, ""))
             self._client.send(message)  # pyright: ignore[reportArgumentType]  it is one of REQUESTS
         self._show()
 
@@ -211,9 +208,3 @@ class Bridge(QObject):
         if session is not None and not session.over:
             return session.plan.frame
         return self.state.bench.frame or Frame()
-
-    def _begin_again(self) -> None:
-        """Start another recorder where the last one is gone."""
-        self._client.close()
-        self._client = self._start()
-        self._fold(m.Gone(True, ""))

@@ -36,14 +36,8 @@ class CardFrame(Panel):
         self.words = label("", "quiet", wrap=True)
         self.body = QVBoxLayout()
         self.body.setSpacing(4)
-        vbox(
-            hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID),
-            self.words,
-            self.body,
-            on=self,
-            margins=GRID,
-            spacing=4,
-        )
+        head = hbox(self._mark, (label(tr(name), "name", wrap=True), 1), spacing=GRID)
+        vbox(head, self.words, self.body, on=self, margins=GRID, spacing=4)
 
     def show_card(self, card: Card) -> None:
         """Show whether the card is ready, and its line; nobody is blamed before Start was asked for."""

@@ -1,6 +1,7 @@
 """The course of a session: the plan with what is done, in hand and coming, and what else can be done now."""
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
@@ -11,10 +12,15 @@ from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.messages import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
-from daq_app.wording import tr
+from daq_app.wording import tr, tr_noop
 from sessions.run import steps
 
 MESSAGES = {"redo": steps.Redo, "skip": steps.Skip, "note": steps.Note, "end": steps.Abort}  # that take a text
+ACTS = {
+    "skip": tr_noop("skip the trial, with a reason"), "redo": tr_noop("redo the trial, with a reason"),
+    "pause": tr_noop("pause"), "note": tr_noop("write a note"), "no answer": tr_noop("the subject gives no answer"),
+    "end": tr_noop("end the session, with a reason"),
+}  # fmt: skip
 ROOMY = 560  # at which a picture of the subject's page has room beneath the plan, before the font's scale [px]
 
 
@@ -31,22 +37,7 @@ class CoursePanel(Panel):
         self.plan = QListWidget()
         self.plan.setAccessibleName(tr("plan: trials done, in hand and coming"))
         self.plan.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.redo = button(tr("Redo R"), tr("redo the trial, with a reason"), lambda: self.ask("redo"), "small")
-        self.skip = button(tr("Skip S"), tr("skip the trial, with a reason"), lambda: self.ask("skip"), "small")
-        self.pause = button(tr("Pause P"), tr("pause"), self._pause, "small")
-        self.note = button(tr("Note N"), tr("write a note"), lambda: self.ask("note"), "small")
-        self.no_answer = button(
-            tr("No answer 0"), tr("the subject gives no answer"), lambda: self.ask("no answer"), "small"
-        )
-        self.end = button(tr("End Ctrl+E"), tr("end the session, with a reason"), lambda: self.ask("end"), "small")
-        self._all = {
-            "skip": self.skip,
-            "redo": self.redo,
-            "pause": self.pause,
-            "note": self.note,
-            "no answer": self.no_answer,
-            "end": self.end,
-        }
+        self.buttons = {act: button("", tr(name), partial(self.ask, act), "small") for act, name in ACTS.items()}
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
@@ -56,15 +47,11 @@ class CoursePanel(Panel):
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
-        vbox(
+        head, around = (
             hbox((label(tr("Plan"), "section"), 1), self._timer),
-            (self.plan, 1),
-            self.mirror,
-            self._bottom,
-            on=self,
-            margins=(int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
-            spacing=GRID,
+            (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
         )
+        vbox(head, (self.plan, 1), self.mirror, self._bottom, on=self, margins=around, spacing=GRID)
 
     @property
     def asking(self) -> bool:
@@ -79,7 +66,7 @@ class CoursePanel(Panel):
         )
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
-        for name, widget in self._all.items():
+        for name, widget in self.buttons.items():
             shown = _shown(view, name)
             if before is None or shown != _shown(before, name):
                 widget.setText(f"{shown.label} {tr(shown.key)}".strip())
@@ -118,14 +105,10 @@ class CoursePanel(Panel):
         self.leave()
         self._send(MESSAGES[self._asking](text))
 
-    def _pause(self) -> None:
-        if self._view is not None and self._view.pause.enabled and self._view.pause.sends is not None:
-            self._send(self._view.pause.sends)
-
     def _actions(self, columns: int) -> QWidget:
         page = QWidget()
         grid = bare(QGridLayout(page), GRID)
-        for at, widget in enumerate(self._all.values()):
+        for at, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)
         return page

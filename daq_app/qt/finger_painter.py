@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen, QPolygonF
 
-from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halved, seen
+from daq_app.analyst.frame import Box, FieldChoice, Frame, Line, Parts, Range, View, halved, visible
 from daq_app.qt.painting import faces, paint_lost, sheer
 from daq_app.qt.tokens import Tokens
 from daq_app.wording import tr, tr_noop
@@ -90,7 +90,8 @@ class FingerPainter:
     def _paint_tissue(self, look: Look, shades: list[QColor]) -> None:
         frame, box = self.frame, self.box
         shown = self.view.visible(box.left(), box.top(), box.width(), box.height())
-        nodes, values, triangles = seen(frame.nodes, look.field.of(frame), self.parts.triangles, shown)
+        nodes, values = frame.nodes, look.field.of(frame)
+        triangles = visible(nodes, self.parts.triangles, shown)
         if len(triangles) and box.width() * box.height() / len(triangles) > COARSE:
             nodes, values, triangles = halved(nodes, values, triangles)
         low, high = look.range

@@ -27,13 +27,7 @@ class Key:
 
 KEYS = (
     Key(tr_noop("Space"), "primary", tr_noop("do what the sentence says (Enter too)")),
-    Key(
-        "R",
-        "redo",
-        tr_noop(
-            "redo the trial that the button names; the reason is asked for, or taken from what was found of the stroke"
-        ),
-    ),
+    Key("R", "redo", tr_noop("redo the trial on the button; its reason is asked for, or known from the stroke")),
     Key("Ctrl+Z", "undo", tr_noop("undo the last redo, until the next stroke: what it discarded counts again")),
     Key("S", "skip", tr_noop("skip the trial, with a reason")),
     Key("P", "pause", tr_noop("pause, and go on")),
@@ -56,11 +50,7 @@ KEYS = (
     Key("B", "bench", tr_noop("show or fold the bench")),
     Key("F5", "pilot", tr_noop("pilot the protocol of the page with simulated hand and answers")),
     Key("F6", "subject", tr_noop("show the subject's window and go to it")),
-    Key(
-        "F7",
-        "preview",
-        tr_noop("preview every page that the subject will see, by the protocol and language of the page"),
-    ),
+    Key("F7", "preview", tr_noop("preview every page that the subject will see, by this protocol and language")),
     Key("Ctrl+M", "ruler", tr_noop("hold the subject's line against a ruler")),
     Key("Ctrl+O", "open", tr_noop("look at a recorded session: strokes, predictions, report, exports")),
     Key("F1", "keys", tr_noop("show or hide these keys")),
@@ -68,34 +58,18 @@ KEYS = (
 )
 
 ANALYST_KEYS = (
-    Key(
-        "Tab",
-        "next",
-        tr_noop("go to the next control; in the line at the top to the next element of the way to the readings"),
-    ),
-    Key(
-        "Enter",
-        "follow",
-        tr_noop("follow that element: to the trial, the prediction, the friction, the window, the readings"),
-    ),
+    Key("Tab", "next", tr_noop("go to the next control; in the line at the top to the next element of the way")),
+    Key("Enter", "follow", tr_noop("follow it: to the trial, prediction, friction, window or readings")),
     Key("Up  Down", "trial", tr_noop("choose another trial, in the list")),
     Key("Left  Right", "edge", tr_noop("move the edge whose button has the focus by 5 ms; with Shift by 50 ms")),
     Key(tr_noop("Enter"), "record", tr_noop("record where the edge is now, as a decision with who and why")),
     Key("Esc", "back", tr_noop("put the edge back where it was")),
     Key("Home", "all", tr_noop("show the whole stroke again after zooming; a double-click on a plot too")),
-    Key(
-        "Ctrl+C",
-        "copy",
-        tr_noop("copy the selected cells of a table as tab-separated values; a click on its head sorts"),
-    ),
+    Key("Ctrl+C", "copy", tr_noop("copy selected cells of a table as tab-separated values; a click on a head sorts")),
     Key("Ctrl+Z", "undo", tr_noop("undo the last decision; that too is recorded")),
     Key("Ctrl+Shift+Z", "redo", tr_noop("redo what was undone last")),
     Key("Space", "play", tr_noop("play and pause, in the replay or in the history")),
-    Key(
-        "Left  Right",
-        "step",
-        tr_noop("one reading, or one state of the history, back and on; Home and End: to its ends"),
-    ),
+    Key("Left  Right", "step", tr_noop("one reading or state of the history back and on; Home and End: to the ends")),
     Key("Ctrl+1 2 3", "pages", tr_noop("go to the trials, the stroke, the model")),
     Key(tr_noop("Esc"), "stop", tr_noop("stop what is being done; what was done is kept")),
     Key("F1", "keys", tr_noop("show or hide these keys")),

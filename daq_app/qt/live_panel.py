@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import Drawer, Panel, button, choice, fill, hbox, label, regrade, say, vbox
+from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, vbox
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.course_state import Mark, picture_end
@@ -24,12 +24,10 @@ LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
 READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
 LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers alone, before the font's scale [px]
-NAMES = {
-    "N": tr_noop("Normal force"),
-    "T": tr_noop("Tangential force"),
-    "mu": tr_noop("Friction coefficient"),
-    "speed": tr_noop("Speed"),
-}  # as spoken
+NAMES = {  # as spoken
+    "N": tr_noop("Normal force"), "T": tr_noop("Tangential force"),
+    "mu": tr_noop("Friction coefficient"), "speed": tr_noop("Speed"),
+}  # fmt: skip
 WIDEST = {"N": "−00.00 N", "T": "00.00 N", "mu": "0.00", "speed": "000 mm/s"}  # each number keeps its place
 LEAST_FOR_SPEED = 280  # a lower panel shows force and ratio alone
 LEAST_FOR_MODEL = 430  # a lower panel shows what is measured alone
@@ -193,9 +191,7 @@ class LivePanel(Panel):
     def __init__(self, feed: LiveFeed, model: LiveModel, scale: float) -> None:
         """Show what `feed` holds and what `model` says; nothing yet."""
         super().__init__(tr("live readings"))
-        self._feed = feed
-        self._model = model
-        self._model_trace = ModelTrace()
+        self._feed, self._model, self._model_trace = feed, model, ModelTrace()
         self._seconds = 10
         self._hold_time: float | None = None  # device time the picture is held at; readings go on behind it
         self._read_at = 0.0
@@ -248,7 +244,7 @@ class LivePanel(Panel):
         """Show the last so many seconds."""
         self._seconds = seconds
         for plot in (*self.plots, self._model_plot):
-            plot.show_seconds(seconds)
+            plot.show_axis(seconds)
         self.bar.length.setCurrentIndex(LENGTHS.index(seconds))
 
     def change_length(self, by: int) -> None:
@@ -280,10 +276,9 @@ class LivePanel(Panel):
                 self._show_until(self.plots[:3], end, seen, clock)
             self._show_until(self.plots[3:], now, seen, clock)
             frozen = newest is not None and end < newest
+            edge = tr("now") if not frozen else tr("lift + 1 s") if self._hold_time is None else tr("held")
             for plot in (*self.plots[:3], self._model_plot):
-                plot.show_end(
-                    tr("lift + 1 s") if frozen and self._hold_time is None else tr("held") if frozen else tr("now")
-                )
+                plot.show_axis(end=edge)
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
                 _, values = trace.between(now - TRAIL, np.nextafter(now, np.inf), every)
@@ -322,10 +317,8 @@ class LivePanel(Panel):
         model = self._model
         words = model_words(model.said, model.settled, model.problem)
         shown = model.settled if model.settled is not None and model.settled.picture is not None else model.said
-        if shown is None:
-            self.finger.show_model(None, np.empty(0), words, clock)
-        else:
-            self.finger.show_model(shown.picture, shown.row, words, clock)
+        picture, row = (None, np.empty(0)) if shown is None else (shown.picture, shown.row)
+        self.finger.show_model(picture, row, words, clock)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Take the room there is; what there is none for is folded."""
@@ -337,26 +330,17 @@ class LivePanel(Panel):
             plot.setVisible(shown)
         lowest = column[3] if model else column[2] if speed else column[1]
         for plot in column:
-            plot.show_times(plot is lowest)  # one axis for all of them
-        self._grid.setRowStretch(2, 2 if speed else 0)
-        self._grid.setRowStretch(3, 2 if model else 0)
+            plot.show_axis(times=plot is lowest)  # one axis for all of them
         self.finger.setVisible(model)
 
     def _placed(self) -> tuple[QWidget, QWidget]:
         """Return the stroke's plots, and what the drawer holds: finger, sample and the six axes."""
         stroke, drawer = QWidget(), QWidget()
-        grid = self._grid = QGridLayout(stroke)
-        side = QVBoxLayout(drawer)
-        for layout in (grid, side):
-            layout.setContentsMargins(0, 0, 0, 0)
-            layout.setSpacing(4)
-        for row, (plot, stretch) in enumerate(zip((*self.plots[:3], self._model_plot), (3, 2, 2, 2), strict=True)):
-            grid.addWidget(plot, row, 0)
-            grid.setRowStretch(row, stretch)
-        fill(side, (self.finger, 7), (self.map, 3))
-        for plot in self.plots[3:]:
-            side.addWidget(plot, 2)
-        self.plots[3].show_times(False)
+        column = (*self.plots[:3], self._model_plot)
+        self._column = vbox(*zip(column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
+        axes = ((plot, 2) for plot in self.plots[3:])
+        vbox((self.finger, 7), (self.map, 3), *axes, on=drawer, spacing=4)
+        self.plots[3].show_axis(times=False)
         return stroke, drawer
 
     def _hold(self) -> None:

@@ -25,6 +25,7 @@ PART = 0.62  # of the height that the finger takes; the row has the rest
 MAGMA = ("#fcfdbf", "#fecf92", "#fe9f6d", "#f7705c", "#de4968", "#b5367a", "#8c2981", "#641a80", "#3b0f70")
 ROW_LINES = 4.0  # of text, below which height the row is left out and the finger has all the room
 SHADES = 20
+TOP_RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop
 EVERY = 1 / 30  # no new picture sooner after another: nobody sees more [s]
 TOP = 0.97  # of the faces' SED lies below the end of the colour scale
 
@@ -215,11 +216,8 @@ class FingerView(QWidget):
                 paint_lost(painter, QPointF(x, y), t)
         painter.restore()
         painter.setPen(QColor(t.quiet))
-        painter.drawText(
-            box.adjusted(4, 0, -4, -2),
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
-            tr("0 to {high:g} kPa", high=self._colours.high),
-        )
+        words = tr("0 to {high:g} kPa", high=self._colours.high)
+        painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, words)
 
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
         """Paint the faces, those of one shade at once."""
@@ -238,11 +236,7 @@ class FingerView(QWidget):
         plot = box.adjusted(6, 2, -6, -line)
         painter.setPen(QColor(t.quiet))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignTop, tr("  SED along the skin [kPa]"))
-        painter.drawText(
-            box.adjusted(0, 0, -6, 0),
-            Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop,
-            f"{self._heights.high:g}",
-        )
+        painter.drawText(box.adjusted(0, 0, -6, 0), TOP_RIGHT, f"{self._heights.high:g}")
         ends = (f"  {ROW[0]:g} mm proximal".replace("-", ""), tr("{row:g} mm distal", row=ROW[-1]))
         painter.drawText(box, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignBottom, ends[0])
         painter.drawText(box.adjusted(0, 0, -6, 0), Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignBottom, ends[1])

@@ -55,9 +55,9 @@ class LivePlot(PaintedWidget):
         self._curves = tuple(curves)
         self._scale = scale
         self._type_scale = type_scale
-        self._seconds = 10.0
-        self._times_shown = True
-        self._end = tr("now")  # what the right edge is
+        self._seconds: float = 10.0
+        self._times_shown: bool = True
+        self._end: str = tr("now")  # what the right edge is
         self._now = 0.0
         self._columns = Columns(np.empty(0), np.empty((len(tuple(channels)), 0)))
         self._marks: tuple[Mark, ...] = ()
@@ -65,22 +65,13 @@ class LivePlot(PaintedWidget):
         self.setMinimumSize(40, round(LEAST * type_scale))
         self.setAccessibleName(tr("plot of {name}", name=self._name))
 
-    def show_seconds(self, seconds: float) -> None:
-        """Show the last so many seconds."""
-        if seconds != self._seconds:
-            self._seconds = seconds
-            self.redraw()
-
-    def show_times(self, shown: bool) -> None:
-        """Show the numbers of the time axis, or leave them to the plot below."""
-        if shown != self._times_shown:
-            self._times_shown = shown
-            self.redraw()
-
-    def show_end(self, words: str) -> None:
-        """Say which instant is at the right edge."""
-        if words != self._end:
-            self._end = words
+    def show_axis(self, seconds: float | None = None, *, times: bool | None = None, end: str | None = None) -> None:
+        """Show the last so many seconds, with their numbers or without, and say which instant is at the right edge."""
+        before = self._seconds, self._times_shown, self._end
+        self._seconds = self._seconds if seconds is None else seconds
+        self._times_shown = self._times_shown if times is None else times
+        self._end = self._end if end is None else end
+        if before != (self._seconds, self._times_shown, self._end):
             self.redraw()
 
     def show_columns(self, columns: Columns, now: float, marks: Sequence[Mark], clock: float) -> None:
@@ -186,8 +177,7 @@ class LivePlot(PaintedWidget):
             if curve.dashed:
                 pen.setDashPattern([1.6, 1.2])
             painter.setPen(pen)
-            end = x + sample
-            middle = baseline - metrics.xHeight() / 2.0
+            end, middle = x + sample, baseline - metrics.xHeight() / 2.0
             painter.drawLine(QPointF(x, middle), QPointF(end, middle))
             painter.setPen(QColor(self.theme.quiet))
             painter.drawText(QPointF(end + 4, baseline), tr(curve.channel))

@@ -17,7 +17,7 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import bare, fill, scrolled, vbox
-from daq_app.qt.preferences import restore_place, save_place
+from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, restore_place, save_place
 from daq_app.qt.rooms import Menus, Rail, Room, Rooms
 from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_picture import open_preview
@@ -47,7 +47,7 @@ LEAVING = 10.0  # closing twice within so long leaves a session that is being re
 class MainWindow(QMainWindow):
     """What the experimenter sees. It knows nothing but the last `View`."""
 
-    theme_wanted = Signal(str)
+    theme_chosen = Signal()
 
     def __init__(self, bridge: Bridge, scale: float, tablet: TabletScreen | None = None) -> None:
         """Place the panels, and follow `bridge`; with a `tablet` the subject answers there."""
@@ -74,7 +74,7 @@ class MainWindow(QMainWindow):
         self.side = SubjectSide(self, bridge, self.subject, tablet, self.course, self.act)
         self.side.line_changed.connect(self._line_changed)
         self.keyboard = self.side.keyboard
-        self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act, self.theme_wanted.emit))
+        self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act))
         self._acts = self._table()
         self._left = QStackedWidget()
         self._left.addWidget(self.page)
@@ -123,7 +123,7 @@ class MainWindow(QMainWindow):
             self.rooms.open(Path(act.removeprefix("open ")))
         elif act in self._acts:
             self._acts[act]()
-        elif act in ("redo", "skip", "note", "no answer", "end") and self.course.isVisible():
+        elif act in COURSE and self.course.isVisible():
             self.course.ask(act)
             if self.course.asking:
                 self.side.come_back()
@@ -132,7 +132,6 @@ class MainWindow(QMainWindow):
         """Return what is done for each act that is not the course panel's own."""
         return {
             "primary": self._primary,
-            "pause": lambda: self.course.isVisible() and self.course.pause.click(),
             "undo": self._undo,
             "new": lambda: self.rooms.over and self.bridge.send(NewSession()),
             "tare": lambda: self.bridge.view.bench.can_tare and self.bridge.send(Tare()),
@@ -159,8 +158,9 @@ class MainWindow(QMainWindow):
             "go to prepare": lambda: self.go_to("prepare"),
             "go to run": lambda: self.go_to("run"),
             "go to review": lambda: self.go_to("review"),
-            "type size": lambda: self.notice.warn(tr("The size of type that was chosen holds from the next start on.")),
-            "language": lambda: self.notice.warn(tr("The language that was chosen holds from the next start on.")),
+            THEME: self.theme_chosen.emit,
+            SCALE: lambda: self.notice.warn(tr("The size of type that was chosen holds from the next start on.")),
+            LANGUAGE: lambda: self.notice.warn(tr("The language that was chosen holds from the next start on.")),
             "quit": self.close,
         }
 
@@ -203,7 +203,7 @@ class MainWindow(QMainWindow):
         self.bridge.end()
         self.rooms.review.leave()
         if self.tablet is not None:
-            self.tablet.close()
+            self.tablet.server.close()
         self.subject.hide()
         QGuiApplication.quit()
 

@@ -93,8 +93,7 @@ class InspectedTrial(QWidget):
         self.cells = {name: label("–", "value") for name in PICTURE}
         self._plots = [LivePlot(*plot, scale, PICTURE) for plot in PLOTS]
         for plot in self._plots:
-            plot.show_times(plot is self._plots[-1])
-            plot.show_end(tr("end"))
+            plot.show_axis(times=plot is self._plots[-1], end=tr("end"))
         head = hbox((self.heading, 1), button(tr("Back  I"), tr("back to the signals of this moment"), back))
         # Two means in a row find room at every size of type.
         cells = named(((short_name(name), cell) for name, cell in self.cells.items()), 2)
@@ -108,7 +107,7 @@ class InspectedTrial(QWidget):
         self._shown = shown
         say(self.heading, shown.heading)
         say(self.verdict, shown.verdict)
-        regrade(self.verdict, {"refused": "wrong", "doubtful": "look"}.get(shown.grade, ""))
+        regrade(self.verdict, GRADES.get(shown.grade, ""))
         say(self.details, shown.details)
         self.details.setVisible(bool(shown.details))
         for name, text in shown.cells:
@@ -129,7 +128,7 @@ class InspectedTrial(QWidget):
         marks += [Mark("lift", picture.lift, picture.lift)] if picture.lift is not None else []
         marks += [Mark("steady", *shown.steady)] if shown.steady is not None else []
         for plot in self._plots:
-            plot.show_seconds(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
+            plot.show_axis(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
             plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
 
 

@@ -70,14 +70,13 @@ class ModelColumn(QWidget):
         self.finger.sight.cut.connect(self._cut)
         for canvas in (self.finger, self.other):
             canvas.range_chosen.connect(self.fields.fix)
-        self.near, self.mesh, self.together = (
-            button(text, name, self._paint, "small", checkable=True)
-            for text, name in (
-                (tr("Contact"), tr("show the contact alone, with its tractions")),
-                (tr("Mesh"), tr("show the mesh")),
-                (tr("Both"), tr("show the finger of the compared session beside this one")),
-            )
-        )
+        texts = {
+            tr("Contact"): tr("show the contact alone, with its tractions"),
+            tr("Mesh"): tr("show the mesh"),
+            tr("Both"): tr("show the finger of the compared session beside this one"),
+        }
+        buttons = (button(text, name, self._paint, "small", checkable=True) for text, name in texts.items())
+        self.near, self.mesh, self.together = buttons
         self.together.hide()
         self.history = button(tr("History"), tr("show the finger from first touch on"), self._ask_history, "small")
         self.film = button(tr("Film"), tr("save the history as a film, GIF or MP4"), self._ask_film, "small")
@@ -251,13 +250,8 @@ class ModelColumn(QWidget):
         try:
             write_picture(self.finger, self._head(), Path(path))
         except OSError as error:
-            self.said.emit(
-                tr(
-                    "{path} could not be written ({strerror}): choose another folder.",
-                    path=path,
-                    strerror=error.strerror,
-                )
-            )
+            why = error.strerror
+            self.said.emit(tr("{path} could not be written ({why}): choose another folder.", path=path, why=why))
         else:
             self.said.emit(tr("Saved: {path}", path=path))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QButtonGroup, QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
+from PySide6.QtWidgets import QBoxLayout, QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
 from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
@@ -39,7 +39,6 @@ class NewSessionPage(Panel):
         """
         super().__init__(tr("new session"))
         self._send = send
-        self._act = act
         self._cards: tuple[Card, ...] = ()
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
@@ -51,7 +50,7 @@ class NewSessionPage(Panel):
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
         self.study = entry(tr("study, a folder of its own; may be empty"))
-        self.studies = choice(tr("study, a folder of its own; may be empty"))
+        self.studies = choice(self.study.accessibleName())
         self.studies.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)
         self.studies.setLineEdit(self.study)
         self.folder = entry(tr("folder in which sessions are kept"))
@@ -63,7 +62,8 @@ class NewSessionPage(Panel):
         self.normal = choice(tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *AXES))
         words = tr("contact area of finger and surface in square millimetres; may be empty")
         self.area = entry(words, tr("as stated"))
-        self.stroking, self.answering = _hands(tr("stroking hand")), _hands(tr("answering hand"))
+        hands = [tr(words) for words, _ in HANDS]
+        self.stroking, self.answering = choice(tr("stroking hand"), hands), choice(tr("answering hand"), hands)
         self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
         self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
         self.with_forces, self.scores_only = self._either(tr("Forces, with the transducer"), tr("Scores only"))
@@ -71,26 +71,27 @@ class NewSessionPage(Panel):
         self.transducer = TransducerRow(act)
         self._people_words = label("", "quiet", wrap=True)
         self.screen_fields = ScreenFields(scale, act)
-        self._pilot = button(
-            tr("Pilot  F5"), tr("pilot this protocol with simulated hand and answers"), lambda: act("pilot")
-        )
+        words = tr("pilot this protocol with simulated hand and answers")
+        self._pilot = button(tr("Pilot  F5"), words, lambda: act("pilot"))
         self._pilot.setToolTip(tr("Runs by itself, needs no subject, and is kept apart in the folder “pilots”"))
-        self._preview = button(
-            tr("Preview  F7"), tr("preview every page that the subject will see"), lambda: act("preview")
-        )
+        words = tr("preview every page that the subject will see")
+        self._preview = button(tr("Preview  F7"), words, lambda: act("preview"))
         self._enrol = button(tr("Enrol"), tr("enrol the subject in the study"), self._enrolled)
         self.cut_short = CutShort(send)
         self._height, self._area = QWidget(), QWidget()
+        self._lines = {
+            "subject": self.subject, "study": self.study, "folder": self.folder, "seed": self.seed,
+            "height": self.height_above, "area": self.area,
+        }  # fmt: skip
         self._build(scale)
         self._follow()
         self._place_changed()
         self._show_study()
 
     def _either(self, *words: str) -> list[QRadioButton]:
-        """Return buttons of which one is pressed, the first to begin with."""
-        group, buttons = QButtonGroup(self), [QRadioButton(one) for one in words]
+        """Return buttons of which one is pressed, the first to begin with; of all on the same card."""
+        buttons = [QRadioButton(one) for one in words]
         for one in buttons:
-            group.addButton(one)
             one.setAccessibleName(one.text())
             one.setMinimumHeight(TARGET - GRID)
         buttons[0].setChecked(True)
@@ -98,7 +99,7 @@ class NewSessionPage(Panel):
 
     def _follow(self) -> None:
         """Let every field say that it has changed, and show what depends on it."""
-        for line in (self.subject, self.study, self.folder, self.seed, self.height_above, self.area):
+        for line in self._lines.values():
             line.textChanged.connect(self.changed)
         for widget in (self.with_forces, self.scores_only, self.people_score, self.simulated):
             widget.toggled.connect(self.changed)
@@ -178,15 +179,7 @@ class NewSessionPage(Panel):
 
     def go_to_missing(self) -> None:
         """Let typing go to the first field that is wrong, and mark its card."""
-        fields: dict[str, QWidget] = {
-            "subject": self.subject,
-            "protocol": self.protocol,
-            "study": self.study,
-            "folder": self.folder,
-            "seed": self.seed,
-            "height": self.height_above,
-            "area": self.area,
-        }
+        fields: dict[str, QWidget] = {**self._lines, "protocol": self.protocol}
         missing = [card for card in self._cards if not card.ready]
         for card in missing:
             self.frames[card.name].insist()
@@ -225,9 +218,8 @@ class NewSessionPage(Panel):
     def _choose_protocol(self, at: int) -> None:
         if at != self.protocol.count() - 1:
             self.changed.emit()
-            return
-        name, _ = QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")
-        self.add_protocol(name)
+        else:
+            self.add_protocol(QFileDialog.getOpenFileName(self, tr("Protocol"), "", "Protocol (*.toml)")[0])
 
     def add_protocol(self, path: str) -> None:
         """Choose the protocol in a file; none where the path is empty."""
@@ -312,7 +304,3 @@ class NewSessionPage(Panel):
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange:
             self._place_changed()
-
-
-def _hands(name: str) -> QComboBox:
-    return choice(name, (tr(words) for words, _ in HANDS))

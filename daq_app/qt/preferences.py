@@ -16,19 +16,19 @@ RECENT = 12  # sessions that are offered
 FRAME = QSize(16, 48)  # that a desktop draws around a window, title bar included [px]
 DRAWER = "window/drawer open"
 DRAWER_SIZES = "window/drawer sizes"
-_LANGUAGE = "window/language"
-_GEOMETRY, _THEME, _SCALE, _RECENT = "window/geometry", "window/theme", "window/type scale", "window/recent sessions"
+THEME, SCALE, LANGUAGE = "window/theme", "window/type scale", "window/language"
+_GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
+
+
+def choose(what: str, value: object) -> None:
+    """Remember what was chosen as `THEME`, `SCALE` or `LANGUAGE`; None follows the system again."""
+    settings().setValue(what, "" if value is None else str(value))
 
 
 def theme() -> str:
     """Return the theme that was chosen, one of THEMES."""
-    said = str(settings().value(_THEME))
+    said = str(settings().value(THEME))
     return said if said in THEMES else "system"
-
-
-def choose_theme(name: str) -> None:
-    """Remember a theme."""
-    settings().setValue(_THEME, name)
 
 
 def chosen_tokens() -> Tokens:
@@ -39,26 +39,16 @@ def chosen_tokens() -> Tokens:
 def type_scale() -> float:
     """Return how much larger than usual the type is [-]: as it was chosen, or as the system asks for."""
     try:
-        chosen = float(str(settings().value(_SCALE)))
+        chosen = float(str(settings().value(SCALE)))
     except ValueError:
         return font_scale()
     return chosen if chosen in SCALES else font_scale()
 
 
-def choose_type_scale(scale: float | None) -> None:
-    """Remember the size of the type; None follows the system again."""
-    settings().setValue(_SCALE, "" if scale is None else repr(scale))
-
-
 def language() -> str:
     """Return the language of the experimenter's windows: as it was chosen, or as the environment says."""
-    said = str(settings().value(_LANGUAGE) or os.environ.get(VARIABLE))
+    said = str(settings().value(LANGUAGE) or os.environ.get(VARIABLE))
     return said if said in languages(EXPERIMENTER) else ENGLISH
-
-
-def choose_language(code: str) -> None:
-    """Remember a language; windows that are built from now on speak it."""
-    settings().setValue(_LANGUAGE, code)
 
 
 def recent_sessions() -> tuple[Path, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING, Literal, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 from PySide6.QtCore import Qt, QUrl, qVersion
 from PySide6.QtGui import QAction, QActionGroup, QDesktopServices
@@ -32,7 +32,6 @@ from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 if TYPE_CHECKING:
     from daq_app.qt.analyst_window import AnalystWindow
 
-V = TypeVar("V")
 Room = Literal["prepare", "run", "review"]
 ROOMS: tuple[Room, ...] = ("prepare", "run", "review")
 WHY_NOT = {
@@ -44,13 +43,9 @@ KEY = {"prepare": "F2", "run": "F3", "review": "F4"}
 WIDTH = 84  # before the font's scale [px]
 DOCS = Path(__file__).parents[2] / "docs" / "index.md"
 SESSION = (
-    ("redo", tr_noop("Redo…")),
-    ("undo", tr_noop("Undo the last redo")),
-    ("skip", tr_noop("Skip…")),
-    ("pause", tr_noop("Pause or go on")),
-    ("note", tr_noop("Note…")),
-    ("end", tr_noop("End…")),
-)
+    ("redo", tr_noop("Redo…")), ("undo", tr_noop("Undo the last redo")), ("skip", tr_noop("Skip…")),
+    ("pause", tr_noop("Pause or go on")), ("note", tr_noop("Note…")), ("end", tr_noop("End…")),
+)  # fmt: skip
 PANELS = (
     ("bench", tr_noop("Bench")),
     ("drawer", tr_noop("Drawer: axes, sample, finger")),
@@ -95,8 +90,8 @@ class Rail(Panel):
 class Menus:
     """Fills the menu bar of a window."""
 
-    def __init__(self, window: QMainWindow, act: Callable[[str], None], theme: Callable[[str], None]) -> None:
-        """Build the menu; `act` does what an entry stands for, `theme` takes a theme's name."""
+    def __init__(self, window: QMainWindow, act: Callable[[str], None]) -> None:
+        """Build the menu; `act` does what an entry stands for, or what follows a preference that was chosen."""
         self._act = act
         bar = window.menuBar()
         if (more := bar.findChild(QToolButton)) is not None:
@@ -122,13 +117,12 @@ class Menus:
             self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
         view.addSeparator()
         themes = {name: name for name in preferences.THEMES}
-        self.themes = self._choices(view.addMenu(tr("Theme")), themes, preferences.theme(), theme)
+        self.themes = self._choices(view.addMenu(tr("Theme")), preferences.THEME, themes, preferences.theme())
         sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
-        take, now = preferences.choose_type_scale, preferences.type_scale()
-        self.sizes = self._choices(view.addMenu(tr("Font size")), sizes, now, take, "type size")
+        self.sizes = self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.type_scale())
         codes = {name_of(code): code for code in languages(EXPERIMENTER)}
-        speak, spoken = preferences.choose_language, preferences.language()
-        self.languages = self._choices(view.addMenu(tr("Language")), codes, spoken, speak, "language")
+        menu, language = view.addMenu(tr("Language")), preferences.language()
+        self.languages = self._choices(menu, preferences.LANGUAGE, codes, language)
         panels = view.addMenu(tr("Panels"))
         for name, words in PANELS:
             self._add(panels, name, tr(words))
@@ -152,13 +146,16 @@ class Menus:
         key = next((known.key for known in KEYS if known.act == name), "")
         return menu.addAction(f"{words}\t{key}" if key else words, lambda: self._act(name))
 
-    def _choices(
-        self, menu: QMenu, values: Mapping[str, V], now: V, take: Callable[[V], None], act: str = ""
-    ) -> QActionGroup:
-        """Return an entry for each value, by its name, that gives it to `take` and then does an `act`."""
+    def _choices(self, menu: QMenu, what: str, values: Mapping[str, object], now: object) -> QActionGroup:
+        """Return an entry for each value of a preference, by its name, that remembers it and does what follows."""
+
+        def choose(value: object) -> None:
+            preferences.choose(what, value)
+            self._act(what)
+
         group = QActionGroup(menu)
         for name, value in values.items():
-            action = menu.addAction(tr(name).capitalize(), lambda value=value: (take(value), act and self._act(act)))
+            action = menu.addAction(tr(name).capitalize(), lambda value=value: choose(value))
             action.setCheckable(True)
             action.setChecked(value == now)
             group.addAction(action)
@@ -204,15 +201,10 @@ class ReviewRoom(QWidget):
         self.recent.itemActivated.connect(self._go)
         self.recent.itemClicked.connect(self._go)
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
-        side = QWidget()
+        side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
         side.setFixedWidth(round(LIST_WIDTH * scale))
-        vbox(
-            label(tr("Recent sessions"), "section"),
-            (self.recent, 1),
-            button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose),
-            on=side,
-            margins=(0, GRID, 0, GRID),
-        )
+        head = label(tr("Recent sessions"), "section")
+        vbox(head, (self.recent, 1), choose, on=side, margins=(0, GRID, 0, GRID))
         self._row = hbox(side, (self._none, 1), on=self, spacing=GRID)
 
     def enter(self) -> None:

@@ -67,9 +67,8 @@ def _key(screen: QScreen) -> str:
     return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
 
 
-def line_settings(screen: QScreen) -> tuple[Setting, ...]:
+def line_settings(shown: Millimetres) -> tuple[Setting, ...]:
     """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
-    shown = millimetres(screen)
     origin = "measured" if shown.checked else "default"
     return (
         Setting("answer line length", LENGTH, "mm", origin),
@@ -92,22 +91,10 @@ class RulerCheck(QWidget):
         self._measured.setFixedWidth(round(100 * scale))
         self._measured.returnPressed.connect(self._keep)
         self._wrong = label("", "quiet", wrap=True)
-        vbox(
-            self._sentence,
-            1,
-            self._line,
-            1,
-            hbox(
-                self._measured,
-                label("mm"),
-                button(tr("Keep"), tr("keep the measured length"), self._keep),
-                button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit),
-                1,
-            ),
-            self._wrong,
-            on=self,
-            margins=4 * GRID,
-        )
+        keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
+        leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit)
+        row = hbox(self._measured, label("mm"), keep, leave, 1)
+        vbox(self._sentence, 1, self._line, 1, row, self._wrong, on=self, margins=4 * GRID)
 
     def begin(self, screen: QScreen) -> None:
         """Check this screen."""
@@ -125,15 +112,11 @@ class RulerCheck(QWidget):
         except ValueError:
             value = float("nan")
         if self._screen is None or checked(self._screen, value) is None:
-            say(
-                self._wrong,
-                tr(
-                    "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
-                    least=LEAST,
-                    most=MOST,
-                    it=text,
-                ),
-            )
+            words = tr(
+                "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
+                least=LEAST, most=MOST, it=text,
+            )  # fmt: skip
+            say(self._wrong, words)
             return
         self.done.emit()
 

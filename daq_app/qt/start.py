@@ -125,11 +125,7 @@ def opened(
     def theme_changed() -> None:
         _dress(application, preferences.chosen_tokens(), scale)
 
-    def theme_chosen(name: str) -> None:
-        preferences.choose_theme(name)
-        theme_changed()
-
-    window.theme_wanted.connect(theme_chosen)
+    window.theme_chosen.connect(theme_changed)
     if theme is None:
         application.styleHints().colorSchemeChanged.connect(theme_changed)
 

@@ -66,14 +66,8 @@ class StrokeColumn(QWidget):
         self.friction.chosen.connect(self._choose)
         self.tabs.addTab(self.friction, tr("All strokes"))
         self.tabs.setMinimumHeight(170)
-        vbox(
-            (self.stroke, 4),
-            hbox((self.player, 1), self.save),
-            self.decisions,
-            (self.tabs, 3),
-            on=self,
-            spacing=GRID // 2,
-        )
+        row = hbox((self.player, 1), self.save)
+        vbox((self.stroke, 4), row, self.decisions, (self.tabs, 3), on=self, spacing=GRID // 2)
 
     def show_state(self, state: AnalystState) -> None:
         """Show what is known now."""

@@ -178,27 +178,9 @@ class SubjectPreview(QDialog):
         self.back = button(tr("◂ Back"), tr("the page before"), lambda: self._turn(-1))
         self.on = button(tr("On ▸"), tr("the next page"), lambda: self._turn(1))
         self._count = label("", "quiet")
-        hbox(
-            self.list,
-            (
-                vbox(
-                    (self.picture, 1),
-                    self.lost,
-                    hbox(
-                        self.back,
-                        self.on,
-                        self._count,
-                        1,
-                        button(tr("Close  Esc"), tr("close the preview"), self.close),
-                    ),
-                    spacing=GRID,
-                ),
-                1,
-            ),
-            on=self,
-            margins=2 * GRID,
-            spacing=2 * GRID,
-        )
+        close = button(tr("Close  Esc"), tr("close the preview"), self.close)
+        page = vbox((self.picture, 1), self.lost, hbox(self.back, self.on, self._count, 1, close), spacing=GRID)
+        hbox(self.list, (page, 1), on=self, margins=2 * GRID, spacing=2 * GRID)
         self.resize(round(1000 * min(scale, 1.25)), round(560 * min(scale, 1.25)))
         self.list.currentRowChanged.connect(self._show)
         self.list.setCurrentRow(0)

@@ -14,7 +14,7 @@ from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.keys import Keyboard
 from daq_app.qt.preferences import direction
-from daq_app.qt.screens import USUAL_DPI, line_settings
+from daq_app.qt.screens import USUAL_DPI, Millimetres, line_settings, millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.tablet.dialogue import AnswerGiven, Dialogue, Force, FromTablet, Hello, Ruler
 from daq_app.tablet.server import TabletServer, own_address
@@ -56,11 +56,8 @@ class TabletScreen(QObject):
         if not self.server.connected:
             return tr("Open {url} on the tablet, and type the code {code}.", url=self.server.url, code=self.server.code)
         checked = tr("checked") if self._pixels else tr("not checked")
-        return tr(
-            "The tablet shows the page. Line of {length:.0f} mm, {checked} with a ruler.",
-            length=LENGTH,
-            checked=checked,
-        )
+        line = tr("Line of {length:.0f} mm, {checked} with a ruler.", length=LENGTH, checked=checked)
+        return f"{tr('The tablet shows the page.')} {line}"
 
     def picture(self) -> bytes:
         """Return the address with the code as a QR code, PNG; nothing while the tablet is there."""
@@ -91,21 +88,8 @@ class TabletScreen(QObject):
 
     def line_settings(self) -> tuple[Setting, ...]:
         """Return what a session keeps of the line that is answered on."""
-        origin = "measured" if self._pixels else "default"
-        return (
-            Setting("subject's screen", "web", "", "set"),
-            Setting("answer line length", LENGTH, "mm", origin),
-            Setting(
-                "pixels in a millimetre of the answering screen",
-                round(self._pixels or USUAL_DPI / 25.4, 4),
-                "1/mm",
-                origin,
-            ),
-        )
-
-    def close(self) -> None:
-        """Serve no more."""
-        self.server.close()
+        shown = Millimetres(self._pixels or USUAL_DPI / 25.4, self._pixels is not None)
+        return (Setting("subject's screen", "web", "", "set"), *line_settings(shown))
 
     def _take(self, said: FromTablet, arrived: float) -> None:
         match said:
@@ -181,7 +165,8 @@ class SubjectSide(QObject):
 
     def line_settings(self) -> tuple[Setting, ...]:
         """Return what a recording says of the subject's line."""
-        return line_settings(self._subject.screen()) if self._tablet is None else self._tablet.line_settings()
+        tablet, screen = self._tablet, self._subject.screen()
+        return line_settings(millimetres(screen)) if tablet is None else tablet.line_settings()
 
     def come_back(self) -> None:
         """Let the keyboard come back to the experimenter's window, which is in front where it shares a screen."""

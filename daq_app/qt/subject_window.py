@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QHBoxLayout, QLabel, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QStackedWidget, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
 from daq_app.qt.parts import button, fill, hbox, label, say, vbox
@@ -93,8 +93,7 @@ class SubjectWindow(QWidget):
         """Show what is to be done now; `hand` is the answering one, where somebody stated it."""
         if view == self._answered:
             return
-        before, self._view, self._stated_hand = self._view, view, hand
-        self._answered = None
+        before, self._view, self._stated_hand, self._answered = self._view, view, hand, None
         if before == view:
             return
         if view.language != self._language:
@@ -118,13 +117,10 @@ class SubjectWindow(QWidget):
         """Make the letters as large as they should be, or as small as lets all of the page be read."""
         layout = self._answer_layout if self.scoring else self._message_layout
         for part in SHRINKING:
-            for widget, size in (
-                (self._title, LARGER),
-                (self._question, LARGER),
-                (self._text, LARGE),
-                (self._hint, LARGE),
-            ):
-                _set_type(widget, size * part, self._type, bold=size == LARGER)
+            for widget in (self._title, self._question):
+                _set_type(widget, LARGER * part, self._type, bold=True)
+            for widget in (self._text, self._hint):
+                _set_type(widget, LARGE * part, self._type)
             self._scale.set_type(LARGE * part, self._type)
             layout.invalidate()
             layout.activate()  # a page that is not shown has not yet heard of its new texts
@@ -219,27 +215,22 @@ class SubjectWindow(QWidget):
         layout.addStretch(1)
         for shown in (self._title, self._text, self.press):
             shown.setMaximumWidth(round(TEXT_WIDTH * self._type))
-            layout.addLayout(_centred(shown, 100))
+            layout.addLayout(hbox(1, (shown, 100), 1))
             layout.addSpacing(3 * GRID)
         layout.addStretch(2)
         return page
 
     def _scale_page(self) -> QWidget:
         page = QWidget()
-        self._answer_layout = layout = QVBoxLayout(page)
-        layout.setContentsMargins(2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
-        self._question.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        fill(layout, self._question, 2)
-        self._hint.setAlignment(Qt.AlignmentFlag.AlignHCenter)
-        fill(layout, self._hint, self._ways, 2)
-        self._next_row = QHBoxLayout()
-        self._next_row.setContentsMargins(4 * GRID, 0, 4 * GRID, 0)
+        for words in (self._question, self._hint):
+            words.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         place = QWidget()  # keeps the button's place while there is none
-        place.setLayout(self._next_row)
+        self._next_row = hbox(on=place, margins=(4 * GRID, 0, 4 * GRID, 0))
         place.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # Next lies at a hand, whichever way texts are read
         place.setFixedHeight(self.next.minimumHeight() + 2 * GRID)
         place.setMaximumWidth(WIDEST)
-        layout.addLayout(_centred(place, 1000))
+        row, margins = hbox(1, (place, 1000), 1), (2 * GRID, 4 * GRID, 2 * GRID, 4 * GRID)
+        self._answer_layout = vbox(self._question, 2, self._hint, self._ways, 2, row, on=page, margins=margins)
         self._place_next("right")
         return page
 
@@ -258,8 +249,7 @@ class SubjectWindow(QWidget):
             self._way.setFocus()
 
     def _ruler_done(self) -> None:
-        self.fit_screen()
-        self.screen_changed.emit()
+        self._screen_changed()
         self._turn()
 
     def _answer_changed(self) -> None:
@@ -327,8 +317,3 @@ def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) 
     """Set a label in large type: the style sheet's sizes are those of the experimenter's window."""
     widget.setStyleSheet(f"font-size: {round(size * scale)}px; font-weight: {600 if bold else 400};")
     widget.setFont(font(round(size), scale, bold=bold))
-
-
-def _centred(widget: QWidget, weight: int) -> QHBoxLayout:
-    """Return a row with a widget in its middle, that takes `weight` times the space of either side."""
-    return hbox(1, (widget, weight), 1)

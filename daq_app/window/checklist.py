@@ -104,11 +104,8 @@ def _study_note(form: SessionForm) -> str:
         return tr("A study of protocol {protocol}.", protocol=said.protocol)
     there = ", ".join(studies_in(place_of(form).parent))
     elsewhere = tr(" Studies there: {there}.", there=there) if there else ""
-    return tr(
-        "“{name}” is no study: sessions go to a plain folder, by this page's protocol.{others}",
-        name=name,
-        others=elsewhere,
-    )
+    words = tr("“{name}” is no study: sessions go to a plain folder, by this page's protocol.", name=name)
+    return words + elsewhere
 
 
 def _subject_note(form: SessionForm) -> str:
@@ -116,9 +113,6 @@ def _subject_note(form: SessionForm) -> str:
     if said is not None:
         return said.words
     subject = form.subject.strip()
-    before = codes_in(place_of(form)).count(subject)
-    return (
-        tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=before)
-        if before
-        else ""
-    )
+    if not (before := codes_in(place_of(form)).count(subject)):
+        return ""
+    return tr("Sessions of {subject} here already: {before}. Is it the same person?", subject=subject, before=before)

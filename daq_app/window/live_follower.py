@@ -49,15 +49,11 @@ def settled_scene(
     """Return the scene of a finished stroke, pressed by its measured force [N]; None where it gives no friction."""
     if friction.mu is None or friction.direction is None or normal_force <= 0.0:
         return None
+    speed = friction.speed or DEFAULT_SPEED
     return replace(
         live_scene(plan, kinematics),
         friction=Friction(max(friction.mu, 0.0), friction.tau_max),
-        loading=Loading(
-            slide=SLIDES[friction.direction],
-            speed=friction.speed or DEFAULT_SPEED,
-            normal_force=normal_force,
-            force_unit="N",
-        ),
+        loading=Loading(slide=SLIDES[friction.direction], speed=speed, normal_force=normal_force, force_unit="N"),
     )
 
 

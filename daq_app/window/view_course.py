@@ -122,12 +122,8 @@ def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
     if not again:
         return Button(tr("Redo"), "R", enabled=False)
     numbers = "–".join(str(trial.trial.number) for trial in again)
-    return Button(
-        tr("Redo {numbers}", numbers=numbers),
-        "R",
-        sends=sends,
-        question=tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_named(again)),
-    )
+    question = tr("Why redo {trials}? What was recorded of it no longer counts.", trials=_named(again))
+    return Button(tr("Redo {numbers}", numbers=numbers), "R", sends=sends, question=question)
 
 
 def _undo(session: SessionState) -> Button:

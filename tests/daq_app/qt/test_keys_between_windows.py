@@ -159,7 +159,7 @@ def test_redo_names_its_trial_on_both_buttons_and_in_its_question(driver):
     QTest.keyClick(window, SPACE)
     driver.phase("ready")
     code = driver.session.trials[0].trial.stimulus.code
-    assert (window.middle.redo.text(), window.course.redo.text()) == ("Redo 1  R", "Redo 1 R")
+    assert (window.middle.redo.text(), window.course.buttons["redo"].text()) == ("Redo 1  R", "Redo 1 R")
     QTest.keyClick(window.subject, Qt.Key.Key_R)
     assert f"trial 1 ({code})" in window.course._question.text()
     QTest.keyClick(window.course.line, ESCAPE)

@@ -256,8 +256,8 @@ def test_no_text_of_prepare_run_keys_and_preview_is_cut_off(driver, windows, siz
 @pytest.fixture
 def type_size():
     """Return what chooses a size of type; the usual one comes back."""
-    yield preferences.choose_type_scale
-    preferences.choose_type_scale(None)
+    yield lambda scale: preferences.choose(preferences.SCALE, scale)
+    preferences.choose(preferences.SCALE, None)
 
 
 @pytest.mark.parametrize(

@@ -187,9 +187,9 @@ class Walk:
             said = [frame for frame in lacking if frame.words.isVisibleTo(frame) and frame.words.text().strip()]
             return "" if lacking and said == lacking else "Start is not lit, and no card says why"
         if window.subject.scoring:
-            answer = window.course.no_answer.isEnabled()
+            answer = window.course.buttons["no answer"].isEnabled()
             return "" if answer or window.course.asking else "an answer is due, and cannot be given or left out"
-        acts = (window.course.skip, window.course.pause, window.course.end)
+        acts = (window.course.buttons["skip"], window.course.buttons["pause"], window.course.buttons["end"])
         if session.phase in BY_ITSELF or any(made.isEnabled() for made in acts):
             return ""
         return (
@@ -215,7 +215,7 @@ class Walk:
                 if session.end is not None and session.sealing == "running":
                     driver.until(lambda: driver.session.sealing != "running", "the seal")
                 window.bridge.send(NewSession())
-            elif window.course.end.isEnabled() and not window.course.asking:
+            elif window.course.buttons["end"].isEnabled() and not window.course.asking:
                 QTest.keyClick(window, KEY.Key_E, CONTROL)
                 QTest.keyClicks(window.course.line, "enough")
                 QTest.keyClick(window.course.line, KEY.Key_Return)

@@ -88,7 +88,7 @@ def test_the_bar_of_the_force_fills_from_where_reading_begins(direction):
     bar.setLayoutDirection(direction)
     bar.resize(400, 40)
     bar._force = 0.25 * FULL
-    image, colour = bar.grab().toImage(), QColor(tokens.LIGHT.act)
+    image, colour = bar.grab().toImage(), QColor(tokens.theme_of(bar).act)
     filled = [x for x in range(image.width()) if image.pixelColor(x, image.height() // 2) == colour]
     assert len(filled) == pytest.approx(100, abs=4)
     assert (filled[-1] > 390) is (direction == RIGHT_TO_LEFT)

@@ -149,15 +149,15 @@ def test_what_to_do_now_is_whole_in_the_lowest_window_with_a_banner_of_three_lin
 
 def test_no_button_beside_the_plan_cuts_its_words_off(driver):
     course = driver.window.course
-    before = course.end.text(), course.redo.text()
-    course.end.setText("New Ctrl+N")  # once the session has ended, the longest it says
-    course.redo.setText("Redo 98–99 R")  # of two that are compared, late in a long session
+    before = course.buttons["end"].text(), course.buttons["redo"].text()
+    course.buttons["end"].setText("New Ctrl+N")  # once the session has ended, the longest it says
+    course.buttons["redo"].setText("Redo 98–99 R")  # of two that are compared, late in a long session
     course.ensurePolished()
     edges = course.layout().contentsMargins()
     wanted = course._bottom.widget(0).layout().sizeHint().width() + edges.left() + edges.right()
     assert wanted <= driver.window._left.width()
-    course.end.setText(before[0])
-    course.redo.setText(before[1])
+    course.buttons["end"].setText(before[0])
+    course.buttons["redo"].setText(before[1])
 
 
 def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):

@@ -37,7 +37,7 @@ def desk(application, tmp_path, monkeypatch):  # noqa: F811  the fixture
     if driver.session is not None and not driver.session.over:
         window.bridge.send(Stop())
         driver.until(lambda: driver.session.over, "the end")
-    window.tablet.close()
+    window.tablet.server.close()
     window.bridge.end()
     for widget in (window.subject, window):
         widget.hide()
