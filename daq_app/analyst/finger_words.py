@@ -123,7 +123,6 @@ def other_finger(state: AnalystState | None) -> tuple[Finger | None, str]:
 
 
 def _of_stimulus(report: Report, of: PredictionFinding) -> list[PredictionFinding]:
-    """Return the predictions of one stimulus in the order of their strokes."""
     alike = [p for p in report.predictions if (p.experiment, p.index) == (of.experiment, of.index)]
     return sorted(alike, key=lambda said: said.stroke or 0)
 

@@ -52,11 +52,6 @@ class Frame:
     contact: Contact
     row: Array  # (r,) SED of the receptors along the skin [MPa]; nan where there is none
 
-    @property
-    def sed(self) -> Array:
-        """SED at the nodes (n,) [MPa]."""
-        return self.values["sed"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkinLine:

@@ -10,6 +10,7 @@ from sessions.report.contents import Field
 from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step
 from solver.prediction import ROW, Skin
+from solver.quantities import SED
 from solver.response.fields import Fields, Sketch, Still, fields_of, most_squeezed, stills, way_until
 
 MOST = 150  # states of a way that did not settle, which may be long
@@ -55,7 +56,7 @@ def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
         index=index,
         nodes=_pairs(frame.nodes),
         triangles=tuple((int(a), int(b), int(c)) for a, b, c in film.parts.triangles),
-        sed=tuple(frame.sed.tolist()),
+        sed=tuple(frame.values[SED.name].tolist()),
         outlines={name: _pairs(line) for name, line in frame.outlines.items()},
         patch=_pairs(frame.patch),
         contact=_pairs(np.column_stack([contact.x, contact.gap])),

@@ -21,8 +21,7 @@ URGENT = (m.Stop, m.Move, m.Undo)  # asks for which the model's answers are left
 def run(connection: Connection, folder: str) -> None:
     """Analyse and predict the session in `folder`, and do what is asked for until the window is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # What is half written is taken back before the end.
-    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGTERM, _leave)  # what is half written is taken back before the end
     with suppress(EOFError, OSError):
         _Server(connection).serve(Path(folder))
 
@@ -42,6 +41,7 @@ class _Server:
     def serve(self, folder: Path) -> None:
         """Work until the window is gone: then EOFError or OSError is raised."""
         from daq_app.analyst.work import Work, sentence_of
+        from solver import Cancelled
 
         try:
             work = Work(folder, self._say, self._urgent)
@@ -64,7 +64,7 @@ class _Server:
                 else:
                     self._halted = self._halted and not isinstance(request, m.GoOn | m.Move | m.Undo)
                     work.do(request)
-            except _cancelled():
+            except Cancelled:
                 pass  # what it was left for is the next that is asked
             except Exception as error:  # noqa: BLE001  likewise
                 self._halted = self._halted or request is None
@@ -85,12 +85,6 @@ class _Server:
             self._requests.clear()
             self._requests.append(stops[0])
         return any(isinstance(request, URGENT) for request in self._requests)
-
-
-def _cancelled() -> type[Exception]:
-    from solver import Cancelled
-
-    return Cancelled
 
 
 class Analyst:
@@ -114,9 +108,8 @@ class Analyst:
             except (EOFError, OSError):
                 self._gone()
                 if not said or not isinstance(said[-1], m.Problem):
-                    said.append(
-                        m.Problem(tr("The work has stopped without a word; what is asked next begins it anew."))
-                    )
+                    words = tr("The work has stopped without a word; what is asked next begins it anew.")
+                    said.append(m.Problem(words))
         if any(isinstance(one, m.Cancelled) for one in said):
             self._stopped = None
         if self._stopped is not None and time.monotonic() - self._stopped > PATIENCE:

@@ -132,7 +132,6 @@ class Work:
         self._say(m.Done(words))
 
     def _first(self) -> int | None:
-        """Return the position among predicted rows of the trial that is chosen."""
         strokes = self._report.strokes
         if not self._chosen < len(strokes):
             return None
@@ -161,7 +160,7 @@ class Work:
         self._say(m.Drawn(name, "" if panel is None else panel.title, png))
 
     def _panel(self, name: str, note: str = "") -> "tuple[Panel | None, bytes]":
-        """Return a picture, its `note` under it, and its PNG; `shown.session_pictures` tells those of the session."""
+        """Return a picture, its `note` under it, and its PNG; `session_pictures` names those of the session."""
         from sessions.report.figures import picture  # slow to load, and many never look at one
         from sessions.report.figures.finger import common_levels, finger_panels
         from sessions.report.figures.style import in_pixels, look

@@ -180,7 +180,6 @@ class AnalystWindow(QMainWindow):
         self.keys.toggle()
 
     def _go_to(self, column: int) -> None:
-        """Go to one of the columns, on its page where they are pages."""
         self._pages.setCurrentIndex(column)
         (self.trials.list, self.stroke.stroke.handles["onset"], self.model.tabs)[column].setFocus()
 
@@ -210,7 +209,6 @@ class AnalystWindow(QMainWindow):
             self.ask(m.Compare(name))
 
     def _follow(self, place: str) -> None:
-        """Go to where an element of the way leads."""
         at = {"session": 2, "prediction": 2, "trial": 0}.get(place, 1)
         self._pages.setCurrentIndex(at)
         match place:

@@ -31,15 +31,9 @@ REACH = 12.0  # above and below the line that counts as touching it [mm]
 MARK = 10.0  # height of the mark [mm]
 
 KEYS = {
-    Qt.Key.Key_Left: -STEP,
-    Qt.Key.Key_Down: -STEP,
-    Qt.Key.Key_Right: STEP,
-    Qt.Key.Key_Up: STEP,
-    Qt.Key.Key_PageDown: -LEAP,
-    Qt.Key.Key_PageUp: LEAP,
-    Qt.Key.Key_Home: -100.0,
-    Qt.Key.Key_End: 100.0,
-}
+    Qt.Key.Key_Left: -STEP, Qt.Key.Key_Down: -STEP, Qt.Key.Key_Right: STEP, Qt.Key.Key_Up: STEP,
+    Qt.Key.Key_PageDown: -LEAP, Qt.Key.Key_PageUp: LEAP, Qt.Key.Key_Home: -100.0, Qt.Key.Key_End: 100.0,
+}  # fmt: skip
 POINTS = ".,\u066b\uff0e\uff0c"  # Latin, Arabic and full-width ones, before a number's fraction
 NUMBER = QRegularExpression(
     rf"\d{{0,9}}[{POINTS}]?\d{{0,9}}", QRegularExpression.PatternOption.UseUnicodePropertiesOption
@@ -228,8 +222,6 @@ def _device(event: QMouseEvent) -> Device:
 
 
 class _Field(QWidget):
-    """Takes an answer that is no place on a line."""
-
     changed = Signal()
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -304,13 +296,10 @@ class ChoiceOfTwo(_Field):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
-        mirrored = self.layoutDirection() == Qt.LayoutDirection.RightToLeft
-        keys: dict[int, Which] = {
-            Qt.Key.Key_1: "first",
-            Qt.Key.Key_Right if mirrored else Qt.Key.Key_Left: "first",
-            Qt.Key.Key_2: "second",
-            Qt.Key.Key_Left if mirrored else Qt.Key.Key_Right: "second",
-        }
+        back, on = Qt.Key.Key_Left, Qt.Key.Key_Right
+        if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
+            back, on = on, back
+        keys: dict[int, Which] = {Qt.Key.Key_1: "first", back: "first", Qt.Key.Key_2: "second", on: "second"}
         if event.key() in keys:
             self._take(self.answer.chosen(self.now(), keys[event.key()], "keyboard"))
         else:

@@ -104,7 +104,6 @@ class BenchPanel(Panel):
         self.window().setFocus()
 
     def _chosen(self) -> str:
-        """Return the address chosen or typed."""
         text = self._choice.currentText().strip()
         at = self._choice.findText(text)
         return text if at < 0 else str(self._choice.itemData(at))

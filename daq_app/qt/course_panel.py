@@ -145,6 +145,5 @@ class CoursePanel(Panel):
 
 
 def _shown(view: CourseView, name: str) -> Button:
-    """Return what a view says of a button."""
     button: Button = getattr(view, name.replace(" ", "_"))
     return button

@@ -31,11 +31,9 @@ NEAREST, FARTHEST = 0.2, 500.0  # least and greatest width that is shown [mm]
 MAPS = {False: ("magma", 1.0, 0.2), True: ("CET-D1A", 0.0, 1.0)}
 LINE_KEYS = Qt.KeyboardModifier.ShiftModifier | Qt.KeyboardModifier.ControlModifier
 ARROWS = {
-    Qt.Key.Key_Left: (-STEP, 0.0),
-    Qt.Key.Key_Right: (STEP, 0.0),
-    Qt.Key.Key_Up: (0.0, STEP),
+    Qt.Key.Key_Left: (-STEP, 0.0), Qt.Key.Key_Right: (STEP, 0.0), Qt.Key.Key_Up: (0.0, STEP),
     Qt.Key.Key_Down: (0.0, -STEP),
-}
+}  # fmt: skip
 
 
 class Sight(QObject):
@@ -212,7 +210,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.sight.set_line((moved, line[1]) if begins else (line[0], moved))
 
     def _probe(self) -> None:
-        """Say which place is under the pointer."""
         at = self._pointer
         inside = at is not None and self.frame is not None and self._here().contains(at)
         self.sight.pointed.emit(self.view().place(at.x(), at.y()) if inside and at is not None else None)
@@ -242,7 +239,6 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         self.viewport().update()
 
     def _here(self) -> QRectF:
-        """Return where the view box is on the canvas."""
         return QRectF(self._box.mapRectToScene(self._box.rect()))
 
     def _above(self) -> float:
@@ -316,6 +312,5 @@ class _FingerItem(pg.GraphicsObject):
 
 
 def _shades(name: str, first: float, last: float) -> list[QColor]:
-    """Return the colours of a part of a named map."""
     table = pg.colormap.get(name).map(np.linspace(first, last, SHADES), mode="byte")
     return [QColor(int(r), int(g), int(b)) for r, g, b, *_ in table]

@@ -334,7 +334,6 @@ class LivePanel(Panel):
         self.finger.setVisible(model)
 
     def _placed(self) -> tuple[QWidget, QWidget]:
-        """Return the stroke's plots, and what the drawer holds: finger, sample and the six axes."""
         stroke, drawer = QWidget(), QWidget()
         column = (*self.plots[:3], self._model_plot)
         self._column = vbox(*zip(column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)

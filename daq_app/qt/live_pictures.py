@@ -80,7 +80,6 @@ class ContactMap(PaintedWidget):
             painter.drawEllipse(QPointF(x[-1], y[-1]), 6, 6)
 
     def _per_mm(self) -> float:
-        """Return how many pixels a millimetre has."""
         return min((self.height() - 2 * MARGIN) / ALONG, (self.width() - self._words_width() - 2 * MARGIN) / ACROSS)
 
     def _words_width(self) -> float:
@@ -220,7 +219,6 @@ class FingerView(QWidget):
         painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, words)
 
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
-        """Paint the faces, those of one shade at once."""
         part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)
         shade = (part * (SHADES - 1)).astype(np.int64)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)

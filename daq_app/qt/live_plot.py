@@ -102,7 +102,6 @@ class LivePlot(PaintedWidget):
             draw_line(painter, x, np.clip(y, -FAR, FAR))
 
     def _inside(self) -> QRectF:
-        """Return where the curves are."""
         left = round(AXIS_WIDTH * self._type_scale)
         below = round((SMALL + 5) * self._type_scale) if self._times_shown else 3
         return QRectF(left, 2, max(self.width() - left - 4, 8), max(self.height() - below - 2, 8))

@@ -129,7 +129,6 @@ class MainWindow(QMainWindow):
                 self.side.come_back()
 
     def _table(self) -> dict[str, Callable[[], object]]:
-        """Return what is done for each act that is not the course panel's own."""
         return {
             "primary": self._primary,
             "undo": self._undo,

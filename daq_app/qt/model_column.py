@@ -197,19 +197,16 @@ class ModelColumn(QWidget):
         self.save.set_name(f"{kind}{self._name}{step}" if self._name else "")
 
     def _draw_line(self) -> None:
-        """Let the mouse draw a line, and plot along it."""
         self.finger.sight.draws_line = self.plot.draw.isChecked()
         if self.finger.sight.draws_line:
             self.plot.source.setCurrentIndex(LINE)
 
     def _cut(self) -> None:
-        """Plot along the line that was just drawn."""
         if self.finger.sight.line is not None:
             self.plot.source.setCurrentIndex(LINE)
         self._paint()
 
     def _probe(self, place: tuple[float, float] | None) -> None:
-        """Say what both fingers have at a place [mm]."""
         canvases = [self.finger, *([self.other] if self.other.isVisible() else [])]
         said = [] if place is None else [canvas.words_at(place) for canvas in canvases]
         self.probe.show_text("  |  ".join(filter(None, said)))

@@ -188,7 +188,6 @@ class FieldPlot(QWidget):
         self._unit = "kPa" if source == RECEPTORS else field.unit.removesuffix("-")
 
     def _read(self, at: float) -> str:
-        """Return what each curve says at a place [mm]."""
         names = NAMES if len(self.values) > 1 else ("",)
         curves = zip(names, self.values, strict=True)
         said = (read_out("mm", place, at, [(name, self._unit, values)]) for name, (place, values) in curves)

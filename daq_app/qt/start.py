@@ -140,7 +140,6 @@ def opened(
 
 
 def _tablet(address: str | None) -> "TabletScreen":
-    """Return the subject's page on a tablet. Raises NoTabletServer."""
     from daq_app.qt.subject_side import TabletScreen
     from daq_app.tablet.server import PORT
 
@@ -182,7 +181,6 @@ def _speak(application: "QApplication") -> None:
 
 
 def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
-    """Give every window the colours and type of a theme."""
     from PySide6.QtGui import QIcon
 
     from daq_app.qt.tokens import palette, style_sheet

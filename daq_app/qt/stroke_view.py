@@ -170,7 +170,6 @@ class StrokeView(QWidget):
             self._plots[1].setYRange(0.0, max(float(known.max()), 0.01) if len(known) else 1.0, padding=0.04)
 
     def _read(self, time: float) -> str:
-        """Return what was felt at a time since contact [s]."""
         names = (("N", "N"), ("T", "N"), ("µ", ""))
         curves = [(name, unit, column) for (name, unit), column in zip(names, self._columns, strict=True)]
         return read_out("s", self._time, time, curves)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt, QTimer
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QDialog, QListWidget, QSizePolicy, QWidget
 
 from daq_app.qt.parts import Openness, Wrapped, button, hbox, label, vbox
@@ -60,11 +60,6 @@ class SubjectPicture(QWidget):
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange and (view := self._view) is not None:
             QTimer.singleShot(0, self, lambda: self._draw(view))
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Draw the picture anew at another size."""
-        super().resizeEvent(event)
-        self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
         """Paint the picture in the middle, with a line around it."""

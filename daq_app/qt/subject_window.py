@@ -86,7 +86,6 @@ class SubjectWindow(QWidget):
 
     @property
     def _way(self) -> ScoreLine | NumberField | ChoiceOfTwo:
-        """Return what the answer is given with."""
         return self.number if self.asks == "number" else self.choice if self.asks == "choice" else self.line
 
     def show_view(self, view: SubjectView, hand: Hand | None) -> None:
@@ -133,7 +132,6 @@ class SubjectWindow(QWidget):
         self._fit_type()
 
     def _speak(self, language: str) -> None:
-        """Turn the page's own words and its direction to another language."""
         self._language = language
         words = translator(language)
         self.setLayoutDirection(direction(language))
@@ -146,7 +144,6 @@ class SubjectWindow(QWidget):
         self.choice.set_words(words(Text.FIRST), words(Text.SECOND))
 
     def _begin(self, view: SubjectView) -> None:
-        """Begin an answer."""
         way = self._way
         if isinstance(way, ScoreLine):
             way.begin(view.ends, view.ticks)

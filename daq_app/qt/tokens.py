@@ -128,7 +128,6 @@ def _tall(size: int, scale: float, least: int) -> str:
 
 
 def _panels(t: Tokens, scale: float) -> str:
-    """Return what grounds, frames and labels look like."""
     return f"""
 * {{ font-size: {_px(TEXT, scale)}; color: {t.text}; }}
 QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
@@ -183,7 +182,6 @@ QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {_px(SMALL, scale)}; 
 
 
 def _fields(t: Tokens) -> str:
-    """Return what menus, fields, lists and bars look like."""
     return f"""
 QMenuBar, QMenu {{ background: {t.surface}; }}
 QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}

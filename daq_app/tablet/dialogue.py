@@ -20,11 +20,8 @@ PixelsPerMm = Annotated[float, Meta(ge=1.0, le=40.0)]
 # ---- from the tablet
 Answered = Scored | MagnitudeEstimate | PairedChoice
 ANSWERS: Mapping[Kind, tuple[type, ...]] = {
-    "read": (),
-    "line": (Scored,),
-    "number": (MagnitudeEstimate,),
-    "choice": (PairedChoice,),
-}
+    "read": (), "line": (Scored,), "number": (MagnitudeEstimate,), "choice": (PairedChoice,),
+}  # fmt: skip
 WORDS = (  # of the page itself
     Text.NEXT, Text.FIRST, Text.SECOND, Text.THANKS, Text.OFFLINE, Text.LINE, Text.UNANSWERED, Text.ANSWERED,
     Text.OWN_NUMBER, Text.OF_TWO, Text.PRESSING,

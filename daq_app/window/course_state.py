@@ -150,7 +150,6 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
 
 
 def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | m.ResumeSession) -> SessionState:
-    """Return the session after something that ends it, or takes it up again."""
     match message:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)
@@ -213,7 +212,6 @@ def _shown(session: SessionState, message: Message) -> SessionState:
 
 
 def _noticed(session: SessionState, message: Message) -> SessionState:
-    """Return the session after a command that asks for nothing."""
     match message:
         case steps.ShowInstruction(block):
             return replace(session, block=block)
@@ -228,7 +226,6 @@ def _noticed(session: SessionState, message: Message) -> SessionState:
 
 
 def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
-    """Return the session after something that is written down."""
     number, data = event.trial, event.data
     match event.kind:
         case "contact_onset":
@@ -254,7 +251,6 @@ def _logged(session: SessionState, event: LoggedEvent) -> SessionState:
 
 
 def _of_trial(session: SessionState, number: int | None, kind: str, data: Mapping[str, Any]) -> SessionState:
-    """Return the session after something that became of a trial."""
     match kind:
         case "scored":
             return session.with_trial(number, answer=_answer(tr_noop("score {answer:.0f}"), data["score"]))

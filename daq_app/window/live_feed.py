@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from daq_app.recorder.messages import Live, Report, Six
+from daq_app.recorder.messages import Live, Report
 from daq_app.window.live_trace import CHANNELS, LiveTrace, broken
 from daq_app.wording import tr_noop
 from drivers.calibration import ALARM, ALARM_COMBINED, WARNING, loads
@@ -72,17 +72,13 @@ def load_of(wrench: Array, rated: Array) -> Load:
 
 def together(reports: Iterable[Report]) -> Iterator[Report]:
     """Return reports in order, readings that follow each other as one: a window that is late catches up at once."""
-    for key, group in groupby(reports, key=_run):
+    # What readings must share to be taken as one; None for what are no readings.
+    for key, group in groupby(reports, key=lambda one: (one.stream, one.zero) if isinstance(one, Live) else None):
         if key is None:
             yield from group
             continue
         lives = [report for report in group if isinstance(report, Live)]
         yield lives[0] if len(lives) == 1 else _joined(lives)
-
-
-def _run(report: Report) -> tuple[int, Six] | None:
-    """Return what readings must share to be taken as one; None for what are no readings."""
-    return (report.stream, report.zero) if isinstance(report, Live) else None
 
 
 def _joined(lives: list[Live]) -> Live:
@@ -123,9 +119,13 @@ class LiveFeed:
             self._tail = _Tail.empty()
             self._sequence = None
             self.trace.clear()
-        time, drawn = broken(live.time, self._channels(live, frame), _missing(live.sequence, self._sequence))
+        before = live.sequence[0] - 1 if self._sequence is None else self._sequence
+        gaps = np.flatnonzero(np.diff(live.sequence, prepend=before) > 1)  # before these, others are missing
+        time, drawn = broken(live.time, self._channels(live, frame), gaps)
         self._sequence = int(live.sequence[-1])
-        self._keep(live)
+        self._take.append(live)
+        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > KEPT:
+            self._take.popleft()
         self.trace.add(time, drawn)
         sensed = live.wrench + info.calibration.wrench(np.array([live.zero]), np.zeros(6))
         return load_of(info.calibration.own(sensed), info.calibration.rated)
@@ -138,11 +138,6 @@ class LiveFeed:
         return ReadingBlock(
             whole.sequence, whole.sequence, whole.status, whole.time, whole.received_ns, raw=whole.wrench
         )
-
-    def _keep(self, live: Live) -> None:
-        self._take.append(live)
-        while len(self._take) > 1 and live.time[-1] - self._take[0].time[-1] > KEPT:
-            self._take.popleft()
 
     def _channels(self, live: Live, frame: Frame) -> Array:
         """Return what is drawn (channels, n); nan where a value means nothing."""
@@ -159,11 +154,6 @@ class LiveFeed:
         drawn[6], drawn[7], drawn[8], drawn[9] = normal, tangential, ratio, speed
         drawn[10:] = position.T
         return np.where(live.status == 0, drawn, np.nan)
-
-
-def _missing(sequence: NDArray[np.int64], before: int | None) -> NDArray[np.int64]:
-    """Return the places of readings before which others are missing."""
-    return np.flatnonzero(np.diff(sequence, prepend=sequence[0] - 1 if before is None else before) > 1)
 
 
 class _Tail:

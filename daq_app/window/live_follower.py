@@ -59,8 +59,6 @@ def settled_scene(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """A state that was shown while something touched."""
-
     time: float  # [s, device time]
     row: Array
     picture: Picture
@@ -70,8 +68,6 @@ class _Seen:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Model:
-    """A stepper, and the picture of its finger."""
-
     stepper: Stepper
     picture: LivePicture
 
@@ -135,10 +131,6 @@ class Follower:
             self._kinematics, instead, forces.received_ns, forces.stream,
         )  # fmt: skip
 
-    def settle(self, request: Settle) -> Settled:
-        """Return the full solve of a stroke, beside the mean of what was said of it."""
-        return self.settling(request)()
-
     def settling(self, request: Settle) -> Callable[[], Settled]:
         """Return what solves a stroke in full; it may run while more is taken, and knows what was said until now."""
         first, last = request.steady
@@ -165,12 +157,10 @@ class Follower:
         """Return the SED of a model under forces [N/mm]; nan without one."""
         if model is None:
             return float("nan")
-        model.stepper.mu, model.stepper.tau = self._mu, self._bound()
+        # The traction bound so far [MPa] is, as the analysis has it, the largest T over the contact area.
+        bound = self._tangential / self._area if self._tangential > 0.0 else np.inf
+        model.stepper.mu, model.stepper.tau = self._mu, bound
         return model.stepper.step(normal, pull)
-
-    def _bound(self) -> float:
-        """Return the traction bound so far [MPa]: as the analysis has it, the largest T over the contact area."""
-        return self._tangential / self._area if self._tangential > 0.0 else np.inf
 
     def _untouched(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0

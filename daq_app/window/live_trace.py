@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 CHANNELS = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz", "N", "T", "mu", "speed", "x", "y")
 LONGEST = 60.0  # kept for drawing [s]
 GAP = 5.0  # a step in time longer than so many usual ones is a gap, where no reading was counted as lost [-]
-STEPS = (1.0, 2.0, 5.0)
+STEPS = (1.0, 2.0, 5.0, 10.0)
 MARGIN = 0.05  # data may go beyond the scale by this share of it: so much is drawn [-]
 SHRINK = 0.25  # a scale of which no more than this share is used ...
 PATIENCE = 20.0  # ... for so long is taken back [s]
@@ -236,11 +236,5 @@ def _step(value: float) -> float:
     """
     if value <= 0.0:
         return 0.0
-    power = 10.0
-    while power > value:
-        power /= 10.0
-    while True:
-        for step in STEPS:
-            if step * power >= value * (1 - 1e-9):
-                return float(f"{step * power:.6g}")
-        power *= 10.0
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(f"{next(step * power for step in STEPS if step * power >= value * (1 - 1e-9)):.6g}")

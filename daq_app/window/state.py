@@ -136,7 +136,6 @@ def _tared(bench: BenchState, message: m.Tare | m.Tared | LoggedEvent) -> BenchS
 
 
 def _not_done(bench: BenchState, failed: m.Failed) -> BenchState:
-    """Return the bench after a request that could not be met."""
     if failed.request == "Connect":
         return BenchState(devices=bench.devices, problem=failed.sentence)
     return replace(bench, taring=False) if failed.request == "Tare" else bench

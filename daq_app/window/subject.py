@@ -1,6 +1,6 @@
 """The subject: texts and pages, all pages before there is a session, an answer as it is given, and whose a key is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import StrEnum
@@ -19,14 +19,15 @@ from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 Translate = Callable[[str], str]  # an English text -> that in the subject's language
 Kind = Literal["read", "line", "number", "choice"]
 EXAMPLES = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
+ALWAYS: Mapping[type, steps.Event] = {  # what brings a session on from a state, whatever the trial
+    states.Idle: steps.Begin(), states.Taring: steps.Zeroed(), states.Stroking: steps.FingerLifted(),
+    states.Settling: steps.FingerLifted(), states.Resting: steps.RestOver(),
+}  # fmt: skip
 OF_A_BLOCK = {"ready": tr_noop("stroke"), "scoring": tr_noop("answer")}  # phases whose page is the block's own
 NAMES = {
-    "mounting": tr_noop("the surface is changed"),
-    "settling": tr_noop("the finger is still on"),
-    "resting": tr_noop("rest"),
-    "paused": tr_noop("pause"),
-    "closing": tr_noop("end"),
-}
+    "mounting": tr_noop("the surface is changed"), "settling": tr_noop("the finger is still on"),
+    "resting": tr_noop("rest"), "paused": tr_noop("pause"), "closing": tr_noop("end"),
+}  # fmt: skip
 Device = Literal["mouse", "touch", "pen", "keyboard"]
 Which = Literal["first", "second"]
 
@@ -41,11 +42,8 @@ PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "En
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number
 CHOOSES = frozenset({"1", "2", "Left", "Right"})  # one of two
 ANSWER_KEYS: dict[Kind, frozenset[str]] = {
-    "read": frozenset(),
-    "line": PLACES | GIVES,
-    "number": TYPES | GIVES,
-    "choice": CHOOSES | GIVES,
-}
+    "read": frozenset(), "line": PLACES | GIVES, "number": TYPES | GIVES, "choice": CHOOSES | GIVES,
+}  # fmt: skip
 
 
 class SubjectText(StrEnum):
@@ -264,26 +262,17 @@ def _name(session: SessionState) -> str:
 
 
 def _next_event(state: states.State) -> steps.Event:
-    """Return what brings a session on from a state."""
     match state:
-        case states.Idle():
-            return steps.Begin()
         case states.Mounting(place):
             return steps.StimulusMounted(place.trial.stimulus.code)
-        case states.Taring():
-            return steps.Zeroed()
         case states.Ready(place):
             return steps.ContactOnset() if place.plan.forces else steps.StrokeDone()
-        case states.Stroking():
-            return steps.FingerLifted()
         case states.Scoring(place):
             return EXAMPLES.get(place.trial.answer, steps.Scored(50.0))
-        case states.Settling(touching=touching):
-            return steps.FingerLifted() if touching else steps.Settled()
-        case states.Resting():
-            return steps.RestOver()
+        case states.Settling(touching=False):
+            return steps.Settled()
         case _:
-            return steps.Finish()
+            return ALWAYS.get(type(state), steps.Finish())
 
 
 @dataclass(frozen=True, slots=True)

@@ -169,7 +169,6 @@ def _to_do(session: SessionState, bench: BenchState) -> tuple[str, Button | None
 
 
 def _to_do_in(trial: Trial, session: SessionState) -> tuple[str, Button | None]:
-    """Return what is to be done within a trial."""
     code = trial.stimulus.code
     match session.phase:
         case "mounting":

@@ -105,7 +105,6 @@ def _kind(session: SessionState, trial: TrialState) -> TileKind:
 
 
 def _why_none(session: SessionState, trial: TrialState) -> str:
-    """Return why nothing is known of the stroke of a trial."""
     if not session.plan.forces:
         return tr("No forces are recorded in this session.")
     if trial.outcome == "coming":
