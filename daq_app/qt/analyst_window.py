@@ -8,7 +8,6 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import (
     QFileDialog,
-    QHBoxLayout,
     QLabel,
     QListWidget,
     QMainWindow,
@@ -24,7 +23,7 @@ from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
-from daq_app.qt.parts import Panel, Wrapped, bare, button, choice, hbox, label, scrolled, vbox
+from daq_app.qt.parts import Panel, Wrapped, button, choice, hbox, label, scrolled, vbox
 from daq_app.qt.plots import ZoomedPlot, pg
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.stroke_column import StrokeColumn
@@ -83,7 +82,7 @@ class AnalystWindow(QMainWindow):
         self.setAccessibleName(tr("analyst's window"))
         self.state = AnalystState(folder)
         self._work = work or Analyst(folder)
-        self.keys: KeysPage | None = None  # made when somebody asks for it
+        self.keys = KeysPage(self, type_scale(), ANALYST_KEYS)
         self._head = label("", "simulated")
         self.way = LineageLabel(tokens)
         self.way.followed.connect(self._follow)
@@ -114,7 +113,7 @@ class AnalystWindow(QMainWindow):
         self._pages = QTabWidget()
         self._pages.setAccessibleName(tr("trials, stroke or model"))
         self._panes = QWidget()
-        self._row = bare(QHBoxLayout(self._panes), GRID)
+        self._row = hbox(on=self._panes, spacing=GRID)
         self._narrow: bool | None = None
         self.setCentralWidget(self._placed())
         self._place_columns()
@@ -150,8 +149,8 @@ class AnalystWindow(QMainWindow):
         control = event.modifiers() & Qt.KeyboardModifier.ControlModifier
         match event.key():
             case Qt.Key.Key_F1:
-                self._show_keys()
-            case Qt.Key.Key_Escape if self.keys is not None and self.keys.isVisible():
+                self.keys.toggle()
+            case Qt.Key.Key_Escape if self.keys.isVisible():
                 self.keys.hide()
             case Qt.Key.Key_Escape if self.stop.isEnabled():
                 self.ask(m.Stop())
@@ -166,18 +165,13 @@ class AnalystWindow(QMainWindow):
         """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
         self._place_columns()
-        if self.keys is not None:
-            self.keys.fit()
+        self.keys.fit()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """End the work with the window."""
         self._timer.stop()
         self._work.close()
         super().closeEvent(event)
-
-    def _show_keys(self) -> None:
-        self.keys = self.keys or KeysPage(self, type_scale(), ANALYST_KEYS)
-        self.keys.toggle()
 
     def _go_to(self, column: int) -> None:
         self._pages.setCurrentIndex(column)

@@ -5,9 +5,9 @@ from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QStackedWidget, QWidget
+from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
-from daq_app.qt.parts import EntryLine, Panel, bare, button, hbox, label, say, vbox
+from daq_app.qt.parts import EntryLine, Panel, bare, button, hbox, label, say, stacked, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.messages import Message
@@ -41,9 +41,7 @@ class CoursePanel(Panel):
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
-        self._bottom = QStackedWidget()
-        self._bottom.addWidget(self._actions(3 if scale <= 1.0 else 2))
-        self._bottom.addWidget(self._entry_row(scale))
+        self._bottom = stacked(self._actions(3 if scale <= 1.0 else 2), self._entry_row(scale))
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
@@ -61,9 +59,8 @@ class CoursePanel(Panel):
     def show_view(self, view: CourseView) -> None:
         """Show the course."""
         before, self._view = self._view, view
-        say(
-            self._timer, tr("waiting {timer}", timer=view.timer) if view.timer else "", tr("Time since this was asked:")
-        )
+        waiting = tr("waiting {timer}", timer=view.timer) if view.timer else ""
+        say(self._timer, waiting, tr("Time since this was asked:"))
         if before is None or before.rows != view.rows:
             self._show_rows(view.rows)
         for name, widget in self.buttons.items():
@@ -74,11 +71,7 @@ class CoursePanel(Panel):
 
     def ask(self, what: str) -> None:
         """Ask for the reason of a redo or skip, or for a note; a redo whose reason is known is sent at once."""
-        view = self._view
-        if view is None:
-            return
-        shown = _shown(view, what)
-        if not shown.enabled:
+        if self._view is None or not (shown := _shown(self._view, what)).enabled:
             return
         if shown.sends is not None:
             self._send(shown.sends)

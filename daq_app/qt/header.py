@@ -67,14 +67,12 @@ class Notice(Panel):
     def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
         """Show nothing; `send` takes what the banner's button asks for."""
         super().__init__("", "banner")
-        self._send = send
+        self._send, self._scale, self._folds = send, scale, False
         self._banner: Banner | None = None
         self._warning: str | None = None
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
-        self._scale = scale
-        self._folds = False
         self.show_folding(False)
         hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
@@ -171,13 +169,9 @@ class Arrow(QWidget):
         """Show +1 away from the subject (up), -1 towards the subject (down), 0 nothing."""
         if direction != self._direction:
             self._direction = direction
-            words = {
-                1: tr("stroke away from the subject"),
-                -1: tr("stroke towards the subject"),
-                0: tr("no stroke asked for"),
-            }
-            self.setAccessibleName(words[direction])
-            self.setToolTip(words[direction])
+            way = tr("stroke away from the subject") if direction > 0 else tr("stroke towards the subject")
+            self.setAccessibleName(way if direction else tr("no stroke asked for"))
+            self.setToolTip(self.accessibleName())
             self.update()
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name

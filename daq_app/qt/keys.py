@@ -102,25 +102,29 @@ class KeysPage(Panel):
 
     def __init__(self, parent: QWidget, scale: float, keys: tuple[Key, ...] = KEYS) -> None:
         super().__init__(tr("keys of this window"))
-        self._scale, self._over = scale, parent
+        self._scale, self._over, self._keys = scale, parent, keys
         self.setParent(parent)
+        self.hide()
+
+    def _fill(self) -> None:
         head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
         rows = QWidget()
         grid = QGridLayout(rows)
         grid.setContentsMargins(0, 0, GRID, 0)
         grid.setHorizontalSpacing(3 * GRID)
         grid.setVerticalSpacing(4)
-        for row, known in enumerate(keys):
+        for row, known in enumerate(self._keys):
             grid.addWidget(label(tr(known.key), "value"), row, 0, Qt.AlignmentFlag.AlignTop)
             grid.addWidget(label(tr(known.words), "value", wrap=True), row, 1)
         grid.setColumnStretch(1, 1)
         area = scrolled(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         vbox(head, (area, 1), on=self, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)), spacing=GRID)
-        self.hide()
 
     def toggle(self) -> None:
-        """Show the page over everything else, or hide it."""
+        """Show the page over everything else, or hide it; it is filled when it is first seen."""
+        if self.layout() is None:  # pyright: ignore[reportUnnecessaryComparison]  Qt returns None where there is none
+            self._fill()
         self.fit()
         self.setVisible(not self.isVisible())
         self.raise_()

@@ -49,11 +49,8 @@ AXES = (
         PlotScale(-50.0, 50.0, 100.0),
     ),
 )
-SED = (
-    tr_noop("SED [kPa], model"),
-    (Curve("SED", MODEL), Curve("SED instead", MODEL, dashed=True, named=False)),
-    PlotScale(0.0, 5.0, 5.0),
-)
+INSTEAD = Curve("SED instead", MODEL, dashed=True, named=False)
+SED = (tr_noop("SED [kPa], model"), (Curve("SED", MODEL), INSTEAD), PlotScale(0.0, 5.0, 5.0))
 FINITE = "live model/finite strain"  # under which the choice is remembered
 
 
@@ -73,15 +70,11 @@ class LiveBar(QWidget):
         self.values: dict[str, QLabel] = {}
         self._pairs: list[tuple[QLabel, QLabel]] = []
         self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
-        self.finite = button(
-            tr("Finite  M"), tr("live model at finite strain"), lambda: finite(self.finite.isChecked()), checkable=True
-        )
-        self.finite.setToolTip(
-            tr("Live model at small strain, or at finite strain where the forces are within its reach")
-        )
-        self.length = choice(tr("stretch of time that is shown"))
-        for seconds in LENGTHS:
-            self.length.addItem(f"{seconds} s", seconds)
+        name, words = tr("live model at finite strain"), tr("Finite  M")
+        self.finite = button(words, name, lambda: finite(self.finite.isChecked()), checkable=True)
+        words = tr("Live model at small strain, or at finite strain where the forces are within its reach")
+        self.finite.setToolTip(words)
+        self.length = choice(tr("stretch of time that is shown"), (f"{seconds} s" for seconds in LENGTHS))
         self.length.activated.connect(lambda: length(LENGTHS[self.length.currentIndex()]))
         self.length.setFixedWidth(round(84 * scale))
         acts = hbox(1, self.finite, self.length, self.hold, spacing=GRID)
@@ -228,9 +221,8 @@ class LivePanel(Panel):
     def _show_tab(self) -> None:
         opened = bool(self.drawer.open)
         self.tab.setText("▸\nD" if opened else "◂\nD")
-        self.tab.setAccessibleName(
-            tr("{word} the drawer: six axes, sample and finger", word=tr("close") if opened else tr("open"))
-        )
+        word = tr("close") if opened else tr("open")
+        self.tab.setAccessibleName(tr("{word} the drawer: six axes, sample and finger", word=word))
         self.tab.setToolTip(self.tab.accessibleName())
 
     def show_forces(self, shown: bool) -> None:
@@ -336,7 +328,7 @@ class LivePanel(Panel):
     def _placed(self) -> tuple[QWidget, QWidget]:
         stroke, drawer = QWidget(), QWidget()
         column = (*self.plots[:3], self._model_plot)
-        self._column = vbox(*zip(column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
+        vbox(*zip(column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
         axes = ((plot, 2) for plot in self.plots[3:])
         vbox((self.finger, 7), (self.map, 3), *axes, on=drawer, spacing=4)
         self.plots[3].show_axis(times=False)

@@ -3,11 +3,12 @@
 import secrets
 from collections.abc import Callable
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QGuiApplication, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractButton, QGridLayout, QHBoxLayout, QMainWindow, QStackedWidget, QWidget
+from PySide6.QtWidgets import QAbstractButton, QHBoxLayout, QMainWindow, QWidget
 
 from daq_app.qt.bench_panel import BenchPanel, BenchStrip
 from daq_app.qt.bridge import Bridge
@@ -16,9 +17,9 @@ from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import bare, fill, scrolled, vbox
+from daq_app.qt.parts import bare, fill, hbox, scrolled, stacked, vbox
 from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, restore_place, save_place
-from daq_app.qt.rooms import Menus, Rail, Room, Rooms
+from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
 from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_picture import open_preview
 from daq_app.qt.subject_side import SubjectSide, TabletScreen
@@ -75,12 +76,10 @@ class MainWindow(QMainWindow):
         self.side.line_changed.connect(self._line_changed)
         self.keyboard = self.side.keyboard
         self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act))
+        self.keys = KeysPage(self, scale)
         self._acts = self._table()
-        self._left = QStackedWidget()
-        self._left.addWidget(self.page)
-        self._left.addWidget(self.course)
+        self._left = stacked(self.page, self.course)
         self.setCentralWidget(self._placed())
-        self.keys: KeysPage | None = None  # made when somebody asks for it
         self.page.changed.connect(self._form_changed)
         bridge.changed.connect(self.show_view)
         bridge.frame.connect(self._draw)
@@ -152,11 +151,9 @@ class MainWindow(QMainWindow):
             "open": self.rooms.choose,
             "report": lambda: (at := self.rooms.analyst) and at.write_report(),
             "export": lambda: (at := self.rooms.analyst) and at.write_export(),
-            "keys": self._show_keys,
+            "keys": self.keys.toggle,
             "leave": self._leave,
-            "go to prepare": lambda: self.go_to("prepare"),
-            "go to run": lambda: self.go_to("run"),
-            "go to review": lambda: self.go_to("review"),
+            **{f"go to {room}": partial(self.go_to, room) for room in ROOMS},
             THEME: self.theme_chosen.emit,
             SCALE: lambda: self.notice.warn(tr("The size of type that was chosen holds from the next start on.")),
             LANGUAGE: lambda: self.notice.warn(tr("The language that was chosen holds from the next start on.")),
@@ -170,8 +167,7 @@ class MainWindow(QMainWindow):
             (self.page.subject if self.rooms.room == "prepare" else self).setFocus()
 
     def _leave(self) -> None:
-        if self.keys is not None:
-            self.keys.hide()
+        self.keys.hide()
         if self.course.asking:
             self.course.leave()
         else:
@@ -189,13 +185,11 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
         """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
-        running = self.bridge.recording
         now = self.bridge.state.now
-        if running and now - self._close_asked > LEAVING:
+        if self.bridge.recording and now - self._close_asked > LEAVING:
             self._close_asked = now
-            self.notice.warn(
-                tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
-            )
+            words = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
+            self.notice.warn(words)
             event.ignore()
             return
         save_place(self)
@@ -220,8 +214,7 @@ class MainWindow(QMainWindow):
 
     def _start_session(self) -> None:
         bench = bench_of(self.bridge.state.bench)
-        cards = self.page.check(bench, anew=True)
-        missing = first_missing(cards)
+        missing = first_missing(self.page.check(bench, anew=True))
         if missing is None:
             self._begin(self.page.form(), bench)
         elif missing.field == "forces" and self.bridge.view.bench.lamp == "off":
@@ -238,8 +231,7 @@ class MainWindow(QMainWindow):
             self.notice.warn(tr("A protocol is piloted in Prepare, while no session is in hand."))
 
     def _preview(self) -> None:
-        refused = open_preview(self.page.form(), self.subject.size(), self._scale, self)
-        if refused:
+        if refused := open_preview(self.page.form(), self.subject.size(), self._scale, self):
             self.notice.warn(refused)
 
     def _begin(self, form: SessionForm, bench: Bench) -> None:
@@ -295,10 +287,6 @@ class MainWindow(QMainWindow):
         except Exception as error:  # noqa: BLE001  an error while drawing never stops a recording
             self.bridge.drawing_failed(error)
 
-    def _show_keys(self) -> None:
-        self.keys = self.keys or KeysPage(self, self._scale)
-        self.keys.toggle()
-
     def _fold_bench(self) -> None:
         self._bench_shown = not self.bench.isVisible()
         self._fit()
@@ -318,8 +306,7 @@ class MainWindow(QMainWindow):
         self.live.set_room(width >= ROOMY + (CARDS if cards else 0) and not (shown and not wide))
         self.to_do.show_small(height < TALL or width < ROOMY)
         self.notice.show_folding(height < LOW)
-        if self.keys is not None:
-            self.keys.fit()
+        self.keys.fit()
 
     def _placed(self) -> QWidget:
         window = QWidget()
@@ -335,14 +322,8 @@ class MainWindow(QMainWindow):
         below.setMinimumHeight(1)  # what to do now is whole, however low the window is
         vbox(self.notice, self.to_do, (below, 1), on=here, spacing=GRID)
         self.rooms.addWidget(here)
-        frame = QGridLayout(window)
-        frame.setContentsMargins(GRID, GRID // 2, GRID, GRID)
-        frame.setSpacing(GRID)
-        frame.addWidget(self.rail, 0, 0, 2, 1)
-        frame.addWidget(self.header, 0, 1)
-        frame.addWidget(self.rooms, 1, 1)
-        frame.setRowStretch(1, 1)
-        frame.setColumnStretch(1, 1)
+        room = vbox(self.header, (self.rooms, 1), spacing=GRID)
+        hbox(self.rail, (room, 1), on=window, margins=(GRID, GRID // 2, GRID, GRID), spacing=GRID)
         return window
 
 

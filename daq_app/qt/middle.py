@@ -5,22 +5,23 @@ from collections.abc import Callable
 
 import numpy as np
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton, QScrollArea, QStackedWidget, QWidget
+from PySide6.QtWidgets import QPushButton, QScrollArea, QWidget
 
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, spoken
 from daq_app.qt.live_plot import LivePlot
-from daq_app.qt.parts import Panel, Wrapped, button, hbox, label, named, regrade, say, scrolled, vbox
+from daq_app.qt.parts import Panel, Wrapped, button, hbox, label, named, regrade, say, scrolled, stacked, vbox
 from daq_app.qt.tokens import GRID, SMALL, TARGET
 from daq_app.window.course_state import Mark
 from daq_app.window.live_trace import Columns
 from daq_app.window.stroke_quality import PICTURE
-from daq_app.window.view_course import CourseView
+from daq_app.window.view_course import CourseView, StrokeView
 from daq_app.window.view_trials import KINDS, Inspection, Tile, inspection
 from daq_app.wording import tr
 
-TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}  # of the style sheet
-GRADES = {"refused": "wrong", "doubtful": "look"}  # of the style sheet
+# Grades of the style sheet: of tiles, and of strokes.
+TILE_GRADES = {"flawed": "wrong", "current": "current", "coming": "coming"}
+GRADES = {"refused": "wrong", "doubtful": "look"}
 AFTER_ONSET = ("stroking", "scoring", "settling")  # phases of a trial whose stroke has begun
 
 
@@ -121,14 +122,13 @@ class InspectedTrial(QWidget):
     def _show_picture(self, shown: Inspection) -> None:
         picture = shown.picture
         assert picture is not None
-        time = picture.time
-        end = float(time[-1]) if len(time) else 0.0
-        span = end - float(time[0]) if len(time) else 0.0
-        marks = [Mark("onset", picture.onset, picture.onset)] if picture.onset is not None else []
-        marks += [Mark("lift", picture.lift, picture.lift)] if picture.lift is not None else []
+        time, onset, lift = picture.time, picture.onset, picture.lift
+        begin, end = (float(time[0]), float(time[-1])) if len(time) else (0.0, 0.0)
+        marks = [Mark("onset", onset, onset)] if onset is not None else []
+        marks += [Mark("lift", lift, lift)] if lift is not None else []
         marks += [Mark("steady", *shown.steady)] if shown.steady is not None else []
         for plot in self._plots:
-            plot.show_axis(max(math.ceil(2.0 * span) / 2.0, 0.5))  # whole halves of a second
+            plot.show_axis(max(math.ceil(2.0 * (end - begin)) / 2.0, 0.5))  # whole halves of a second
             plot.show_columns(Columns(time, np.asarray(picture.values)), end, marks, 0.0)
 
 
@@ -148,27 +148,27 @@ class Middle(QWidget):
         self.redo = button(tr("Redo  R"), tr("redo the last stroke"), lambda: act("redo"))
         self.undo = button("", tr("undo the last redo"), lambda: act("undo"))
         self.undo.hide()
-        self._pages = QStackedWidget()
         frame = Panel(tr("inspected trial"))
         vbox(scrolled(self.trial), on=frame, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)))
-        for page in (self.live, frame):
-            self._pages.addWidget(page)
+        self._pages = stacked(self.live, frame)
         vbox(self.strip, (self._pages, 1), hbox((self.stroke, 1), self.undo, self.redo), on=self, spacing=GRID)
 
     def show_view(self, course: CourseView | None) -> None:
         """Show the session in hand, or that there is none."""
         self.strip.setVisible(course is not None)
         self.live.show_forces(course is None or not course.no_forces)
+        stroke = StrokeView("none", tr("No stroke yet.")) if course is None else course.stroke
+        words = stroke.words if course is None else course.no_forces or stroke.words
+        self.stroke.show_text(words)
+        self.stroke.setAccessibleName(f"{tr('The last stroke:')} {words}")
+        self.stroke.setToolTip(stroke.details)
+        regrade(self.stroke, GRADES.get(stroke.grade, ""))
         if course is None:
-            self._show_stroke(tr("No stroke yet."), "", "")
             self.redo.setEnabled(False)
             self.undo.hide()
             self.leave()
             return
         self.live.map.show_direction(course.direction)
-        self._show_stroke(
-            course.no_forces or course.stroke.words, course.stroke.details, GRADES.get(course.stroke.grade, "")
-        )
         self.redo.setEnabled(course.redo.enabled)
         self.redo.setText(f"{course.redo.label}  {tr(course.redo.key)}")
         self.undo.setText(f"{course.undo.label}  {tr(course.undo.key)}")
@@ -215,9 +215,3 @@ class Middle(QWidget):
             self.trial.show_trial(shown)
         self._pages.setCurrentIndex(0 if shown is None else 1)
         self.strip.show_inspected(None if shown is None else shown.number)
-
-    def _show_stroke(self, words: str, details: str, grade: str) -> None:
-        self.stroke.show_text(words)
-        self.stroke.setAccessibleName(f"{tr('The last stroke:')} {words}")
-        self.stroke.setToolTip(details)
-        regrade(self.stroke, grade)

@@ -20,11 +20,8 @@ from sessions.plan.protocols import protocol_names
 from sessions.plan.protocols.languages import ENGLISH
 
 TWO = 565  # at which the cards stand in two columns, before the font's scale [px]
-HANDS: tuple[tuple[str, Hand | None], ...] = (
-    (tr_noop("not stated"), None),
-    (tr_noop("right"), "right"),
-    (tr_noop("left"), "left"),
-)
+HANDS: tuple[Hand | None, ...] = (None, "right", "left")
+HAND_NAMES = tr_noop(("not stated", "right", "left"))
 
 
 class NewSessionPage(Panel):
@@ -43,9 +40,8 @@ class NewSessionPage(Panel):
         self._checked: object = None  # what the cards were derived from
         self.frames = {name: CardFrame(name) for name in FIELDS}
         self.subject = entry(tr("subject code, never a name"))
-        self._proposal = button(
-            "", tr("take the proposed code"), lambda: self.subject.setText(self._proposal.text()), "small"
-        )
+        words = tr("take the proposed code")
+        self._proposal = button("", words, lambda: self.subject.setText(self._proposal.text()), "small")
         self.protocol = choice(tr("protocol"), (*protocol_names(), tr("choose a file …")))
         self.protocol.setCurrentText(SessionForm().protocol)
         self.protocol.activated.connect(self._choose_protocol)
@@ -56,13 +52,12 @@ class NewSessionPage(Panel):
         self.folder = entry(tr("folder in which sessions are kept"))
         self.folder.setText("recordings")
         self.seed = entry(tr("seed of the stimulus order; empty for a new one"), tr("a new one"))
-        self.height_above = entry(
-            tr("height of the face above the transducer's origin in millimetres; may be empty"), tr("as stated")
-        )
+        words = tr("height of the face above the transducer's origin in millimetres; may be empty")
+        self.height_above = entry(words, tr("as stated"))
         self.normal = choice(tr("axis of the transducer along which pressing is positive"), (tr("as stated"), *AXES))
         words = tr("contact area of finger and surface in square millimetres; may be empty")
         self.area = entry(words, tr("as stated"))
-        hands = [tr(words) for words, _ in HANDS]
+        hands = [tr(words) for words in HAND_NAMES]
         self.stroking, self.answering = choice(tr("stroking hand"), hands), choice(tr("answering hand"), hands)
         self.pre_evaluation = tick(tr("Pre-evaluation first"), tr("every stimulus judged once before all else"))
         self.practice = tick(tr("Practice first"), tr("practice before the trials that count"))
@@ -119,8 +114,8 @@ class NewSessionPage(Panel):
             study=self.study.text(),
             folder=self.folder.text(),
             seed=self.seed.text(),
-            stroking_hand=HANDS[self.stroking.currentIndex()][1],
-            answering_hand=HANDS[self.answering.currentIndex()][1],
+            stroking_hand=HANDS[self.stroking.currentIndex()],
+            answering_hand=HANDS[self.answering.currentIndex()],
             pre_evaluation=self.pre_evaluation.isVisibleTo(self) and self.pre_evaluation.isChecked(),
             practice=self.practice.isVisibleTo(self) and self.practice.isChecked(),
             language=self.screen_fields.language.currentData() or "",
@@ -168,11 +163,10 @@ class NewSessionPage(Panel):
 
     def check(self, bench: Bench, *, anew: bool = False) -> tuple[Card, ...]:
         """Show what each card lacks, and return the cards; nothing is read from the disk while nothing has changed."""
-        form = self.form()
-        screen = self.screen_fields.words
-        if anew or (form, bench, screen) != self._checked:
-            self._checked = (form, bench, screen)
-            self._cards = checklist(form, bench, screen)
+        checked = self.form(), bench, self.screen_fields.words
+        if anew or checked != self._checked:
+            self._checked = checked
+            self._cards = checklist(*checked)
             for card in self._cards:
                 self.frames[card.name].show_card(card)
         return self._cards

@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
     QScrollArea,
     QSizePolicy,
     QSplitter,
+    QStackedWidget,
     QTextEdit,
     QVBoxLayout,
     QWidget,
@@ -158,8 +159,7 @@ class EntryLine(QLineEdit):
     def __init__(self, keep: Callable[[], None], left: Callable[[], None]) -> None:
         """Call `keep` at Enter and `left` at Esc."""
         super().__init__()
-        self._keep = keep
-        self._left = left
+        self._keep, self._left = keep, left
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Take the two keys; type the others."""
@@ -216,6 +216,14 @@ def _set_out(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Ma
     if on is not None:
         on.setLayout(layout)
     return fill(layout, *parts)
+
+
+def stacked(*pages: QWidget) -> QStackedWidget:
+    """Return pages of which one is shown, the first to begin with."""
+    stack = QStackedWidget()
+    for page in pages:
+        stack.addWidget(page)
+    return stack
 
 
 def named(values: Iterable[tuple[str, QWidget]], across: int = 1) -> QGridLayout:

@@ -8,10 +8,10 @@ import pyqtgraph  # pyright: ignore[reportMissingTypeStubs]
 from numpy.typing import NDArray
 from PySide6.QtCore import QEvent, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QKeyEvent, QMouseEvent
-from PySide6.QtWidgets import QDoubleSpinBox, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QDoubleSpinBox, QWidget
 
 from daq_app.analyst.frame import FIELD_CHOICES, FieldChoice, Finger, Line, Range, along_line, along_skin, read_out
-from daq_app.qt.parts import bare, button, choice, fill, hbox, label, vbox
+from daq_app.qt.parts import button, choice, hbox, label, vbox
 from daq_app.qt.preferences import type_scale
 from daq_app.qt.tokens import GRID, MODEL, SMALL, TARGET, Tokens, font
 from daq_app.wording import tr, tr_noop
@@ -106,12 +106,10 @@ class ZoomedPlot(pg.PlotWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
         """Say what stands at the pointer, as far as the plot knows it."""
         pg.PlotWidget.mouseMoveEvent(self, event)
-        item: Any = self.getPlotItem()
-        box = item.getViewBox()
-        scene = self.mapToScene(event.position().toPoint())
-        inside = box.sceneBoundingRect().contains(scene)
+        box: Any = self.getPlotItem().getViewBox()
+        scene, room = self.mapToScene(event.position().toPoint()), box.sceneBoundingRect()
         x = float(box.mapSceneToView(scene).x())
-        words = self.read(x) if self.read is not None and inside else ""
+        words = self.read(x) if self.read is not None and room.contains(scene) else ""
         if not words:
             self._hide_words()
             return
@@ -119,7 +117,6 @@ class ZoomedPlot(pg.PlotWidget):
         self._pointer.show()
         self.words.setText(words)
         self.words.adjustSize()
-        room = box.sceneBoundingRect()
         left = room.left() if scene.x() > room.center().x() else room.right() - self.words.width()
         self.words.move(round(left), round(room.top()))
         self.words.show()
@@ -154,11 +151,10 @@ class FieldPlot(QWidget):
         self.plot.setMinimumHeight(self.plot.minimumHeight() + 2 * GRID)  # two lines of words under it
         self.values, self._unit = [NOTHING], ""
         self._named = False  # two curves are
+        pens = (pg.mkPen(MODEL, width=2, style=style) for style in (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine))
         self._curves = [
-            pg.PlotDataItem(
-                pen=pg.mkPen(MODEL, width=2, style=style), connect="finite", symbolSize=4, symbolPen=None, name=name
-            )
-            for name, style in zip(NAMES, (Qt.PenStyle.SolidLine, Qt.PenStyle.DashLine), strict=True)
+            pg.PlotDataItem(pen=pen, connect="finite", symbolSize=4, symbolPen=None, name=name)
+            for name, pen in zip(NAMES, pens, strict=True)
         ]
         self._here = pg.InfiniteLine(pos=0.0, angle=90, pen=pg.mkPen(tokens.quiet, width=1))
         for curve in self._curves:
@@ -216,12 +212,10 @@ class FieldBar(QWidget):
         self.which = choice(tr("field that is drawn"), (tr(field.label) for field in FIELD_CHOICES))
         self.ranges = choice(tr("range of the colours"), (tr("All trials"), tr("Own scale"), tr("Fixed")))
         self.low, self.high = _number(tr("colours begin at")), _number(tr("colours end at"))
-        layout = bare(QHBoxLayout(self), GRID // 2)
-        fill(layout, (self.which, 3), (self.ranges, 2))
+        hbox((self.which, 3), (self.ranges, 2), self.low, self.high, on=self, spacing=GRID // 2)
         for number in (self.low, self.high):
             number.setVisible(False)
             number.valueChanged.connect(lambda: self.changed.emit())
-            layout.addWidget(number)
         self.which.currentIndexChanged.connect(self._free)
         self.ranges.currentIndexChanged.connect(self._fix)
 

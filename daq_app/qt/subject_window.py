@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QLabel, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
-from daq_app.qt.parts import button, fill, hbox, label, say, vbox
+from daq_app.qt.parts import button, fill, hbox, label, say, stacked, vbox
 from daq_app.qt.preferences import direction
-from daq_app.qt.screens import Millimetres, RulerCheck, millimetres
+from daq_app.qt.screens import RulerCheck, millimetres
 from daq_app.qt.tokens import GRID, font
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
@@ -50,18 +50,13 @@ class SubjectWindow(QWidget):
         self._scale = _Scale(self.line)
         self.number = NumberField(scale, now)
         self.choice = ChoiceOfTwo(scale, now)
-        self._ways = QStackedWidget()
-        for way in (self._scale, self.number, self.choice):
-            self._ways.addWidget(way)
+        self._ways = stacked(self._scale, self.number, self.choice)
         self.next = button(Text.NEXT, Text.NEXT, self._give, "primary")
         self.next.setMinimumSize(round(180 * scale), round(64 * scale))
         self.ruler = RulerCheck(scale)
         self.ruler.setLayoutDirection(Qt.LayoutDirection.LeftToRight)  # its words are the experimenter's
         self.ruler.done.connect(self._ruler_done)
-        self._pages = QStackedWidget()
-        self._pages.addWidget(self._message_page())
-        self._pages.addWidget(self._scale_page())
-        self._pages.addWidget(self.ruler)
+        self._pages = stacked(self._message_page(), self._scale_page(), self.ruler)
         vbox(self._pages, on=self)
         for way in (self.line, self.number, self.choice):
             way.changed.connect(self._answer_changed)
@@ -148,10 +143,9 @@ class SubjectWindow(QWidget):
         if isinstance(way, ScoreLine):
             way.begin(view.ends, view.ticks)
             self._scale.show_ends(view.ends)
-            self._ways.setCurrentWidget(self._scale)
         else:
             way.begin()
-            self._ways.setCurrentWidget(way)
+        self._ways.setCurrentWidget(self._scale if way is self.line else way)
 
     def check_ruler(self) -> None:
         """Show the page on which the line is held against a ruler."""
@@ -160,12 +154,10 @@ class SubjectWindow(QWidget):
         self.raise_()
         self.activateWindow()
 
-    def fit_screen(self) -> Millimetres:
+    def fit_screen(self) -> None:
         """Make the line as long as it should be on the screen the window is on."""
-        known = millimetres(self.screen())
-        self.line.set_pixels_per_mm(known.pixels)
+        self.line.set_pixels_per_mm(millimetres(self.screen()).pixels)
         self._scale.fit()
-        return known
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
         """Let Enter be Next, and every other key of the line go to the line."""

@@ -139,17 +139,15 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):
             return _judged(session, trial, take, quality)
-        case m.SessionEnded() | m.Gone() | m.Failed() | m.ResumeSession():
-            return _ended(session, message)
         case m.Sealing():
             return replace(session, sealing="running")
         case m.Sealed():
             return replace(session, sealing="sealed")
         case _:
-            return _shown(session, message)
+            return _shown(_ended(session, message), message)
 
 
-def _ended(session: SessionState, message: m.SessionEnded | m.Gone | m.Failed | m.ResumeSession) -> SessionState:
+def _ended(session: SessionState, message: Message) -> SessionState:
     match message:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)

@@ -68,13 +68,50 @@ class BenchState:
 
 def bench_after(bench: BenchState, message: Message) -> BenchState:
     """Return the bench after a message; the same object where it does not concern the bench."""
+    return _loaded(_tared(_linked(bench, message), message), message)
+
+
+def _linked(bench: BenchState, message: Message) -> BenchState:
     match message:
-        case m.Connect() | m.Device() | m.NoDevice() | m.LinkDown() | m.LinkBack() | m.Failed():
-            return _linked(bench, message)
-        case m.SessionEnded() | m.Gone():
-            return _left(bench, message)
-        case m.Tare() | m.Tared() | LoggedEvent(kind="zeroed"):
-            return _tared(bench, message)
+        case m.Connect(uri):
+            return BenchState(link="connecting", uri=uri, devices=bench.devices)
+        case m.Device(info, frame):
+            return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
+        case m.NoDevice():
+            return BenchState(devices=bench.devices, problem=bench.problem)
+        case m.Failed("Connect", sentence):
+            return BenchState(devices=bench.devices, problem=sentence)
+        case m.LinkDown(sentence):
+            return replace(bench, link="lost", problem=sentence)
+        case m.LinkBack(same=True):
+            return replace(bench, link="open", problem=None)
+        case m.LinkBack(info):
+            words = tr("another transducer answers now, with serial number {serial}", serial=info.serial)
+            return replace(bench, link="lost", problem=words)
+        case m.SessionEnded(end=end) if end.cause == "device":
+            return replace(bench, link="lost", problem=end.reason)
+        case m.Gone(requested=False):
+            return BenchState(devices=bench.devices)  # the recorder's process held the transducer
+        case _:
+            return bench
+
+
+def _tared(bench: BenchState, message: Message) -> BenchState:
+    match message:
+        case m.Tare():
+            return replace(bench, taring=True)
+        case m.Failed("Tare"):
+            return replace(bench, taring=False)
+        case m.Tared(mean, spread, _, readings, duration):
+            return _zeroed(replace(bench, taring=False), mean, spread, readings, duration)
+        case LoggedEvent(kind="zeroed", data=data):
+            return _zeroed(bench, data["mean"], data["spread"], data["readings"], data["duration"])
+        case _:
+            return bench
+
+
+def _loaded(bench: BenchState, message: Message) -> BenchState:
+    match message:
         case m.HealthReport():
             # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
             peak = Load(tuple(message.peak), message.combined_peak)
@@ -91,54 +128,6 @@ def bench_after(bench: BenchState, message: Message) -> BenchState:
             return replace(bench, searching=False, searched=True, devices=devices)
         case _:
             return bench
-
-
-def _linked(
-    bench: BenchState, message: m.Connect | m.Device | m.NoDevice | m.LinkDown | m.LinkBack | m.Failed
-) -> BenchState:
-    match message:
-        case m.Connect(uri):
-            return BenchState(link="connecting", uri=uri, devices=bench.devices)
-        case m.Device(info, frame):
-            return replace(bench, link="open", info=info, frame=frame, uri=info.uri, problem=None, life=None)
-        case m.NoDevice():
-            return BenchState(devices=bench.devices, problem=bench.problem)
-        case m.LinkDown(sentence):
-            return replace(bench, link="lost", problem=sentence)
-        case m.LinkBack(info, same):
-            problem = (
-                None if same else tr("another transducer answers now, with serial number {serial}", serial=info.serial)
-            )
-            return replace(bench, link="open" if same else "lost", problem=problem)
-        case m.Failed():
-            return _not_done(bench, message)
-
-
-def _left(bench: BenchState, message: m.SessionEnded | m.Gone) -> BenchState:
-    """Return the bench after a session or the recorder has let go of it."""
-    match message:
-        case m.SessionEnded(end=end) if end.cause == "device":
-            return replace(bench, link="lost", problem=end.reason)
-        case m.Gone(requested=False):
-            return BenchState(devices=bench.devices)  # the recorder's process held the transducer
-        case _:
-            return bench
-
-
-def _tared(bench: BenchState, message: m.Tare | m.Tared | LoggedEvent) -> BenchState:
-    match message:
-        case m.Tare():
-            return replace(bench, taring=True)
-        case m.Tared(mean, spread, _, readings, duration):
-            return _zeroed(replace(bench, taring=False), mean, spread, readings, duration)
-        case LoggedEvent(data=data):
-            return _zeroed(bench, data["mean"], data["spread"], data["readings"], data["duration"])
-
-
-def _not_done(bench: BenchState, failed: m.Failed) -> BenchState:
-    if failed.request == "Connect":
-        return BenchState(devices=bench.devices, problem=failed.sentence)
-    return replace(bench, taring=False) if failed.request == "Tare" else bench
 
 
 def _zeroed(bench: BenchState, mean: Any, spread: Any, readings: int, duration: float) -> BenchState:  # noqa: ANN401

@@ -14,8 +14,9 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.strokes import AnalysisSettings, FlawName, FrictionParameters
 from sessions.strokes.analysis import analyse_blocks
-from sessions.strokes.stroke import Flaw, Stroke
+from sessions.strokes.stroke import Stroke
 
+KEEP_OFF = tr_noop("Keep the finger off until the stroke.")
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 
 # Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
@@ -27,12 +28,8 @@ FLAWS: Mapping[FlawName, tuple[str, str]] = {
     FlawName.SECOND_STROKE: tr_noop(("second stroke", "Stroke once, then lift.")),
     FlawName.WRONG_DIRECTION: tr_noop(("wrong direction", "Stroke the way the arrow points.")),
     FlawName.TOO_LITTLE_FORCE: tr_noop(("pressed too lightly", "Press harder.")),
-    FlawName.NO_UNLOADED_STRETCH: tr_noop(
-        ("no unloaded stretch before the stroke", "Keep the finger off until the stroke.")
-    ),
-    FlawName.BEGINS_IN_CONTACT: tr_noop(
-        ("the finger touched before the stroke", "Keep the finger off until the stroke.")
-    ),
+    FlawName.NO_UNLOADED_STRETCH: (tr_noop("no unloaded stretch before the stroke"), KEEP_OFF),
+    FlawName.BEGINS_IN_CONTACT: (tr_noop("the finger touched before the stroke"), KEEP_OFF),
     FlawName.ENDS_IN_CONTACT: tr_noop(("the finger had not left", "Lift the finger at the end.")),
     FlawName.NOT_LIFTED: tr_noop(("the finger was not lifted between strokes", "Lift the finger between strokes.")),
     FlawName.DIRECTION_TURNS: tr_noop(("the direction turned", "Stroke straight, one way.")),
@@ -86,12 +83,14 @@ def stroke_quality(
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
     mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]
-    remarks = [(flaw.grade, *_words(flaw)) for flaw in mentioned]
+    remarks: list[tuple[str, str, str, str]] = []  # grade, few words, at length, and what to do
+    for flaw in mentioned:
+        short, advice = FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), ""))
+        remarks.append((flaw.grade, short, flaw.sentence, advice))
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
-        at_length = tr(
-            "The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=100 * (1 - fell)
-        )
+        share = 100 * (1 - fell)
+        at_length = tr("The normal force ended at {share:.0f} % of what it was: the finger was leaving.", share=share)
         refusals = sum(grade == "refused" for grade, *_ in remarks)
         remarks.insert(refusals, ("doubtful", LEAVING, at_length, PRESS_ON))
     words = list(dict.fromkeys(short for _, short, _, _ in remarks))
@@ -103,21 +102,11 @@ def stroke_quality(
         known = tuple(words) or FLAWS[FlawName.NO_STROKE][:1]
         advice = advice or FLAWS[FlawName.NO_STROKE][1]
         return Quality("refused", known, tuple(sentences), None, None, None, None, None, advice=advice, redo=True)
+    mends = bool(advice) and remarks[0][0] != "note"
     return Quality(
-        grade,
-        tuple(words),
-        tuple(sentences),
-        stroke.steady,
-        stroke.mu_dynamic,
-        stroke.mu_dynamic_interval,
-        stroke.speed,
-        fell,
-        analysis.friction[0],
-        stroke.normal_force,
-        advice,
-        _picture(stroke),
-        bool(advice) and remarks[0][0] != "note",
-    )
+        grade, tuple(words), tuple(sentences), stroke.steady, stroke.mu_dynamic, stroke.mu_dynamic_interval,
+        stroke.speed, fell, analysis.friction[0], stroke.normal_force, advice, _picture(stroke), mends,
+    )  # fmt: skip
 
 
 def in_newtons(info: TransducerInfo) -> TransducerInfo:
@@ -135,12 +124,6 @@ def _picture(stroke: Stroke) -> StrokePicture | None:
     values = np.vstack([curve.normal, curve.tangential, curve.ratio, curve.speed])
     means = (stroke.normal_force, stroke.tangential_force, stroke.mu_dynamic, stroke.speed)
     return StrokePicture(curve.time, values, stroke.onset, stroke.lift, means)
-
-
-def _words(flaw: Flaw) -> tuple[str, str, str]:
-    """Return a flaw in few words, at length, and what to do about it."""
-    words, advice = FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), ""))
-    return words, flaw.sentence, advice
 
 
 def _fell(stroke: Stroke) -> float | None:

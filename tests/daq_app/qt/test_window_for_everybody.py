@@ -173,6 +173,12 @@ def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
     assert window.bench.isVisible()
 
 
+def fitted(subject):
+    """Let the line fit its screen, and return what is known of that."""
+    subject.fit_screen()
+    return screens.millimetres(subject.screen())
+
+
 def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
     window, model = driver.window, driver.window.bridge.model
     remembered = preferences.settings
@@ -277,15 +283,15 @@ def test_a_touch_is_recorded_as_a_touch(driver):
 def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     subject = driver.window.subject
     screen = subject.screen()
-    before = subject.fit_screen().pixels
+    before = fitted(subject).pixels
     assert screens.checked(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
-    assert subject.fit_screen().pixels == pytest.approx(before * 100 / 80)
-    assert subject.fit_screen().checked
+    assert fitted(subject).pixels == pytest.approx(before * 100 / 80)
+    assert fitted(subject).checked
     length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
     assert screens.checked(screen, 3.0) is None
     preferences.settings().clear()
-    assert subject.fit_screen().pixels == pytest.approx(before)
+    assert fitted(subject).pixels == pytest.approx(before)
 
 
 def test_next_stands_where_the_answering_hand_is(driver):
