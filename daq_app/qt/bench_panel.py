@@ -49,12 +49,10 @@ class BenchPanel(Panel):
         self.search = button(tr("Search"), tr("search for transducers"), search)
         self.connect_button = button(tr("Connect"), tr("connect the chosen transducer"), self.connect_chosen)
         self.tare = button(tr("Zero T"), tr("measure the zero of the bench"), lambda: send(Tare()))
-        self.acknowledge = button(
-            tr("Acknowledge A"), tr("acknowledge overloads: begin to watch anew"), lambda: send(AcknowledgeOverloads())
-        )
+        name = tr("acknowledge overloads: begin to watch anew")
+        self.acknowledge = button(tr("Acknowledge A"), name, lambda: send(AcknowledgeOverloads()))
         self._search_words = label("", "quiet", wrap=True)
-        self._content = self._built()
-        vbox(self._content, on=self, margins=2)
+        vbox(self._built(), on=self, margins=2)
 
     def show_view(self, view: BenchView) -> None:
         """Show the bench."""

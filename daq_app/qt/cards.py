@@ -47,9 +47,8 @@ class CardFrame(Panel):
         say(self._mark, "✓" if card.ready else "○")
         say(self.words, card.words)
         self.words.setVisible(bool(card.words))
-        self.setAccessibleName(
-            f"{tr(self._name)}: {tr('ready') if card.ready else tr('not ready')}. {card.words}".strip()
-        )
+        state = tr("ready") if card.ready else tr("not ready")
+        self.setAccessibleName(f"{tr(self._name)}: {state}. {card.words}".strip())
         regrade(self.words, "")
 
     def insist(self) -> None:
@@ -96,8 +95,7 @@ class CutShort(Panel):
         self.setVisible(bool(sessions))
 
     def _resumed(self) -> None:
-        folder = self._sessions.currentData()
-        if folder:
+        if folder := self._sessions.currentData():
             self._send(ResumeSession(str(folder)))
 
 
@@ -134,9 +132,8 @@ class ScreenFields(QWidget):
         self._size = QSize(1000, 640)  # of the subject's window
         self.language = choice(tr("language that the subject reads"))
         self.thumbnail = Thumbnail(scale)
-        self._ruler = button(
-            tr("Check with a ruler  Ctrl+M"), tr("check the subject's line with a ruler"), lambda: act("ruler")
-        )
+        name = tr("check the subject's line with a ruler")
+        self._ruler = button(tr("Check with a ruler  Ctrl+M"), name, lambda: act("ruler"))
         self.camera = QLabel()
         self.camera.setAccessibleName(tr("address and code for the tablet's camera"))
         self.camera.hide()

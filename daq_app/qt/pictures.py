@@ -131,17 +131,13 @@ class ComparedView(QWidget):
         for row in rows:
             cells = [f"{row.experiment} {row.index}"]
             for name, pair in zip(NAMES, row.pairs, strict=True):
-                digits = 1 if name == "score" else 3
-                cells += [_number(value, digits) for value in (pair.first, pair.second)]
-                cells.append(_number(pair.difference, digits, sign=True))
+                digits, values = (
+                    1 if name == "score" else 3,
+                    ((pair.first, ""), (pair.second, ""), (pair.difference, "+")),
+                )
+                cells += ["–" if one is None else f"{one:{sign}.{digits}f}".replace("-", "−") for one, sign in values]
             lines.append(tuple(cells))
         self.table.show_lines(tuple(lines))
-
-
-def _number(value: float | None, digits: int, *, sign: bool = False) -> str:
-    if value is None:
-        return "–"
-    return f"{value:+.{digits}f}".replace("-", "−") if sign else f"{value:.{digits}f}"
 
 
 def write_picture(canvas: FingerCanvas, head: str, path: Path) -> None:

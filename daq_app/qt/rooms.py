@@ -1,6 +1,7 @@
 """The ways through the window: its menu, the rail, and the rooms. Menu entries are acts that keys do too."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import (
     QMainWindow,
     QMenu,
     QMessageBox,
+    QPushButton,
     QStackedWidget,
     QToolButton,
     QWidget,
@@ -47,13 +49,10 @@ SESSION = (
     ("pause", tr_noop("Pause or go on")), ("note", tr_noop("Note…")), ("end", tr_noop("End…")),
 )  # fmt: skip
 PANELS = (
-    ("bench", tr_noop("Bench")),
-    ("drawer", tr_noop("Drawer: axes, sample, finger")),
-    ("mirror", tr_noop("The subject's page")),
-    ("inspect", tr_noop("Inspect the last trial")),
-    ("hold", tr_noop("Hold the picture")),
-    ("model", tr_noop("Live model at finite strain")),
-)
+    ("bench", tr_noop("Bench")), ("drawer", tr_noop("Drawer: axes, sample, finger")),
+    ("mirror", tr_noop("The subject's page")), ("inspect", tr_noop("Inspect the last trial")),
+    ("hold", tr_noop("Hold the picture")), ("model", tr_noop("Live model at finite strain")),
+)  # fmt: skip
 LIBRARIES = ("PySide6-Essentials", "numpy", "scipy", "numba")
 LIST_WIDTH = 200  # of the recent sessions, before the font's scale [px]
 
@@ -64,16 +63,10 @@ class Rail(Panel):
     def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
         """Show that nothing is open; `go` is called with the room that is wanted."""
         super().__init__(tr("rooms"), "strip")
-        self.buttons = {
-            room: button(
-                f"{tr(ROOM_NAMES[room])}\n{KEY[room]}",
-                tr(ROOM_NAMES[room]),
-                lambda room=room: go(room),
-                "rail",
-                checkable=True,
-            )
-            for room in ROOMS
-        }
+        self.buttons: dict[Room, QPushButton] = {}
+        for room in ROOMS:
+            name = tr(ROOM_NAMES[room])
+            self.buttons[room] = button(f"{name}\n{KEY[room]}", name, partial(go, room), "rail", checkable=True)
         vbox(*self.buttons.values(), 1, on=self, margins=(GRID // 2, GRID, GRID // 2, GRID))
         self.setFixedWidth(round(WIDTH * min(scale, 1.4)))
 
@@ -117,9 +110,9 @@ class Menus:
             self._add(view, f"go to {room}", tr(ROOM_NAMES[room]))
         view.addSeparator()
         themes = {name: name for name in preferences.THEMES}
-        self.themes = self._choices(view.addMenu(tr("Theme")), preferences.THEME, themes, preferences.theme())
+        self._choices(view.addMenu(tr("Theme")), preferences.THEME, themes, preferences.theme())
         sizes = {f"{100 * scale:.0f} %": scale for scale in preferences.SCALES}
-        self.sizes = self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.type_scale())
+        self._choices(view.addMenu(tr("Font size")), preferences.SCALE, sizes, preferences.type_scale())
         codes = {name_of(code): code for code in languages(EXPERIMENTER)}
         menu, language = view.addMenu(tr("Language")), preferences.language()
         self.languages = self._choices(menu, preferences.LANGUAGE, codes, language)

@@ -101,14 +101,6 @@ class TextTable(CopiedTable):
         """Stand at a cell of a line, which is numbered as before any sorting."""
         self.setCurrentIndex(self._sorted.mapFromSource(self._cells.index(line, column)))
 
-    def texts(self) -> list[tuple[str, ...]]:
-        """Return the lines as they are sorted now."""
-        model = self._sorted
-        return [
-            tuple(str(model.index(row, column).data()) for column in range(model.columnCount()))
-            for row in range(model.rowCount())
-        ]
-
     def _went(self, now: QModelIndex, _before: QModelIndex) -> None:
         if now.isValid():
             self.chosen.emit(self._sorted.mapToSource(now).row())
