@@ -13,11 +13,9 @@ from sessions.report.contents import PredictionFinding, Report
 Number = float | None
 NAMES = tr_noop(("µ", "SED [kPa]", "score"))
 PHASES = {
-    "pressing": tr_noop("pressing down"),
-    "sticking": tr_noop("sticking: dragged, nothing slips yet"),
-    "slipping in part": tr_noop("slipping in part"),
-    "sliding": tr_noop("sliding: every point slips"),
-}
+    "pressing": tr_noop("pressing down"), "sticking": tr_noop("sticking: dragged, nothing slips yet"),
+    "slipping in part": tr_noop("slipping in part"), "sliding": tr_noop("sliding: every point slips"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +45,8 @@ def compared(first: Report, second: Report) -> tuple[ComparedRow, ...]:
     tables = [_numbers(report) for report in (first, second)]
     names = [experiment.name for report in (first, second) for experiment in report.experiments]
     keys = sorted({*tables[0], *tables[1]}, key=lambda key: (names.index(key[0]) if key[0] in names else -1, *key))
-    return tuple(
-        ComparedRow(*key, tuple(Pair(*(table.get(key, {}).get(name) for table in tables)) for name in NAMES))
-        for key in keys
-    )
+    pairs = ((key, [[table.get(key, {}).get(name) for table in tables] for name in NAMES]) for key in keys)
+    return tuple(ComparedRow(*key, tuple(Pair(*values) for values in rows)) for key, rows in pairs)
 
 
 def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:

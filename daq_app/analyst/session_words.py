@@ -17,6 +17,10 @@ RULES = tr_noop(("maximum", "mean over steady window"))  # `sessions` names whic
 FRICTION_HEAD = tr_noop(
     ("trial", "stimulus", "µ steady", "95 %", "µ greatest", "τ max [kPa]", "V [mm/s]", "N [N]", "way", "flaws")
 )
+PICTURES = {  # one of each experiment
+    "relation": tr_noop("SED against score"), "scores": tr_noop("scores"), "friction": tr_noop("friction over time"),
+    "speed": tr_noop("speed over time"), "response": tr_noop("response over time"),
+}  # fmt: skip
 WAYS = {1: tr_noop("distal"), -1: tr_noop("proximal")}
 
 
@@ -181,15 +185,8 @@ def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
     if report is None:
         return ()
     experiments = [experiment.name for experiment in report.experiments] or [""]
-    kinds = {
-        "relation": tr("SED against score"),
-        "scores": tr("scores"),
-        "friction": tr("friction over time"),
-        "speed": tr("speed over time"),
-        "response": tr("response over time"),
-    }
     names = [("course", tr("forces over the whole recording"))]
-    for kind, words in kinds.items():
+    for kind, words in ((kind, tr(words)) for kind, words in PICTURES.items()):
         names += [(f"{kind} {name}".rstrip(), f"{words}, {name}" if name else words) for name in experiments]
     return tuple(names)
 

@@ -166,16 +166,11 @@ def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: st
     return Decision(by, why, what, stroke.trial, stroke.within, old, new)
 
 
-def taken_back(decisions: Decisions, by: str) -> Decision | None:
-    """Return the line that undoes the last decision in force; None where there is none."""
-    last = _last(_standing(decisions))
-    return None if last is None else Decision(by, "undone in the window", undoes=last.number)
-
-
-def brought_back(decisions: Decisions, by: str) -> Decision | None:
-    """Return the line that redoes what was undone last; None where nothing was undone since the last decision."""
-    last = _last(_undone(decisions))
-    return None if last is None else Decision(by, "redone in the window", undoes=last.number)
+def reversal(decisions: Decisions, by: str, *, again: bool) -> Decision | None:
+    """Return the line that undoes the last decision in force, or `again` takes the last undoing back; None: nothing."""
+    lines = _undone(decisions) if again else _standing(decisions)
+    why = "redone in the window" if again else "undone in the window"
+    return Decision(by, why, undoes=lines[-1].number) if lines else None
 
 
 def history(decisions: Decisions) -> History:
@@ -192,10 +187,6 @@ def _undone(decisions: Decisions) -> list[Decision]:
     """Return the lines that undo a decision, and have come since the last one."""
     decided = {line.number for line in decisions.lines if line.undoes is None}
     return [line for line in decisions.standing if line.undoes in decided and line.number > max(decided)]
-
-
-def _last(lines: list[Decision]) -> Decision | None:
-    return lines[-1] if lines else None
 
 
 def decision_meant(decisions: Decisions, line: Decision) -> Decision:

@@ -12,7 +12,7 @@ from daq_app.analyst.finger_words import NAMES, compared, film_words, named_erro
 from daq_app.analyst.frame import FIELD_ERRORS, Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
 from daq_app.analyst.session_words import picture_errors, sed_words
-from daq_app.analyst.stroke import RawFile, brought_back, decision_meant, decision_of, history, taken_back
+from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
 from sessions.exchange import ExportError, ExportSource, export
@@ -84,7 +84,7 @@ class Work:
             case m.ShowHistory(key):
                 self._film(key)
             case m.ShowReadings(stroke):
-                self._read(stroke)
+                self._say(m.Read(stroke, self._raw.around(self._report.strokes[stroke - 1])))
             case m.Compare(folder):
                 self._compare(Path(folder))
             case m.Write():
@@ -122,7 +122,7 @@ class Work:
 
     def _undo(self, by: str, *, again: bool) -> None:
         decisions = read(self._recording.folder)
-        line = brought_back(decisions, by) if again else taken_back(decisions, by)
+        line = reversal(decisions, by, again=again)
         if line is None:
             raise NothingToShow(tr("There is nothing to redo.") if again else tr("There is no decision to undo."))
         record = append(self._recording, line)
@@ -214,16 +214,13 @@ class Work:
         from sessions.report.figures.relation import compared_panel
         from sessions.report.figures.style import look
 
-        other = self._other
-        if other is None:
+        if (other := self._other) is None:
             return None
-        rows = [
-            (f"{row.experiment} {row.index}", [(pair.first, pair.second) for pair in row.pairs])
-            for row in compared(self._report, other)
-        ]
-        names = (self._report.session, other.session)
+        listed = ((f"{row.experiment} {row.index}", row.pairs) for row in compared(self._report, other))
+        rows = [(words, [(pair.first, pair.second) for pair in pairs]) for words, pairs in listed]
+        names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
         with look():
-            return compared_panel(NAMES, names, rows, simulated=self._report.simulated or other.simulated)
+            return compared_panel(NAMES, names, rows, simulated=simulated)
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
@@ -255,10 +252,6 @@ class Work:
             why = tr("{first} Followed from first touch: {why}", first=why, why=stop)
         self._filmed = m.Filmed(key, film, why)
         self._say(self._filmed)
-
-    def _read(self, number: int) -> None:
-        stroke = self._report.strokes[number - 1]
-        self._say(m.Read(number, self._raw.around(stroke)))
 
     def _compare(self, folder: Path) -> None:
         self._say(m.Step(0.0, tr("opening {name}", name=folder.name)))

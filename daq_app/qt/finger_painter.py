@@ -62,20 +62,18 @@ class FingerPainter:
 
     def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
         """Paint everything inside the box."""
-        painter, ink = self.painter, QColor(self.tokens.text)
+        painter, ink, box = self.painter, QColor(self.tokens.text), self.box
         ground = self._placed(np.array([[0.0, 0.0]]))[0].y()
         painter.save()
-        painter.setClipRect(self.box)
-        top = max(ground, self.box.top())
-        painter.fillRect(
-            QRectF(self.box.left(), top, self.box.width(), self.box.bottom() - top), sheer(self.tokens.quiet, 40)
-        )
+        painter.setClipRect(box)
+        below = QRectF(box.left(), max(ground, box.top()), box.width(), box.bottom() - max(ground, box.top()))
+        painter.fillRect(below, sheer(self.tokens.quiet, 40))
         self._paint_tissue(look, shades)
         if look.mesh:
             self._paint_mesh()
         self._paint_outlines()
         painter.setPen(QPen(ink, 1.4))
-        painter.drawLine(QPointF(self.box.left(), ground), QPointF(self.box.right(), ground))
+        painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         self._paint_contact(ground)
         if look.lost is not None:
             paint_lost(painter, self._placed(np.array([look.lost]))[0], self.tokens)

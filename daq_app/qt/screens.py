@@ -33,13 +33,11 @@ class Millimetres:
 
 def millimetres(screen: QScreen) -> Millimetres:
     """Return the size of a millimetre on a screen."""
-    stored = settings().value(_key(screen))
-    said = _said(screen)
     try:
-        factor = float(str(stored))
+        factor = float(str(settings().value(_key(screen))))
     except ValueError:
-        return Millimetres(said, checked=False)
-    return Millimetres(said * factor, checked=True)
+        return Millimetres(_said(screen), checked=False)
+    return Millimetres(_said(screen) * factor, checked=True)
 
 
 def checked(screen: QScreen, measured: float) -> Millimetres | None:
@@ -54,15 +52,13 @@ def checked(screen: QScreen, measured: float) -> Millimetres | None:
 def _said(screen: QScreen) -> float:
     """Return device-independent pixels in a millimetre as the screen tells, or the usual where it cannot be true."""
     dots = screen.physicalDotsPerInch() * screen.devicePixelRatio()
-    if not PLAUSIBLE[0] <= dots <= PLAUSIBLE[1]:
-        return USUAL_DPI / 25.4
-    return screen.physicalDotsPerInch() / 25.4
+    return (screen.physicalDotsPerInch() if PLAUSIBLE[0] <= dots <= PLAUSIBLE[1] else USUAL_DPI) / 25.4
 
 
 def _key(screen: QScreen) -> str:
     """Return the name of a screen: of this very one where it has a serial number, at this scaling."""
     parts = (screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
-    name = "-".join(part for part in parts if part) or "screen"
+    name = "-".join(filter(None, parts)) or "screen"
     safe = "".join(c if c.isalnum() or c == "-" else "_" for c in name)
     return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
 
@@ -85,7 +81,7 @@ class RulerCheck(QWidget):
         super().__init__()
         self._screen: QScreen | None = None
         self._line = _Line()
-        self._sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
+        sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
         self._measured = QLineEdit()
         self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
         self._measured.setFixedWidth(round(100 * scale))
@@ -94,7 +90,7 @@ class RulerCheck(QWidget):
         keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
         leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit)
         row = hbox(self._measured, label("mm"), keep, leave, 1)
-        vbox(self._sentence, 1, self._line, 1, row, self._wrong, on=self, margins=4 * GRID)
+        vbox(sentence, 1, self._line, 1, row, self._wrong, on=self, margins=4 * GRID)
 
     def begin(self, screen: QScreen) -> None:
         """Check this screen."""

@@ -94,8 +94,7 @@ class LiveModel:
 
     def follow(self, plan: SessionPlan | None) -> None:
         """Follow the finger of another plan."""
-        self._plan = plan
-        self.settled = None
+        self._plan, self.settled = plan, None
         if self._process is None and self.problem:
             self.prepare()  # one that has ended gets another chance with the next session
         elif self._process is not None:
@@ -110,9 +109,7 @@ class LiveModel:
 
     def add(self, live: Live, frame: Frame) -> None:
         """Take readings."""
-        if self._connection is None:
-            return
-        forces = forces_of(live, frame)
+        forces = None if self._connection is None else forces_of(live, frame)
         if forces is None:
             return
         if self._waiting and self._waiting[-1].stream != forces.stream:

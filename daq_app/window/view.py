@@ -338,7 +338,7 @@ def _banner(state: AppState) -> Banner | None:
     if state.gone is not None:
         return Banner("wrong", sentence(state.gone))
     if bench.link == "lost":
-        lost = "" if not running else tr(" Readings are being lost; what came before is kept.")
+        lost = tr(" Readings are being lost; what came before is kept.") if running else ""
         problem = (bench.problem or "").removeprefix("the transducer does not answer; ")  # which the banner says itself
         return Banner("wrong", tr("The transducer does not answer: {problem}.{lost}", problem=problem, lost=lost))
     if running and state.heard is not None and state.now - state.heard > SILENT:

@@ -255,14 +255,11 @@ def _row(session: SessionState, trial: TrialState) -> PlanRow:
     if trial.outcome == "coming":
         return PlanRow("coming", " ", name)
     shown = session.plan.shown.experimenter
-    results: list[str] = []
-    if trial.quality is not None and "forces" in shown:
-        results.append(_mu(trial.quality))
-    if trial.answer is not None and "answer" in shown:
-        results.append(trial.answer)
-    if trial.quality is not None and trial.quality.words:
-        results.append("!")
-    return PlanRow("done", "✓", name, "   ".join(results))
+    quality = trial.quality
+    mu = _mu(quality) if quality is not None and "forces" in shown else ""
+    answer = trial.answer if "answer" in shown else ""
+    flawed = "!" if quality is not None and quality.words else ""
+    return PlanRow("done", "✓", name, "   ".join(filter(None, (mu, answer, flawed))))
 
 
 def _mu(quality: Quality) -> str:

@@ -5,6 +5,7 @@ import re
 import shutil
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -19,12 +20,13 @@ from daq_app.analyst.frame import FIELD_ERRORS, Contact, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, row_words, session_pictures
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
-from daq_app.analyst.stroke import APART, EDGES, brought_back, decision_of, edges_of, history, taken_back, within
+from daq_app.analyst.stroke import APART, EDGES, decision_of, edges_of, history, reversal, within
 from daq_app.analyst.work import Work
-from daq_app.qt.transport_bar import Transport
 from sessions.recording.derived import set_gain_error
 from sessions.strokes.decisions import Decision, Decisions, read
 from tests.sessions.report_example import example
+
+undo, redo = partial(reversal, again=False), partial(reversal, again=True)
 
 SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "sealed"
 NOTHING = np.empty(0)
@@ -174,14 +176,14 @@ def test_undo_and_redo_go_back_and_forth_over_every_decision_and_all_of_it_stays
     for new in (1.0, 2.0):
         kept = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 0.5, new))
     seen = [value(kept)]
-    for step in (taken_back, taken_back, brought_back, brought_back, taken_back):
+    for step in (undo, undo, redo, redo, undo):
         kept = kept.with_line(step(kept, "E03"))
         seen.append(value(kept))
     assert seen == [[2.0], [1.0], [], [1.0], [2.0], [1.0]]
     assert len(kept.lines) == 7
-    assert taken_back(Decisions(), "E03") is None
+    assert undo(Decisions(), "E03") is None
     again = kept.with_line(Decision("E02", "dragged", "onset", 1, 1, 1.0, 3.0))
-    assert brought_back(again, "E03") is None
+    assert redo(again, "E03") is None
 
 
 def test_the_history_names_what_undo_and_redo_would_do_next():
@@ -190,7 +192,7 @@ def test_the_history_names_what_undo_and_redo_would_do_next():
         kept = kept.with_line(Decision("E02", "dragged", what, 1, 1, 0.5, 1.0))
     onset, lift = "onset of stroke 1 of trial 1", "lift of stroke 1 of trial 1"
     seen = [history(kept)]
-    for step in (taken_back, taken_back, brought_back):
+    for step in (undo, undo, redo):
         kept = kept.with_line(step(kept, "E03"))
         seen.append(history(kept))
     assert [(one.done, one.undone) for one in seen] == [
@@ -199,29 +201,6 @@ def test_the_history_names_what_undo_and_redo_would_do_next():
         ((), (onset, lift)),
         ((onset,), (lift,)),
     ]
-
-
-# ---- replay
-
-
-@given(steps=st.lists(st.tuples(st.sampled_from(["play", "pause", "seek", "speed"]), st.floats(0.0, 2.0)), max_size=12))
-def test_a_replay_never_leaves_its_recording_and_stands_still_when_paused(steps):
-    now, transport = 0.0, Transport(1.0, 4.0, 1.0)
-    for what, by in steps:
-        before = transport.at(now)
-        match what:
-            case "play":
-                transport = transport.played(now)
-            case "pause":
-                transport = transport.paused(now)
-                assert transport.at(now + by) == pytest.approx(before)
-            case "seek":
-                transport = transport.sought(by * 3.0, now)
-            case "speed":
-                transport = transport.at_speed(0.1 + by, now)
-                assert transport.at(now) == pytest.approx(before)
-        now += by
-        assert 1.0 <= transport.at(now) <= 4.0
 
 
 # ---- two sessions
