@@ -127,7 +127,12 @@ class Bridge(QObject):
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
-            self._tell_load()
+            # The load is told no more often than it can be read; an overload is kept by the recorder: look it up.
+            before, bench = self.state.bench.peak.over, self.state.bench
+            self._fold(Loaded(self._load))
+            self._load = Load()
+            if self.state.bench.peak.over != before and bench.info is not None:
+                self._look_up_life(bench.info.serial)
         for report in together(self._client.poll()):
             try:
                 self._take(report)
@@ -168,14 +173,6 @@ class Bridge(QObject):
                 pass
         self._fold(report)
         self._judge.heard(report, self.feed)
-
-    def _tell_load(self) -> None:
-        """Tell the load, no more often than it can be read; an overload is kept by the recorder: look it up."""
-        before, bench = self.state.bench.peak.over, self.state.bench
-        self._fold(Loaded(self._load))
-        self._load = Load()
-        if self.state.bench.peak.over != before and bench.info is not None:
-            self._look_up_life(bench.info.serial)
 
     def _look_up_life(self, serial: str) -> None:
         """Look up what a serial number has been through, without holding up the window: its file grows for years."""

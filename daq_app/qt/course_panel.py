@@ -41,7 +41,12 @@ class CoursePanel(Panel):
         self.line = EntryLine(self._keep, self.leave)
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
-        self._bottom = stacked(self._actions(3 if scale <= 1.0 else 2), self._entry_row(scale))
+        acts, columns = QWidget(), 3 if scale <= 1.0 else 2
+        grid = bare(QGridLayout(acts), GRID)
+        for at, widget in enumerate(self.buttons.values()):
+            grid.addWidget(widget, at // columns, at % columns)
+        self.plan.setMinimumHeight(3 * TARGET // 2)
+        self._bottom = stacked(acts, self._entry_row(scale))
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
@@ -97,14 +102,6 @@ class CoursePanel(Panel):
             return
         self.leave()
         self._send(MESSAGES[self._asking](text))
-
-    def _actions(self, columns: int) -> QWidget:
-        page = QWidget()
-        grid = bare(QGridLayout(page), GRID)
-        for at, widget in enumerate(self.buttons.values()):
-            grid.addWidget(widget, at // columns, at % columns)
-        self.plan.setMinimumHeight(3 * TARGET // 2)
-        return page
 
     def _entry_row(self, scale: float) -> QWidget:
         page, keep = QWidget(), button(tr("Keep  Enter"), tr("keep what was typed"), self._keep)

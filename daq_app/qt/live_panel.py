@@ -63,7 +63,6 @@ class LiveBar(QWidget):
         """Show no numbers; `length` takes what is chosen [s], `hold` is called at a press, `finite` takes a choice."""
         super().__init__()
         self._forces_shown = True
-        self._on_hold = False
         self._short = False  # the buttons show their keys alone
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self._scale = scale
@@ -89,16 +88,6 @@ class LiveBar(QWidget):
         self._forces_shown = shown
         self._fit()
 
-    def fit_into(self, height: int) -> None:
-        """Fold the buttons away where the panel is so low; their keys still serve."""
-        for widget in (self.finite, self.length, self.hold):
-            widget.setVisible(height >= LEAST_FOR_ACTS * self._scale)
-
-    def show_held(self, on_hold: bool) -> None:
-        """Say whether the picture is held."""
-        self._on_hold = on_hold
-        self._show_words()
-
     def show_numbers(self, values: NDArray[np.float64]) -> None:
         """Show the means of the last readings (channels, n)."""
         for channel, unit, digits, _ in READ:
@@ -121,7 +110,7 @@ class LiveBar(QWidget):
         if not self._short:
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
-        self._show_words()
+        self.show_words()
         side_by_side = self._forces_shown and self._needed(TITLE) + self._acts <= self.width()
         size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
         direction = QBoxLayout.Direction.LeftToRight if side_by_side else QBoxLayout.Direction.TopToBottom
@@ -134,9 +123,10 @@ class LiveBar(QWidget):
             for widget in (caption, value):
                 widget.setVisible(self._forces_shown and room >= 0)
 
-    def _show_words(self) -> None:
+    def show_words(self) -> None:
+        """Say on the buttons what they do, or their keys alone where there is no room."""
         self.finite.setText("M" if self._short else tr("Finite  M"))
-        words = tr("Held  H") if self._on_hold else tr("Hold  H")
+        words = tr("Held  H") if self.hold.isChecked() else tr("Hold  H")
         self.hold.setText("H" if self._short else words)
 
     def _needed(self, size: int) -> int:
@@ -190,6 +180,7 @@ class LivePanel(Panel):
         self._read_at = 0.0
         self._drawn: object = None  # what the picture was drawn of
         self._forces_shown = True
+        self._least_for_acts = LEAST_FOR_ACTS * scale
         self.plots = [LivePlot(*plot, scale) for plot in (*PLOTS, *AXES)]
         self._model_plot = LivePlot(*SED, scale, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
@@ -315,7 +306,8 @@ class LivePanel(Panel):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
         """Take the room there is; what there is none for is folded."""
         super().resizeEvent(event)
-        self.bar.fit_into(self.height())
+        for act in (self.bar.finite, self.bar.length, self.bar.hold):  # their keys still serve
+            act.setVisible(self.height() >= self._least_for_acts)
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
         column = (*self.plots[:3], self._model_plot)
         for plot, shown in zip(column, (True, True, speed, model), strict=True):
@@ -336,7 +328,7 @@ class LivePanel(Panel):
 
     def _hold(self) -> None:
         self._hold_time = self._feed.trace.newest if self.bar.hold.isChecked() else None
-        self.bar.show_held(self.bar.hold.isChecked())
+        self.bar.show_words()
 
     def _finite(self, chosen: bool) -> None:
         settings().setValue(FINITE, "yes" if chosen else "no")

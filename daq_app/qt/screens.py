@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QScreen
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QLineEdit, QWidget
 
-from daq_app.qt.answer_fields import LENGTH
+from daq_app.qt.answer_fields import LENGTH, ScoreLine
 from daq_app.qt.parts import button, hbox, label, say, vbox
 from daq_app.qt.preferences import settings
-from daq_app.qt.tokens import GRID, theme_of
+from daq_app.qt.tokens import GRID
 from daq_app.wording import tr
 from sessions.recording import Setting
 
@@ -80,7 +80,9 @@ class RulerCheck(QWidget):
     def __init__(self, scale: float) -> None:
         super().__init__()
         self._screen: QScreen | None = None
-        self._line = _Line()
+        self._line = ScoreLine(lambda: 0.0)  # the very line on which is answered
+        self._line.setEnabled(False)
+        self._line.setAccessibleName(tr("line of 100 millimetres to be measured"))
         sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
         self._measured = QLineEdit()
         self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
@@ -90,12 +92,12 @@ class RulerCheck(QWidget):
         keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
         leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit)
         row = hbox(self._measured, label("mm"), keep, leave, 1)
-        vbox(sentence, 1, self._line, 1, row, self._wrong, on=self, margins=4 * GRID)
+        vbox(sentence, 1, hbox(1, self._line, 1), 1, row, self._wrong, on=self, margins=4 * GRID)
 
     def begin(self, screen: QScreen) -> None:
         """Check this screen."""
         self._screen = screen
-        self._line.set_length(LENGTH * millimetres(screen).pixels)
+        self._line.set_pixels_per_mm(millimetres(screen).pixels)
         self._measured.setText("100")
         self._measured.selectAll()
         self._measured.setFocus(Qt.FocusReason.OtherFocusReason)
@@ -115,27 +117,3 @@ class RulerCheck(QWidget):
             say(self._wrong, words)
             return
         self.done.emit()
-
-
-class _Line(QWidget):
-    def __init__(self) -> None:
-        super().__init__()
-        self._length = 0.0
-        self.setMinimumHeight(60)
-        self.setAccessibleName(tr("line of 100 millimetres to be measured"))
-
-    def set_length(self, pixels: float) -> None:
-        """Show a line of this length."""
-        self._length = pixels
-        self.setMinimumWidth(round(pixels) + 20)
-        self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the line with its two ends."""
-        painter = QPainter(self)
-        painter.setPen(QPen(QColor(theme_of(self).text), 2))
-        box = QRectF((self.width() - self._length) / 2, 10, self._length, 40)
-        middle = box.center().y()
-        painter.drawLine(QPointF(box.left(), middle), QPointF(box.right(), middle))
-        for x in (box.left(), box.right()):
-            painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))

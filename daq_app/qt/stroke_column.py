@@ -81,7 +81,9 @@ class StrokeColumn(QWidget):
         elif self._moving and state.step is None:  # it was not recorded: the sentence below says why
             self.stroke.show_edges()
         self._moving = self._moving and state.step is not None
-        self.decisions.show_decided(() if stroke is None else tuple(stroke.decided.values()), state.history)
+        decided = () if stroke is None else stroke.decided.values()
+        self.decisions.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in decided))
+        self.decisions.stack.show_history(state.history)
         self._show_readings(state)
         self.friction.show_lines(friction_table(state.report), state.row)
         if (lines := numbers(state)) != self._lines:
@@ -213,11 +215,6 @@ class DecisionsBar(QWidget):
     def reason(self) -> str:
         """Return why."""
         return self.why.text().strip() or DRAGGED
-
-    def show_decided(self, sentences: tuple[str, ...], history: m.History) -> None:
-        """Show what was decided about a stroke, and what of the session can be undone."""
-        self.sentences_label.show_text("\n".join(f"✎ {sentence}" for sentence in sentences))
-        self.stack.show_history(history)
 
     def _ask(self, again: bool) -> None:
         self.requested.emit(m.Undo(self.who(), again))

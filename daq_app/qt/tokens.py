@@ -91,23 +91,18 @@ def palette(t: Tokens) -> QPalette:
     """Return the palette for what the style draws by itself: radio buttons, arrows of lists, focus."""
     colours = QPalette()
     role = QPalette.ColorRole
-    for name, colour in (
-        (role.Window, t.ground),
-        (role.WindowText, t.text),
-        (role.Base, t.raised),
-        (role.AlternateBase, t.surface),
-        (role.Text, t.text),
-        (role.Button, t.raised),
-        (role.ButtonText, t.text),
-        (role.ToolTipBase, t.raised),
-        (role.ToolTipText, t.text),
-        (role.PlaceholderText, t.quiet),
-        (role.Highlight, t.act),
-        (role.Accent, t.act),
-        (role.HighlightedText, t.on_act),
-        (role.Mid, t.line),
+    for colour, *names in (
+        (t.ground, role.Window),
+        (t.surface, role.AlternateBase),
+        (t.raised, role.Base, role.Button, role.ToolTipBase),
+        (t.text, role.WindowText, role.Text, role.ButtonText, role.ToolTipText),
+        (t.quiet, role.PlaceholderText),
+        (t.line, role.Mid),
+        (t.act, role.Highlight, role.Accent),
+        (t.on_act, role.HighlightedText),
     ):
-        colours.setColor(name, QColor(colour))
+        for name in names:
+            colours.setColor(name, QColor(colour))
     for name in (role.Text, role.ButtonText, role.WindowText):
         colours.setColor(QPalette.ColorGroup.Disabled, name, QColor(t.quiet))
     return colours
@@ -159,8 +154,7 @@ QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius
 QPushButton:hover {{ border-color: {t.quiet}; }}
 QPushButton:pressed {{ background: {t.line}; }}
 QComboBox:disabled {{ color: {t.quiet}; }}
-QLineEdit:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
-QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
+QLineEdit:disabled, QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
 QPushButton:focus, QLineEdit:focus, QPlainTextEdit:focus, QListWidget:focus, QTreeWidget:focus {{
   border: 2px solid {t.act}; }}
 QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; font-weight: 600;

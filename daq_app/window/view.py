@@ -116,6 +116,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
     """Return what is shown of the bench; while a session is recorded it is neither disconnected nor tared."""
     info = bench.info
     lamp, words = _bench_lamp(bench)
+    counts, lag = asdict(bench.health), f"{bench.health.lag_ms:.0f} ms"
     open_now = bench.link == "open"
     return BenchView(
         lamp=lamp,
@@ -124,7 +125,7 @@ def bench_view(bench: BenchState, *, recording: bool) -> BenchView:
         serial="–" if info is None else info.serial,
         calibration="–" if info is None else info.calibration.source,
         rate=_rate(bench),
-        counters=_counters(bench),
+        counters=(*((name, f"{counts[name]}") for name in ("received", *COUNTED)), ("lag", lag)),
         bars=_bars(bench),
         tare=_tare(bench),
         drift=_drift(bench),
@@ -184,12 +185,6 @@ def _rate(bench: BenchState) -> str:
     rate = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
     measured = f"{bench.rate:.0f}" if isfinite(bench.rate) else "–"
     return tr("{measured} Hz (set {asked})", measured=measured, asked=rate)
-
-
-def _counters(bench: BenchState) -> tuple[tuple[str, str], ...]:
-    counts = asdict(bench.health)
-    rows = [(name, f"{counts[name]}") for name in ("received", *COUNTED)]
-    return (*rows, ("lag", f"{bench.health.lag_ms:.0f} ms"))
 
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:
