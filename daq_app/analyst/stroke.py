@@ -104,14 +104,9 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
     zero = block.raw[free].mean(axis=0) if len(free) else np.zeros(6)
     words = tr("mean before contact, readings: {count}", count=len(free)) if len(free) else tr("as recorded")
     wrench = in_face_frame(calibration.wrench(block.raw, zero), recording.plan.frame)
-    return RawReadings(
-        place=place,
-        unit=calibration.raw_unit,
-        **same_fields(block, RawReadings),
-        normal=-wrench[:, 2],
-        tangential=np.hypot(wrench[:, 0], wrench[:, 1]),
-        zero=words,
-    )
+    read, normal, tangential = same_fields(block, RawReadings), -wrench[:, 2], np.hypot(wrench[:, 0], wrench[:, 1])
+    unit = calibration.raw_unit
+    return RawReadings(place=place, unit=unit, zero=words, normal=normal, tangential=tangential, **read)
 
 
 class History(Struct, frozen=True):

@@ -49,9 +49,8 @@ class LineageLabel(QLabel):
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self.setTextInteractionFlags(
-            Qt.TextInteractionFlag.LinksAccessibleByMouse | Qt.TextInteractionFlag.LinksAccessibleByKeyboard
-        )
+        flags = Qt.TextInteractionFlag
+        self.setTextInteractionFlags(flags.LinksAccessibleByMouse | flags.LinksAccessibleByKeyboard)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.linkActivated.connect(self.followed.emit)
         self.linkHovered.connect(self._tell)
@@ -99,9 +98,8 @@ class AnalystWindow(QMainWindow):
         self.progress = QProgressBar()
         self.progress.setAccessibleName(tr("progress"))
         self.stop = button(tr("Stop  Esc"), tr("stop what is being done"), lambda: self.ask(m.Stop()))
-        self.go_on = button(
-            tr("Go on"), tr("have the model answer the trials that are left"), lambda: self.ask(m.GoOn())
-        )
+        name = tr("have the model answer the trials that are left")
+        self.go_on = button(tr("Go on"), name, lambda: self.ask(m.GoOn()))
         self.report = button(tr("Report…"), tr("write the report"), self.write_report)
         self.format = choice(tr("format of the export"), sorted(FORMATS))
         self.export = button(tr("Export…"), tr("write an export"), self.write_export)
@@ -321,14 +319,10 @@ class TrialsColumn(QWidget):
         self.list.setCurrentRow(state.row if chosen(state) is not None else -1)
         self.list.blockSignals(False)
         self.errors.show_text(greatest_errors(state.report, state.response))
-        ring = pg.mkPen(QColor(self._tokens.text))
-        self.points.setData(
-            [
-                {"pos": (p.score, p.response), "data": p.row, "brush": MODEL, "pen": ring}
-                | ({"size": 18, "symbol": "s"} if p.row == state.row else {"size": 11, "symbol": "o"})
-                for p in points(state)
-            ]
-        )
+        marks = {True: {"size": 18, "symbol": "s"}, False: {"size": 11, "symbol": "o"}}
+        alike = {"brush": MODEL, "pen": pg.mkPen(QColor(self._tokens.text))}
+        shown = ({"pos": (p.score, p.response), "data": p.row} | marks[p.row == state.row] for p in points(state))
+        self.points.setData([spot | alike for spot in shown])
 
     def _chosen(self, row: int) -> None:
         if row >= 0:

@@ -50,10 +50,8 @@ class CoursePanel(Panel):
         self._timer = label("", "quiet")
         self.mirror = Mirror(scale)
         self._roomy = round(ROOMY * min(scale, 1.4))
-        head, around = (
-            hbox((label(tr("Plan"), "section"), 1), self._timer),
-            (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID),
-        )
+        head = hbox((label(tr("Plan"), "section"), 1), self._timer)
+        around = (int(1.5 * GRID), GRID, int(1.5 * GRID), GRID)
         vbox(head, (self.plan, 1), self.mirror, self._bottom, on=self, margins=around, spacing=GRID)
 
     @property

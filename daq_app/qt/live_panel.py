@@ -41,13 +41,10 @@ PLOTS = (
     ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
     (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
 )
+TORQUES = (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "fz", dashed=True))
 AXES = (
     ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "fz")), PlotScale(-5.0, 5.0, 10.0)),
-    (
-        "Tx Ty Tz [N mm]",
-        (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "fz", dashed=True)),
-        PlotScale(-50.0, 50.0, 100.0),
-    ),
+    ("Tx Ty Tz [N mm]", TORQUES, PlotScale(-50.0, 50.0, 100.0)),
 )
 INSTEAD = Curve("SED instead", MODEL, dashed=True, named=False)
 SED = (tr_noop("SED [kPa], model"), (Curve("SED", MODEL), INSTEAD), PlotScale(0.0, 5.0, 5.0))

@@ -275,15 +275,8 @@ class ModelColumn(QWidget):
 
     def _finger_page(self) -> QWidget:
         page = QWidget()
-        vbox(
-            self.fields,
-            (hbox((self.finger, 1), (self.other, 1)), 3),
-            self.probe,
-            (self.plot, 1),
-            self.errors,
-            self.why,
-            hbox((self.player, 1), self.film),
-            hbox(self.near, self.mesh, self.together, self.history, (self.save, 1)),
-            on=page,
-        )
+        fingers, play = hbox((self.finger, 1), (self.other, 1)), hbox((self.player, 1), self.film)
+        acts = hbox(self.near, self.mesh, self.together, self.history, (self.save, 1))
+        plots = (fingers, 3), self.probe, (self.plot, 1)
+        vbox(self.fields, *plots, self.errors, self.why, play, acts, on=page)
         return page

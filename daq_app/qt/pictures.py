@@ -131,10 +131,8 @@ class ComparedView(QWidget):
         for row in rows:
             cells = [f"{row.experiment} {row.index}"]
             for name, pair in zip(NAMES, row.pairs, strict=True):
-                digits, values = (
-                    1 if name == "score" else 3,
-                    ((pair.first, ""), (pair.second, ""), (pair.difference, "+")),
-                )
+                digits = 1 if name == "score" else 3
+                values = (pair.first, ""), (pair.second, ""), (pair.difference, "+")
                 cells += ["–" if one is None else f"{one:{sign}.{digits}f}".replace("-", "−") for one, sign in values]
             lines.append(tuple(cells))
         self.table.show_lines(tuple(lines))

@@ -87,9 +87,8 @@ class EdgeHandle(QPushButton):
         mark = "✎ " if placed.decided else "" if placed.present else "○ "
         self.setText(f"{mark}{name} {at}{' ⏎' if self._away else ''}")
         state = placed.decided or (tr("as found") if placed.present else tr("not found; where it could be"))
-        self.setToolTip(
-            tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
-        )
+        words = tr("{state}\nDrag the line, or: ← → move (Shift further), Enter records, Esc goes back", state=state)
+        self.setToolTip(words)
         spoken = {"steady begin": tr("steady from"), "steady end": tr("steady to")}.get(self.edge, name)
         self.setAccessibleName(f"{spoken} {at} s, {state}{', Enter records' if self._away else ''}")
 

@@ -67,9 +67,8 @@ class SubjectPicture(QWidget):
             return
         ratio = self.devicePixelRatioF()
         room = QSize(round(self.width() * ratio), round(self.height() * ratio))
-        drawn = self._picture.scaled(
-            room, Qt.AspectRatioMode.KeepAspectRatio, Qt.TransformationMode.SmoothTransformation
-        )
+        smooth = Qt.TransformationMode.SmoothTransformation
+        drawn = self._picture.scaled(room, Qt.AspectRatioMode.KeepAspectRatio, smooth)
         drawn.setDevicePixelRatio(ratio)
         size = drawn.deviceIndependentSize().toSize()
         at = QPoint((self.width() - size.width()) // 2, (self.height() - size.height()) // 2)

@@ -135,9 +135,8 @@ class LiveFeed:
         if not self._take:
             return ReadingBlock.empty()
         whole = _joined(list(self._take))
-        return ReadingBlock(
-            whole.sequence, whole.sequence, whole.status, whole.time, whole.received_ns, raw=whole.wrench
-        )
+        sequence, wrench = whole.sequence, whole.wrench
+        return ReadingBlock(sequence, sequence, whole.status, whole.time, whole.received_ns, raw=wrench)
 
     def _channels(self, live: Live, frame: Frame) -> Array:
         """Return what is drawn (channels, n); nan where a value means nothing."""

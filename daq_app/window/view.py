@@ -325,8 +325,7 @@ def _banner(state: AppState) -> Banner | None:
         return Banner("wrong", words, tr("Resume session") if again else "", again)
     if state.gone is not None and session is not None and session.sealing == "cut short":
         words = tr(
-            "The recorder has ended while it sealed the session. Everything is kept: 'daq-app resume --end {folder}' "
-            "seals it.",
+            "The recorder has ended while it sealed. Everything is kept: 'daq-app resume --end {folder}' seals it.",
             folder=session.folder,
         )
         return Banner("wrong", words)

@@ -77,6 +77,7 @@ class CourseView:
 
 def course_view(session: SessionState, bench: BenchState, now: float) -> CourseView:
     """Return what is shown of a session."""
+    nought = "" if isinstance(session.command, steps.AskNumber) else "0"  # which is a digit of a number that is due
     (headline, primary), over = _to_do(session, bench), session.over
     again = redo_targets(session)
     stroke = _stroke(session, again)
@@ -97,13 +98,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
         if session.phase == "paused"
         else Button(tr("Pause"), "P", session.phase in IN_A_TRIAL, steps.Pause()),
         note=Button(tr("Note"), "N", not over, question=tr("Note, kept with its time:")),
-        # While a number is due, 0 is a digit of it.
-        no_answer=Button(
-            tr("No answer"),
-            "" if isinstance(session.command, steps.AskNumber) else "0",
-            session.phase == "scoring",
-            NO_ANSWER.get(type(session.command)),
-        ),
+        no_answer=Button(tr("No answer"), nought, session.phase == "scoring", NO_ANSWER.get(type(session.command))),
         end=Button(tr("New"), "Ctrl+N", sends=NewSession())
         if over
         else Button(tr("End"), "Ctrl+E", question=tr("Why does the session end now?")),

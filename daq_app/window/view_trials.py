@@ -16,9 +16,7 @@ KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state witho
     "skipped": ("–", tr_noop("skipped")),
     "coming": ("○", tr_noop("still to come")),
 }
-DIGITS_AND_UNITS: dict[str, tuple[int, str]] = dict(
-    zip(PICTURE, ((2, "N"), (2, "N"), (2, ""), (0, "mm/s")), strict=True)
-)
+DIGITS_AND_UNITS = {"N": (2, "N"), "T": (2, "N"), "mu": (2, ""), "speed": (0, "mm/s")}  # of the rows of PICTURE
 
 
 @dataclass(frozen=True, slots=True)
