@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 
 import numpy as np
@@ -94,7 +94,7 @@ class LiveFeed:
         self._info: TransducerInfo | None = None
         self._stream: int | None = None
         self._take: deque[Live] = deque()
-        self._tail = _Tail.empty()
+        self._tail = _Tail()
         self._sequence: int | None = None  # of the newest reading
 
     def device(self, info: TransducerInfo | None) -> None:
@@ -116,7 +116,7 @@ class LiveFeed:
         if live.stream != self._stream:
             self._stream = live.stream
             self._take.clear()
-            self._tail = _Tail.empty()
+            self._tail = _Tail()
             self._sequence = None
             self.trace.clear()
         before = live.sequence[0] - 1 if self._sequence is None else self._sequence
@@ -155,26 +155,22 @@ class LiveFeed:
         return np.where(live.status == 0, drawn, np.nan)
 
 
+@dataclass(frozen=True, slots=True)
 class _Tail:
     """The last moments of the centre of pressure: what the speed of the next reading needs."""
 
-    def __init__(self, time: Array, position: Array) -> None:
-        self._time = time  # (k,)
-        self._position = position  # (k, 2)
-
-    @staticmethod
-    def empty() -> "_Tail":
-        return _Tail(np.empty(0), np.empty((0, 2)))
+    time: Array = field(default_factory=lambda: np.empty(0))  # (k,)
+    position: Array = field(default_factory=lambda: np.empty((0, 2)))  # (k, 2)
 
     def onward(self, time: Array, position: Array) -> tuple["_Tail", Array]:
         """Return the next tail and the speed (n,) [mm/s] at each of n further readings."""
-        times = np.concatenate([self._time, time])
-        places = np.concatenate([self._position, position])
+        times = np.concatenate([self.time, time])
+        places = np.concatenate([self.position, position])
         origin = times[0]  # so that sums of times stay exact
         rows = np.column_stack([np.nan_to_num(places), times - origin])
         total = np.vstack([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
         bad = np.concatenate([[0], np.cumsum(np.isnan(places[:, 0]))])
-        ends = np.arange(len(self._time), len(times)) + 1
+        ends = np.arange(len(self.time), len(times)) + 1
         recent = np.searchsorted(times, time - SMOOTH)
         old_end = np.searchsorted(times, time - LAG)
         old_start = np.searchsorted(times, time - LAG - SMOOTH)
