@@ -35,10 +35,7 @@ class Look:
 
 
 def whole_box(frame: Frame, look: Look) -> Box:
-    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm].
-
-    A line of words finds room under it.
-    """
+    """Return left, right, below and above of what is shown before anybody moves or zooms it [mm]."""
     if not look.near:
         x, y = frame.nodes[:, 0], frame.nodes[:, 1]
         return float(x.min()) - 0.5, float(x.max()) + 0.5, -TRACTIONS, float(y.max()) + 0.3

@@ -330,10 +330,7 @@ class Openness:
 
 
 class Drawer(QSplitter):
-    """What is always there, and a drawer at its right that remembers whether it is open and how wide it is.
-
-    Where there is no room for both, the drawer begins closed, and takes the whole place when it is opened.
-    """
+    """What is always there, and a drawer at its right that remembers whether it is open and how wide it is."""
 
     def __init__(self, main: QWidget, drawer: QWidget) -> None:
         super().__init__(Qt.Orientation.Horizontal)

@@ -100,10 +100,7 @@ class Thumbnail(SubjectPicture):
 
 
 class Mirror(QWidget):
-    """Shows the subject's page without any answer on it, so that it serves under every blinding.
-
-    It begins folded where there is no room for it, and can be opened there all the same.
-    """
+    """Shows the subject's page without any answer on it, so that it serves under every blinding."""
 
     def __init__(self, scale: float) -> None:
         super().__init__()

@@ -22,7 +22,6 @@ from sessions.strokes.settings import RatioSettings
 Array = NDArray[np.float64]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
-
 FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
@@ -35,7 +34,7 @@ class Load:
     """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
 
     axes: tuple[float, ...] = (0.0,) * 6
-    combined: float = 0.0  # see `drivers.loads`
+    combined: float = 0.0  # see `drivers.calibration.loads`
 
     def latched(self, other: "Load") -> "Load":
         """Return the greater of each share.

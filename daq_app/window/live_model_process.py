@@ -1,7 +1,4 @@
-"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits.
-
-The full solve of a stroke runs beside, in a thread of that process: the next stroke is followed meanwhile.
-"""
+"""The live model's own process, and its client in the window: one batch is under way at a time, nothing ever waits."""
 
 import signal
 import threading

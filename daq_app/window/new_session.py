@@ -144,10 +144,7 @@ def checked(
 
 
 def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
-    """Return everything that keeps a session from beginning: a sentence for each field that is wrong, by its name.
-
-    The protocol is read and the disk is measured, so that what Start would refuse is known before anybody presses it.
-    """
+    """Return everything that keeps a session from beginning: a sentence for each field that is wrong, by its name."""
     wrong = _refusals(form, bench)
     if form.tablet and not form.simulated:
         wrong["tablet"] = form.tablet

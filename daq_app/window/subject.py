@@ -18,6 +18,11 @@ from sessions.run.steps import MagnitudeEstimate, PairedChoice, Scored
 
 Translate = Callable[[str], str]  # an English text -> that in the subject's language
 Kind = Literal["read", "line", "number", "choice"]
+Device = Literal["mouse", "touch", "pen", "keyboard"]
+Which = Literal["first", "second"]
+Owner = Literal["text", "answer", "course"]
+
+# Of a preview: answers, events, and what its pages are called.
 EXAMPLES = {"number": steps.MagnitudeEstimate(1.0), "choice": steps.PairedChoice("first")}
 ALWAYS: Mapping[type, steps.Event] = {  # what brings a session on from a state, whatever the trial
     states.Idle: steps.Begin(), states.Taring: steps.Zeroed(), states.Stroking: steps.FingerLifted(),
@@ -28,15 +33,13 @@ NAMES = {
     "mounting": tr_noop("the surface is changed"), "settling": tr_noop("the finger is still on"),
     "resting": tr_noop("rest"), "paused": tr_noop("pause"), "closing": tr_noop("end"),
 }  # fmt: skip
-Device = Literal["mouse", "touch", "pen", "keyboard"]
-Which = Literal["first", "second"]
 
+# Of an answer on the line, and of keys:
 MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
 STEP = 1.0  # an arrow moves the mark by so much ...
 LEAP = 10.0  # ... and Page Up or Page Down by this
 PAUSE = 1.0  # key presses further apart than this are two answers, not one [s]
 DIGITS = 1  # of a score: a mark can be placed no finer
-Owner = Literal["text", "answer", "course"]
 GIVES = frozenset({"Enter", "Space"})  # the answer that stands
 PLACES = frozenset({"Left", "Right", "Up", "Down", "PgUp", "PgDown", "Home", "End"})  # the mark on the line
 TYPES = frozenset({*"0123456789.,", "Backspace", "Del"})  # a number

@@ -100,10 +100,7 @@ class BenchView:
 
 
 def bench_summary(view: BenchView) -> str:
-    """Return what the card of the transducer says: which it is, its zero, noise and life.
-
-    One that is not connected has its name alone.
-    """
+    """Return what the card of the transducer says: which it is, its zero, noise and life."""
     if view.lamp == "off":
         return f"{view.name}: {view.lamp_words}."
     zero = tr("Zero: {zero}.", zero=view.tare.rsplit("\n", 1)[-1])
