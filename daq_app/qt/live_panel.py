@@ -41,9 +41,9 @@ PLOTS = (
     ("µ = T/N [-]", (Curve("mu", MU),), PlotScale(0.0, 1.0, 1.0)),
     (tr_noop("speed [mm/s]"), (Curve("speed", "text"),), PlotScale(0.0, 50.0, 50.0)),
 )
-TORQUES = (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "fz", dashed=True))
+TORQUES = (Curve("Tx", FX, dashed=True), Curve("Ty", FY, dashed=True), Curve("Tz", "text", dashed=True))
 AXES = (
-    ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "fz")), PlotScale(-5.0, 5.0, 10.0)),
+    ("Fx Fy Fz [N]", (Curve("Fx", FX), Curve("Fy", FY), Curve("Fz", "text")), PlotScale(-5.0, 5.0, 10.0)),
     ("Tx Ty Tz [N mm]", TORQUES, PlotScale(-50.0, 50.0, 100.0)),
 )
 INSTEAD = Curve("SED instead", MODEL, dashed=True, named=False)

@@ -34,11 +34,6 @@ class Tokens:
     look: str  # look here
     record: str  # the recording lamp
 
-    @property
-    def fz(self) -> str:
-        """Fz is drawn in the strongest contrast there is."""
-        return self.text
-
 
 _COLOURS = {  # of the light and of the dark theme
     "ground": ("#eceeef", "#16191b"),
