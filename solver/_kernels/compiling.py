@@ -112,18 +112,27 @@ def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., 
     work on a small mesh.
     """
     ending = tuple([_kind(argument) for argument in last])
+    mine: dict[tuple[object, ...], Callable[..., Result]] = {}
 
     def call(*first: object) -> Result:
-        key = (loop, tuple([_kind(argument) for argument in first]), ending)
-        entry = _ENTRIES.get(key)
+        key = tuple([_kind(argument) for argument in first])
+        entry = mine.get(key)
         if entry is None:
-            dispatcher: Any = loop
-            types = tuple(_numba.typeof(argument) for argument in (*first, *last))
-            dispatcher.compile(types)  # or load
-            entry = _ENTRIES[key] = dispatcher.overloads[types].entry_point
+            entry = mine[key] = _entry(loop, (key, ending), (*first, *last))
         return entry(*first, *last)
 
     return call
+
+
+def _entry(loop: Callable[..., Result], kinds: tuple[object, ...], arguments: tuple[object, ...]) -> Callable[..., Any]:
+    """Return the code of a loop for arguments of these `kinds`, compiled or loaded where it is not there yet."""
+    entry = _ENTRIES.get((loop, *kinds))
+    if entry is None:
+        dispatcher: Any = loop
+        types = tuple(_numba.typeof(argument) for argument in arguments)
+        dispatcher.compile(types)  # or load
+        entry = _ENTRIES[loop, *kinds] = dispatcher.overloads[types].entry_point
+    return entry
 
 
 def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
