@@ -70,8 +70,10 @@ class ElementWork(NamedTuple):
     Their sixteen columns are x of the outer nodes, then y; the centre's come last.
     """
 
-    h: Array  # (q, 18) gradients in the deformed body
-    s: Array  # (q, 18) what the stress is made of
+    turned: Array  # (q, 4) inverse of F, transposed: xx, xy, yx, yy
+    exceeds: Array  # (q, 4) F less that
+    h: Array  # (q, 18) gradients of shape functions times the former: in the deformed body
+    s: Array  # (q, 18) and times the latter
     wide: Array  # (q, 3) weights times modes
     push: Array  # (q,) shear modulus as it has grown, by weight
     more: Array  # (q,) how fast it grows, by weight
@@ -83,7 +85,8 @@ class ElementWork(NamedTuple):
     laplace: Array  # (9, 9) as in `ElementArrays`, times the shear modulus as it has grown [N/mm per mm]
     left: Array  # (18, 5) the tangent less the products is left right: three modes of pressure, and the centre
     right: Array  # (5, 16)
-    own: Array  # (18, 18) their product, and what is added to it
+    own: Array  # (18, 18) what stiffening and relaxing tissue add to the tangent
+    product: Array  # (16, 16) of left and right
 
 
 class BodyState(NamedTuple):

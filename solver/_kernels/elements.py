@@ -140,18 +140,20 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
     least = np.inf
     ux, uy = np.empty(9), np.empty(9)
     work = ElementWork(
-        np.empty((9, 18)), np.empty((9, 18)), np.empty((9, 3)), np.empty(9), np.empty(9), np.empty(9),
-        np.empty((3, 18)), np.empty(18), np.empty((9, 16)), np.empty((9, 16)), np.empty((9, 9)), np.empty((18, 5)),
-        np.empty((5, 16)), np.empty((18, 18)),
+        np.empty((9, 4)), np.empty((9, 4)), np.empty((9, 18)), np.empty((9, 18)), np.empty((9, 3)), np.empty(9),
+        np.empty(9), np.empty(9), np.empty((3, 18)), np.empty(18), np.empty((9, 16)), np.empty((9, 16)),
+        np.empty((9, 9)), np.empty((18, 5)), np.empty((5, 16)), np.zeros((18, 18)), np.empty((16, 16)),
     )  # fmt: skip
+    relaxes, filled = system.more_tangent.shape[0] > 0, False
     for e in range(elements.nodes.shape[0]):
         gather(u, elements.nodes, e, ux, uy)
-        least = min(least, strain_points(e, ux, uy, pressure, elements, work, system.volume))
+        least = min(least, strain_points(e, ux, uy, elements, work, system.volume))
         if not least > 0.0:
             return least
-        sum_points(e, elements.lame[e], work, system)
+        sum_forces(e, elements, work, system)
         if anew:
             stiffens = elements.stiffening[e] != PLAIN
+            deform_gradients(e, stiffens, pressure, elements, work)
             if stiffens:
                 sum_laplace(elements.grad_x[e], elements.grad_y[e], work.push, work.laplace)
             else:
@@ -159,7 +161,9 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
                     for c in range(9):
                         work.laplace[i, c] = elements.shear[e] * elements.laplace[e, i, c]
             sum_geometric(work)
-            sum_dyads(e, stiffens, work, system)
+            if stiffens or relaxes or filled:
+                filled = stiffens or relaxes
+                sum_dyads(e, stiffens, work, system)
             eliminate_centre(e, work, system)
             write_tangent(e, work, system)
         add_forces(e, elements.unknown, work.f, system)
@@ -167,18 +171,14 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
 
 
 @compiled
-def strain_points(
-    e: int, ux: Array, uy: Array, pressure: Array, elements: ElementArrays, work: ElementWork, volume: Array
-) -> float:
-    """Fill what sums over an element's quadrature points are made of, and `volume`; return its least det F."""
-    h, s, wide, push, more, bend = work.h, work.s, work.wide, work.push, work.more, work.bend
+def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: ElementWork, volume: Array) -> float:
+    """Fill what an element's quadrature points are strained, and its modes of `volume`; return its least det F."""
+    turned, exceeds, wide, push, more = work.turned, work.exceeds, work.wide, work.push, work.more
     v0 = v1 = v2 = 0.0
-    p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
     exponent, shear = elements.stiffening[e], elements.shear[e]
     least = np.inf
     for q in range(9):
-        gx, gy = elements.grad_x[e, q], elements.grad_y[e, q]
-        h00, f01, f10, h11 = displacement_gradient(ux, uy, gx, gy)
+        h00, f01, f10, h11 = displacement_gradient(ux, uy, elements.grad_x[e, q], elements.grad_y[e, q])
         grown = volume_growth(h00, f01, f10, h11)
         f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
         least = min(least, j)
@@ -197,38 +197,61 @@ def strain_points(
             more[q] = 2.0 * growth * wg
             wg *= factor
         push[q] = wg
-        bend[q] = wg - (w0 * p0 + w1 * p1 + w2 * p2)
         over = 1.0 / j
-        a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over  # inverse transposed
-        b00, b11 = (h00 - h11 + grown * f00) * over, (h11 - h00 + grown * f11) * over  # F less it, as exactly
-        b01, b10 = f01 - a01, f10 - a10
-        for i in range(8):
-            h[q, i], h[q, 8 + i] = a00 * gx[i] + a01 * gy[i], a10 * gx[i] + a11 * gy[i]
-            s[q, i], s[q, 8 + i] = b00 * gx[i] + b01 * gy[i], b10 * gx[i] + b11 * gy[i]
-        h[q, 16], h[q, 17] = a00 * gx[8] + a01 * gy[8], a10 * gx[8] + a11 * gy[8]
-        s[q, 16], s[q, 17] = b00 * gx[8] + b01 * gy[8], b10 * gx[8] + b11 * gy[8]
+        a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over
+        turned[q, 0], turned[q, 1], turned[q, 2], turned[q, 3] = a00, a01, a10, a11
+        exceeds[q, 0], exceeds[q, 1] = (h00 - h11 + grown * f00) * over, f01 - a01  # to its own digits
+        exceeds[q, 2], exceeds[q, 3] = f10 - a10, (h11 - h00 + grown * f11) * over
     volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
     return least
 
 
 @compiled
-def sum_points(e: int, lam: float, work: ElementWork, system: ElementSystem) -> None:
-    """Fill the derivatives of an element's volume modes, its forces, and what its pressure makes of the tangent."""
-    h, s, wide, push, d, f = work.h, work.s, work.wide, work.push, work.d, work.f
-    v0, v1, v2 = system.volume[e, 0], system.volume[e, 1], system.volume[e, 2]
+def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: ElementSystem) -> None:
+    """Fill an element's forces `f` (18,)."""
+    turned, exceeds, wide, push, f = work.turned, work.exceeds, work.wide, work.push, work.f
+    lam, relaxes = elements.lame[e], system.more_force.shape[0] > 0
+    v0, v1, v2 = lam * system.volume[e, 0], lam * system.volume[e, 1], lam * system.volume[e, 2]
     for c in range(18):
-        d0 = d1 = d2 = total = 0.0
+        f[c] = system.more_force[e, c] if relaxes else 0.0
+    for q in range(9):
+        gx, gy, g = elements.grad_x[e, q], elements.grad_y[e, q], push[q]
+        pressure = wide[q, 0] * v0 + wide[q, 1] * v1 + wide[q, 2] * v2
+        p00, p01 = g * exceeds[q, 0] + pressure * turned[q, 0], g * exceeds[q, 1] + pressure * turned[q, 1]
+        p10, p11 = g * exceeds[q, 2] + pressure * turned[q, 2], g * exceeds[q, 3] + pressure * turned[q, 3]
+        for i in range(8):
+            f[i] += p00 * gx[i] + p01 * gy[i]
+            f[8 + i] += p10 * gx[i] + p11 * gy[i]
+        f[16] += p00 * gx[8] + p01 * gy[8]
+        f[17] += p10 * gx[8] + p11 * gy[8]
+
+
+@compiled
+def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementArrays, work: ElementWork) -> None:
+    """Fill the deformed gradients of shape functions, the derivatives of an element's volume modes, and `bend`."""
+    h, s, wide, bend, d, left, lam = work.h, work.s, work.wide, work.bend, work.d, work.left, elements.lame[e]
+    p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
+    for q in range(9):
+        bend[q] = work.push[q] - (wide[q, 0] * p0 + wide[q, 1] * p1 + wide[q, 2] * p2)
+        push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.turned[q], h[q])
+        if stiffens:
+            push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.exceeds[q], s[q])
+    for c in range(18):
+        d0 = d1 = d2 = 0.0
         for q in range(9):
             d0 += wide[q, 0] * h[q, c]
             d1 += wide[q, 1] * h[q, c]
             d2 += wide[q, 2] * h[q, c]
-            total += push[q] * s[q, c]
         d[0, c], d[1, c], d[2, c] = d0, d1, d2
-        f[c] = total + lam * (d0 * v0 + d1 * v1 + d2 * v2)
-        work.left[c, 0], work.left[c, 1], work.left[c, 2] = lam * d0, lam * d1, lam * d2
-    if system.more_force.shape[0] > 0:
-        for c in range(18):
-            f[c] += system.more_force[e, c]
+        left[c, 0], left[c, 1], left[c, 2] = lam * d0, lam * d1, lam * d2
+
+
+@compiled
+def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
+    """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient: x of all, y of all, centre."""
+    for i in range(8):
+        out[i], out[8 + i] = by[0] * gx[i] + by[1] * gy[i], by[2] * gx[i] + by[3] * gy[i]
+    out[16], out[17] = by[0] * gx[8] + by[1] * gy[8], by[2] * gx[8] + by[3] * gy[8]
 
 
 @compiled
@@ -267,12 +290,10 @@ def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) 
     for i in range(18):
         for c in range(18):
             own[i, c] = system.more_tangent[e, i, c] if system.more_tangent.shape[0] > 0 else 0.0
-    if stiffens:
-        for i in range(18):
-            for q in range(9):
-                x = more[q] * s[q, i]
-                for c in range(18):
-                    own[i, c] += x * s[q, c]
+        for q in range(9 if stiffens else 0):
+            x = more[q] * s[q, i]
+            for c in range(18):
+                own[i, c] += x * s[q, c]
 
 
 @compiled
@@ -295,13 +316,9 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     inverse[e, 0], inverse[e, 1], inverse[e, 2] = k00, k01, k11
     for c in range(16):
         i, a = c % 8, c // 8
-        x, y = own[16, c], own[17, c]
-        if a == 0:
-            x += by_x[8, i] + even[8, i]
-            y += by_x[8, 8 + i]
-        else:
-            x += by_y[8, i]
-            y += by_y[8, 8 + i] + even[8, i]
+        by = by_x if a == 0 else by_y
+        x = own[16, c] + by[8, i] + (1 - a) * even[8, i]
+        y = own[17, c] + by[8, 8 + i] + a * even[8, i]
         for m in range(3):
             x += left[16, m] * d[m, c]
             y += left[17, m] * d[m, c]
@@ -315,7 +332,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's tangent, lower half, its centre eliminated, and how its volume modes follow displacements."""
     left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
-    by_x, by_y = work.by_x, work.by_y
+    by_x, by_y, product = work.by_x, work.by_y, work.product
     for m in range(3):
         for c in range(18):
             system.dilate[e, m, 2 * (c % 8) + c // 8 if c < 16 else c] = work.d[m, c]
@@ -324,13 +341,13 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
             total = 0.0
             for m in range(5):
                 total += left[i, m] * right[m, c]
-            own[i, c] += total
+            product[i, c] = total
     for i in range(8):
         for c in range(i + 1):
-            tangent[e, 2 * i, 2 * c] = own[i, c] + by_x[i, c] + even[i, c]
-            tangent[e, 2 * i, 2 * c + 1] = own[i, 8 + c] + by_y[i, c]
-            tangent[e, 2 * i + 1, 2 * c] = own[8 + i, c] + by_x[i, 8 + c]
-            tangent[e, 2 * i + 1, 2 * c + 1] = own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
+            tangent[e, 2 * i, 2 * c] = product[i, c] + own[i, c] + by_x[i, c] + even[i, c]
+            tangent[e, 2 * i, 2 * c + 1] = product[i, 8 + c] + own[i, 8 + c] + by_y[i, c]
+            tangent[e, 2 * i + 1, 2 * c] = product[8 + i, c] + own[8 + i, c] + by_x[i, 8 + c]
+            tangent[e, 2 * i + 1, 2 * c + 1] = product[8 + i, 8 + c] + own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
 
 
 @compiled
@@ -339,11 +356,12 @@ def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None
     recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse
     for m in range(2):
         recovery_matrix[e, m, 16] = inverse[e, m] * f[16] + inverse[e, m + 1] * f[17]
-    for c in range(16):
-        i, a = c % 8, c // 8
-        row, at = unknown[e, i, a], 2 * i + a
-        if row >= 0:
-            system.force[row] += f[c] - recovery_matrix[e, 0, at] * f[16] - recovery_matrix[e, 1, at] * f[17]
+    for i in range(8):
+        for a in range(2):
+            row, at = unknown[e, i, a], 2 * i + a
+            if row >= 0:
+                centre = recovery_matrix[e, 0, at] * f[16] + recovery_matrix[e, 1, at] * f[17]
+                system.force[row] += f[i + 8 * a] - centre
 
 
 @compiled

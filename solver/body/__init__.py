@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import ClassVar, Protocol, Self
+from typing import ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -261,6 +261,17 @@ _SHAPES = ShapeFunctions(
 )
 
 
+class Places(NamedTuple):
+    """Probes, and what they need of their elements."""
+
+    probes: "Probes"
+    held: Indices  # (m,) elements that hold probes
+    number: Indices  # (p,) which of those holds each
+    gradients: Array  # (2, m, q, 9) of their shape functions
+    modes: Array  # (p, 3) the elements' own modes there
+    constants: Array  # (5, p) shear modulus, Lamé's first constant, stiffening, and the skin's direction x, y
+
+
 @dataclass(frozen=True, eq=False)
 class MeshElements:
     """The elements of a mesh, integrated: e of them, q = 9 quadrature points each.
@@ -286,32 +297,27 @@ class MeshElements:
         """Return the measure of volume change of a displacement gradient: its trace at small strain, else ln J."""
         return xx + yy
 
-    def state(self, probes: "Probes", displacement: Array, tangent: Array | None = None) -> LocalState:
-        """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...).
+    def places(self, probes: "Probes", tangent: Array | None = None) -> "Places":
+        """Return what stays of probes whatever the displacements; `tangent` (p, 2) is along x where it is not given."""
+        of, element, held = self.elements, probes.element, distinct(probes.element)
+        along = np.tile([1.0, 0.0], (len(element), 1)) if tangent is None else tangent
+        constants = np.stack([of.shear[element], of.lame[element], of.stiffening[element], *along.T])
+        gradients = np.stack([of.grad_x[held], of.grad_y[held]])
+        return Places(probes, held, np.searchsorted(held, element), gradients, self.combined(probes), constants)
 
-        `tangent` (p, 2) are the skin's directions there; the x axis where none are given.
-        """
-        of = self.elements
-        wide = (slice(None), *([None] * (displacement.ndim - 2)))
-        gradient = probes.displacement_gradient(self.mesh, displacement)
-        held, place = np.unique(probes.element, return_inverse=True)
+    def state(self, places: "Places", displacement: Array) -> LocalState:
+        """Return what is known of places for displacements (nodes, 2, ...): arrays (p, ...)."""
+        held, wide = places.held, (slice(None), slice(None), *([None] * (displacement.ndim - 2)))
+        gradient = places.probes.displacement_gradient(self.mesh, displacement)
         local = displacement[self.mesh.elements[held]]
         local = (local - local[:, 8:]).reshape(len(local), 9, -1)
-        shape = (len(held), 9, *displacement.shape[1:])
-        by_x, by_y = (np.moveaxis((grad[held] @ local).reshape(shape), 2, 0) for grad in (of.grad_x, of.grad_y))
-        fit = self.volume_modes(self.volume(by_x[0], by_y[0], by_x[1], by_y[1]), held)[place]
-        along = np.array([[1.0, 0.0]]) if tangent is None else tangent
+        by = np.moveaxis((places.gradients @ local).reshape(2, len(held), 9, *displacement.shape[1:]), 3, 1)
+        fit = self.volume_modes(self.volume(by[0, 0], by[1, 0], by[0, 1], by[1, 1]), held)[places.number]
+        shear, lame, stiffening, x, y = places.constants[wide]
         return LocalState(
-            xx=gradient[:, 0, 0],
-            xy=gradient[:, 0, 1],
-            yx=gradient[:, 1, 0],
-            yy=gradient[:, 1, 1],
-            dilatation=np.einsum("pm,pm...->p...", self.combined(probes), fit),
-            shear=of.shear[probes.element][wide],
-            lame=of.lame[probes.element][wide],
-            stiffening=of.stiffening[probes.element][wide],
-            tangent=(along[:, 0][wide], along[:, 1][wide]),
-        )
+            gradient[:, 0, 0], gradient[:, 0, 1], gradient[:, 1, 0], gradient[:, 1, 1],
+            np.einsum("pm,pm...->p...", places.modes, fit), shear, lame, stiffening, (x, y),
+        )  # fmt: skip
 
     @cached_property
     def divergence(self) -> Array:
@@ -327,10 +333,7 @@ class MeshElements:
 
 @lru_cache(maxsize=4)  # bodies of one mesh and several materials follow one another
 def _geometry(mesh: Mesh) -> tuple[Array, ...]:
-    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`.
-
-    Raises LinAlgError where an element is folded.
-    """
+    """Return gradients along x and y, weights, modes, Laplacian, centre and combination of the elements of `mesh`."""
     count = len(mesh.elements)
     sizes = (9, 9), (9, 9), (9,), (9, 3), (9, 9), (2,), (3, 3)
     out = tuple(np.empty((count, *size)) for size in sizes)
@@ -377,7 +380,11 @@ class Patches:
 
     def state(self, displacement: Array) -> LocalState:
         """Return what is known of the places for displacements (nodes, 2, ...): arrays (p, ...)."""
-        return self.elements.state(self.endings.probes, displacement, self.endings.tangent)
+        return self.elements.state(self._places, displacement)
+
+    @cached_property
+    def _places(self) -> "Places":
+        return self.elements.places(self.endings.probes, self.endings.tangent)
 
     def energy(self, displacement: Array) -> Array:
         """Return the SED at the places (p, ...) [MPa] for displacements (nodes, 2, ...)."""

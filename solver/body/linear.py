@@ -56,7 +56,7 @@ class Elastic(MeshElements):
 
     def energy(self, probes: Probes, displacement: Array) -> Array:
         """Return the SED (p, ...) [MPa] for displacements (nodes, 2, ...)."""
-        return SED.small(self.state(probes, displacement))
+        return SED.small(self.state(self.places(probes), displacement))
 
 
 class LinearElimination:

@@ -171,8 +171,8 @@ class LinearFinger(Finger[LinearPatches]):
     @cached_property
     def ending_by_skin(self) -> Array:
         """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
-        endings = self.ending.endings
-        at = self.body.elastic.state(endings.probes, self.body.every_step())  # (p, 2 k)
+        endings, elastic = self.ending.endings, self.body.elastic
+        at = elastic.state(elastic.places(endings.probes), self.body.every_step())  # (p, 2 k)
         whole = np.sqrt(endings.weights / endings.areas)[:, None]
         strain = np.sqrt(at.shear) * np.stack([at.xx, at.yy, at.engineering_shear / np.sqrt(2.0)])
         lines = np.vstack([*(whole * strain), whole * np.sqrt(at.lame / 2.0) * at.dilatation])

@@ -105,7 +105,7 @@ class Sketch:
 
     def values(self, displacement: Array) -> Array:
         """Return `FIELDS` at the nodes of every element (f, 9 e, m) of displacements (nodes, 2, m), small strain."""
-        state = self.elastic.state(self.probes, displacement)
+        state = self.elastic.state(self.elastic.places(self.probes), displacement)
         return np.stack([field.small(state) for field in FIELDS])
 
     def fields(self, displacement: Array, indentation: float, values: Array) -> Fields:

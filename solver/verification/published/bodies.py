@@ -178,7 +178,7 @@ def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     element, local = placed(mesh, points)
     probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
-    at = elastic.state(probes, displacement)
+    at = elastic.state(elastic.places(probes), displacement)
     pressure = (at.lame * at.dilatation)[:, None, None] * np.eye(2)
     return at.shear[:, None, None] * (strain + np.swapaxes(strain, 1, 2)) + pressure
 
