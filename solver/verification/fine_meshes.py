@@ -1,8 +1,4 @@
-"""The truth of a random scene: its numbers on three meshes far finer than an answer's, whose nodes lie elsewhere.
-
-Two are fine everywhere. The third is refined where the error comes from, as a corner that even those do not resolve:
-what the three do not agree on is not known.
-"""
+"""The truth of a random scene: its numbers on two uniformly fine meshes, and on one refined where its error is made."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -53,8 +49,7 @@ def _refined(scenes: Sequence[Scene]) -> Array:
     tolerance = REFINED[scenes[0].solve.kinematics]
     tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}
     answers = solve_many([replace(scene, solve=replace(scene.solve, **tight)) for scene in scenes])
-    nested = [answer.nested for answer in answers if isinstance(answer, Prediction)]
-    known = [one.numbers[:3] for one in nested if one is not None]
+    known = [one.nested.numbers[:3] for one in answers if isinstance(one, Prediction) and one.nested is not None]
     if len(known) < len(scenes):
         raise NotConverged("No refined mesh has a state.")
     return np.abs(known)
