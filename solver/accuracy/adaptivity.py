@@ -67,7 +67,8 @@ class Meshes:
 
         It is the settled one, or the slide where a given drag nearly makes the finger slide.
         """
-        if (scene, sizing) not in self._coarse:
+        new = (scene, sizing) not in self._coarse
+        if new:
             begun = perf_counter()
             finger = self.finger(scene, sizing)
             setup = perf_counter() - begun
@@ -80,7 +81,7 @@ class Meshes:
         solution = self._coarse[scene, sizing]
         if isinstance(solution, SolveFailure):
             raise solution
-        return solution
+        return solution if new else replace(solution, setup_s=0.0)
 
 
 def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:

@@ -127,4 +127,5 @@ def test_at_finite_strain_a_tolerance_is_met_on_lines_that_were_added():
     tight = solve(scene)
     usual = solve(replace(scene, solve=Solve("finite")))
     assert tight.error_estimate <= 0.002
+    assert min(tight.wall_s, tight.setup_s, tight.estimate_s) > 0.0
     assert abs(tight.sed_ending / usual.sed_ending_corrected - 1.0) < 0.002 + usual.error_estimate
