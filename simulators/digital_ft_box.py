@@ -180,7 +180,7 @@ def _crc(frame: bytes) -> bytes:
 SIMULATOR = Simulator(
     "digital-ft",
     served(lambda bench, clock, faults: DigitalFtBox(bench, clock, faults=faults)),
-    factor=0.4,
+    factor=0.25,
     statuses=(sum(1 << n for n in (*range(6), 7, *range(8, 14))),),
     unshown=0.2,  # a sum of seven bits
     serial_line=True,
