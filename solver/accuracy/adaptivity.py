@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from time import perf_counter
 
+import numpy as np
+
 from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state, steps_asked
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import nearby, roughly, settled
@@ -18,7 +20,7 @@ from solver.scene import Scene
 COARSE = (
     4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again
 )
-ELSEWHERE = 1.05  # times as fine is a mesh whose nodes lie elsewhere
+ELSEWHERE = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
 NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
@@ -165,7 +167,11 @@ def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshe
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
-    elsewhere = ELSEWHERE * (COARSE if isinstance(sizing.fineness, Lines) else sizing.fineness)
+    lines = sizing.fineness
+    if isinstance(lines, Lines):
+        elsewhere = lines.divided(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
+    else:
+        elsewhere = ELSEWHERE * lines
     begun = _begun(scene, replace(sizing, fineness=elsewhere), below, meshes)
     return replace(begun, state=settled(begun.finger, scene, begun.state, times))
 

@@ -29,7 +29,7 @@ from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
 MOST = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
-# Measured on 23 scenes at tolerances of 0.3 and 0.05 %: to halve or double any of the next three takes 1 to 18 % more
+# Measured on 23 scenes at tolerances of 0.3 and 0.05 %: to halve or double any of the next four takes 1 to 18 % more
 # work, but for a smaller growth, which takes 4 % less in more rounds.
 PARTS = 4  # of one gap in a round, at most: an error says little about elements many times smaller
 GROWTH = 1.3  # of the unknowns in a round, at least
@@ -62,9 +62,8 @@ class NestedGrid:
         place = mesh.nodes[nodes].reshape(columns, rows, 25, 2)
         affine = np.concatenate([np.ones((*place.shape[:3], 1)), place - place.mean(axis=2, keepdims=True)], axis=3)
         turned = np.swapaxes(affine, 2, 3)
-        return NestedGrid(
-            finger, nodes, shear, affine, np.asarray(np.linalg.solve(turned @ affine, turned), np.float64)
-        )
+        fit = np.asarray(np.linalg.solve(turned @ affine, turned), np.float64)
+        return NestedGrid(finger, nodes, shear, affine, fit)
 
     def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array]:
         """Return what columns (a,) and rows (b,) add to the error of the SED [MPa], right among each other.

@@ -180,13 +180,12 @@ def _refined(
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
     is the answer if it `_stands`.
     """
-    surfaces = compared_sets(scenes)
-    first, kind = fineness, scenes[0].solve.kinematics
+    surfaces, kind = compared_sets(scenes), scenes[0].solve.kinematics
     answers: dict[int, Answer] = {}
     best: dict[int, Answer] = {}  # of each, by its estimate
     lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
-    work: dict[float | Lines, list[int]] = {first: list(range(len(scenes)))}
-    last: float | Lines = first
+    work: dict[float | Lines, list[int]] = {fineness: list(range(len(scenes)))}
+    last: float | Lines = fineness
     while True:
         for last, todo in work.items():
             solved = on_mesh.answers([scenes[i] for i in todo], last, watch)
@@ -202,7 +201,11 @@ def _refined(
         apart = [
             contrast_error([p for i in together if isinstance(p := answers[i], Prediction)]) for together in surfaces
         ]
-        wanted = _wanted(scenes, missed, surfaces, apart)
+        # What has no state on a finer mesh stays as it is, or there would be no end.
+        refinable = [
+            [i for i in together if isinstance(answers[i], Prediction) and i not in lost] for together in surfaces
+        ]
+        wanted = _wanted(scenes, missed, refinable, apart)
         work = _finer({i: answers[i] for i in sorted(wanted)}, wanted, DEFAULT[kind])
         if not work:
             break
@@ -211,7 +214,7 @@ def _refined(
                 rough(answer)
     answers |= {i: best[i] for i, miss in enumerate(missed) if miss > 1.0}
     if kind == "finite":  # where a fine mesh may lose its way
-        lost |= _fallen_back(scenes, answers, first, on_mesh)
+        lost |= _fallen_back(scenes, answers, fineness, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
     warnings = [_undone(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
     return _Refined([answers[i] for i in range(len(scenes))], warnings, last)

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import Friction, Loading, Scene, Solve, solve
-from solver.accuracy import refinement
+from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
+from solver.accuracy import adaptivity, refinement
 from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refined
 from solver.continuation.small_states import WIDE
 from solver.continuation.small_states import settled as settled_state
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
+from solver.response import solution
 from solver.scene.published import scenes
 
 SLIDES = {
@@ -110,6 +111,40 @@ def test_refinement_comes_to_an_end(monkeypatch):
     # elements so small that none may be divided
     monkeypatch.setattr(refinement, "FINEST", 1.0)
     assert refined(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9)) is None
+
+
+def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
+    monkeypatch.setattr(refinement, "MOST", 3000)
+    asked = Solve("finite", contrast_tolerance=0.0005)
+    surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=asked) for mu in (0.2, 0.25, 0.9)]
+    rounds = []
+    finer = solution._finer
+    monkeypatch.setattr(solution, "_finer", lambda *found: rounds.append(finer(*found)) or rounds[-1])
+    *answers, refused = solve_many(surfaces)
+    assert isinstance(refused, NoSteadyState)
+    assert all(answer.dofs > 2000 for answer in answers)
+    assert not rounds[-1]
+    assert len(rounds) < 5
+
+
+def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
+    scene = Scene(friction=Friction(3.0, 0.004), loading=Loading(1.0, "+x"), solve=Solve("finite", evidence="quick"))
+    settled, tried = adaptivity.settled, []
+
+    def none_on_the_first(finger, *more):
+        tried.append(finger)
+        if len(tried) == 2:
+            raise NotConverged("the last node is neither open nor touching")
+        return settled(finger, *more)
+
+    monkeypatch.setattr(adaptivity, "settled", none_on_the_first)
+    meshes = adaptivity.Meshes()
+    low = adaptivity.coarse_solution(scene, 1.0, 4.0, meshes)
+    tried[:] = [low.finger]
+    lines = refined(low.finger.geometry, None)
+    top = adaptivity.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
+    assert len(top.finger.geometry.lines.arcs) == 2 * len(lines.arcs) - 1
+    assert top.finger.geometry.lines.rows == lines.rows
 
 
 def test_a_tolerance_is_met_with_few_unknowns():
