@@ -39,7 +39,7 @@ class Calibration:
     def with_tool(self, tool: tuple[float, ...]) -> "Calibration":
         """Return the calibration with a tool transform (6,) [mm, degrees] behind the transducer's own.
 
-        A force couple moved 5 mm towards the transducer: 1 N along y is felt there as -5 N mm about x more.
+        A force couple moved 5 mm towards the transducer: 1 N along y then adds -5 N mm about x.
 
         >>> cal = Calibration("FT1", "N, N mm", np.eye(6), np.full(6, np.nan), "by hand")
         >>> cal.with_tool((0.0, 0.0, -5.0, 0.0, 0.0, 0.0)).matrix[3].tolist()

@@ -1,4 +1,4 @@
-"""The simulated bench: a stimulus on a six-axis transducer, a finger that strokes it, and what is felt."""
+"""The simulated bench: a stimulus on a six-axis transducer, a finger that strokes it, and the wrench measured."""
 
 import threading
 from dataclasses import dataclass

@@ -240,7 +240,7 @@ class Electronics:
         return packed
 
     def set_bias(self, now: float) -> None:
-        """Let what is felt now read as zero."""
+        """Let the present load read as zero."""
         self._bias = np.clip(self._bench.wrench(np.array([now]))[0], -self._rated, self._rated)
 
     def tcp_reply(self, request: bytes, now: float) -> bytes:

@@ -86,7 +86,7 @@ def machine(measured: Measured) -> Table:
             ("begun", f"{measured.begun} UTC"), ("system", row.system),
             ("processor", f"{row.processor}, {row.cores} cores"),
             ("threads of linear algebra", row.threads),
-            ("processes wanting a core before it began", "not told" if row.load is None else f"{row.load:.2f}"),
+            ("processes wanting a core before it began", "not known" if row.load is None else f"{row.load:.2f}"),
             ("took", f"{sum(measured.took_s.values()):.0f} s" + (", stopped by hand" if measured.stopped else "")),
             *row.versions.items(),
         ]  # fmt: skip
@@ -94,10 +94,10 @@ def machine(measured: Measured) -> Table:
 
 
 def targets(measured: Measured) -> Table:
-    """Return what was asked of the speed."""
+    """Return the table of speeds with their targets."""
     rows: list[Target] = measured.of(Target)
     caption = (
-        "What is asked of the speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
+        "Targets of speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
         "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said."
     )
     return _of_rows("targets", caption, rows, {
@@ -277,7 +277,7 @@ def fill(docs: Path, tables: Mapping[str, Table]) -> None:
 PAGE, DATA, FIGURES = "accuracy.html", "accuracy.json", "figures"
 # anchor, words, and the figures and tables under them, by name
 SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-    ("asked", "What is asked of the speed", ("targets",)),
+    ("asked", "Targets of speed", ("targets",)),
     ("time", "Time against true error", ("speed", "speeds", "benchmarks")),
     ("estimate", "Estimates against true errors", ("estimates",)),
     ("cases", "The reference cases", ("truths",)),

@@ -127,7 +127,7 @@ class Bridge(QObject):
         if now - self._ticked >= TICK:
             self._ticked = now
             self._fold(Tick(now))
-            # The load is told no more often than it can be read; an overload is kept by the recorder: look it up.
+            # The load comes no more often than it can be read; overloads between are kept by the recorder.
             before, bench = self.state.bench.peak.over, self.state.bench
             self._fold(Loaded(self._load))
             self._load = Load()

@@ -1,4 +1,4 @@
-"""A stroke as it was felt: forces and their ratio over time, with the edges of its windows as handles."""
+"""A stroke as it was measured: forces and their ratio over time, with the edges of its windows as handles."""
 
 from typing import Any
 

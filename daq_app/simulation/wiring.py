@@ -132,7 +132,7 @@ class SimulatedHand:
                 pass
 
     def poll(self) -> tuple[steps.Event, ...]:
-        """Return nothing: what a hand does is felt by the transducer."""
+        """Return nothing: the transducer measures what a hand does."""
         return ()
 
     def _surface(self, trial: Trial) -> Surface:

@@ -61,7 +61,7 @@ class Load:
 def load_of(wrench: Array, rated: Array) -> Load:
     """Return the greatest load within readings (n, 6) [N, N mm] of a transducer with rated ranges (6,) [N, N mm].
 
-    `wrench` is as felt: what strains the transducer includes its zero.
+    `wrench` is not zeroed: what strains the transducer includes its zero.
     """
     if not len(wrench):
         return Load()

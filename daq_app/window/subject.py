@@ -176,7 +176,7 @@ class _Page:
         return self.say(SubjectText.STROKE) if allowed == 1 else self.say(SubjectText.STROKES).format(number=allowed)
 
     def _notice(self, to_do: str) -> str:
-        """Return what to do with the finger, and what the protocol lets the subject know beside it."""
+        """Return the instruction for the finger, and the progress that the protocol shows the subject."""
         session = self.session
         shown, trial = session.plan.shown.subject, session.of(session.trial)
         parts = [to_do]

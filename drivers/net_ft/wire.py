@@ -20,7 +20,7 @@ START = _REQUEST.pack(_HEADER, 0x0002, 0)  # one record a datagram, until stoppe
 START_BUFFERED = _REQUEST.pack(_HEADER, 0x0003, 0)  # as many records a datagram as the box is set to
 
 READ_WRENCH = bytes(20)  # commands of the TCP port
-SET_BIAS = bytes(19) + b"\x01"  # what is felt now reads as zero from then on
+SET_BIAS = bytes(19) + b"\x01"  # the present load reads as zero from then on
 RESET_LATCH = bytes(19) + b"\x02"  # of the monitor condition
 READ_UNITS = b"\x01" + bytes(19)
 _WRENCH = struct.Struct(">HH6h")

@@ -42,7 +42,7 @@ def predict(
     options make no scene, Cancelled where `progress` says so.
     """
     chosen = with_own_finger(options or PredictionOptions(), plan)
-    prepared = prepared_cases(analysis, plan, chosen)
+    prepared, width = prepared_cases(analysis, plan, chosen), template(chosen).finger.width
     rows = [one.row for one in prepared]
     report: Watch = watch or (lambda _number, _row, _way: None)
     for number, one in enumerate(prepared):
@@ -50,8 +50,7 @@ def predict(
             report(number, one.row, None)
     solved = sorted((n for n, one in enumerate(prepared) if one.scene is not None), key=lambda n: (n != first, n))
     scenes = [scene for n in solved if (scene := prepared[n].scene) is not None]
-    # A depth is matched on the small-strain finger, whose answer at finite strain would be another one.
-    small = chosen.kinematics == "small"
+    small = chosen.kinematics == "small"  # a depth is matched on its finger, which finite strain would put elsewhere
     measured = [prepared[n].row.measured_normal if small else None for n in solved]
     depths = _depths(scenes, [None if f is None else f / s.finger.width for f, s in zip(measured, scenes, strict=True)])
     ways: dict[int, Way] = {}
@@ -79,8 +78,8 @@ def predict(
     return SessionPrediction(
         simulated=analysis.simulated,
         trials=tuple(rows),
-        width=template(chosen).finger.width,
-        width_origin="assumed" if template(chosen).finger.width == Finger().width else "set",
+        width=width,
+        width_origin="assumed" if width == Finger().width else "set",
         options=chosen,
         decisions=analysis.decisions,
         area=analysis.settings.area,

@@ -75,7 +75,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What was felt in one stroke; m instants. mu is None where too little normal force makes it meaningless."""
+    """The forces of one stroke; m instants. mu is None where too little normal force makes it meaningless."""
 
     origin: float  # contact onset, or the recording's beginning where it begins in contact [s, device time]
     time: Numbers  # since `origin` [s]

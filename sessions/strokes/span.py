@@ -106,7 +106,7 @@ class Span:
     """n sound readings; bad ones are left out."""
 
     time: Array  # (n,) [s, device time]
-    wrench: Array  # (n, 6) face frame, as felt, not zeroed [N, N mm]
+    wrench: Array  # (n, 6) face frame, as measured, not zeroed [N, N mm]
     smooth: Array  # (n, 6) the same, filtered; nan in stretches too short for the filter
     rate: float  # [Hz]
     filtered: str  # what the filter did

@@ -118,10 +118,9 @@ def solve_active_set(
 ) -> int:
     """Solve the skin's system of contact, changing `states` up to `rounds` times until none contradicts the solution.
 
-    That is the contact of the linearised body, exact where the rounds suffice. Where there is a `compliance`, as of
-    `CondensedBody`, what is unknown are forces, fewer than steps. Filled: the reactions of `states`, and `system` with
-    its `steps`, the first that to equilibrium, the others where steps are unknown. Returns the number of systems
-    solved, UNSETTLED or SINGULAR.
+    Exact for the linearised body where the rounds suffice. With a `compliance`, forces are unknown, fewer than steps.
+    Filled: reactions of `states`, and `steps` of `system`, but only that to equilibrium where forces are unknown.
+    Returns the number of systems solved, UNSETTLED or SINGULAR.
     """
     size, steps, motion = states.state.shape[0], system.steps, system.motion
     sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # how the force of the surface follows steps, or forces
@@ -148,8 +147,7 @@ def solve_active_set(
         take_answer(system, count, by_forces, states, load.mu, answer)
         stuck, dragged = count_in(states.state, STICK) > 0, control.kind == DRAG_GIVEN
         if dragged and not stuck and may_hold and turn < control.rounds:
-            # a body that is free along x needs a node that holds it: all are asked again, one by one
-            hold(states.state)
+            hold(states.state)  # free along x, the body needs a node that holds it: all are asked again, one by one
             may_hold, one_by_one = False, True
             continue
         regular = balance(states.state, sums, loads, answer, control, stuck, motion)
@@ -157,12 +155,9 @@ def solve_active_set(
             regular &= follow(compliance, answer, untouched, steps, states.reaction)
         else:
             regular &= resist(body, steps, states.reaction)
-        if not regular:
-            return SINGULAR
-        if turn == control.rounds:
-            break
-        loose = dragged and not stuck  # nothing holds the body along x: then it may have gone anywhere
-        look_ahead(position, steps, motion, loose, ahead, above, slip)
+        if not regular or turn == control.rounds:
+            return UNSETTLED if regular else SINGULAR
+        look_ahead(position, steps, motion, dragged and not stuck, ahead, above, slip)
         bounded_length(ahead, skin, states.state, load.mu, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1

@@ -345,7 +345,7 @@ def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool
 def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
     """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
 
-    A low bound with a large coefficient of friction is felt where hardly anything presses: there slip is a bad guess.
+    A low bound with a large coefficient of friction acts where hardly anything presses: there slip is a bad guess.
     Raises NotConverged.
     """
     bare = settled(newton, load._replace(mu=0.0), None, tolerance)

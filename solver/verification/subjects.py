@@ -49,5 +49,5 @@ SUBJECTS = (
     Subject("orders", "orders of convergence", 20.0, 1.3, orders.measure),
     Subject("growth", "growth with the unknowns", 12.0, 1.2, growth.measure),
     Subject("hard_cases", "hard cases", 35.0, 2.0, hard_cases.measure),
-    Subject("targets", "what was asked of the speed", 0.0, 0.0, targets.measure),
+    Subject("targets", "targets of speed", 0.0, 0.0, targets.measure),
 )

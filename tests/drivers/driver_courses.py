@@ -174,7 +174,7 @@ class Metronome:
 
 
 def uninterrupted(run, whole=lambda _: True):
-    """Return what `run` returns; it runs again where the machine stood still meanwhile, or what came is not `whole`."""
+    """Return what `run` returns; it runs again where the machine stood still, no device answered, or not `whole`."""
     for _ in range(AGAIN):
         try:
             with Metronome() as metronome:

@@ -1,7 +1,7 @@
 """Measure on this machine how fast the solver is and how true, and write one page of it.
 
-Time against true error, estimates against true errors, orders of convergence, hard cases, costs, and whether what is
-asked of the speed is met. Ctrl-C stops it and keeps what was measured until then. Run it while nothing else runs.
+Time against true error, estimates against true errors, orders of convergence, hard cases, costs, and whether targets of
+speed are met. Ctrl-C stops it and keeps what was measured until then. Run it while nothing else runs.
 """
 
 import argparse

@@ -40,7 +40,7 @@ class Group:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """One table, with what must be read beside it."""
+    """One table with its caption and notes."""
 
     name: str  # its anchor on the page
     caption: str
