@@ -1,16 +1,9 @@
 """Forces at the stimulus's face: the wrench in the face frame, its zero-phase filter, ratio and centre of pressure.
 
-Filter and peaks are SciPy's compiled loops. They are loaded without the rest of `scipy.signal`, whose import takes ten
-times as long as the analysis of a session. A SciPy that is laid out otherwise is asked by its front door.
+Filter and peaks stand here since `scipy.signal` takes ten times as long to load as a session to analyse.
 """
 
-import sys
 from dataclasses import dataclass
-from functools import cache
-from importlib.machinery import PathFinder
-from importlib.util import find_spec, module_from_spec
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,56 +17,44 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     """Return values (n, k) through a second-order Butterworth low-pass, forwards and then backwards.
 
     One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are
-    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
+    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them. The
+    recursion y[i] + a y[i-1] + b y[i-2] = g (x[i] + 2 x[i-1] + x[i-2]) is a triangular system with three diagonals.
     """
+    from scipy.linalg.lapack import dtbtrs  # slow to load, and the window's live feed has no need of it
+
     bent = float(np.tan(np.pi * cut_off / rate))
     whole = 1.0 + np.sqrt(2.0) * bent + bent * bent
     gain = bent * bent / whole
-    back, further = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
-    sections = np.array([[gain, 2.0 * gain, gain, 1.0, back, further]])
-    compiled = _compiled("_sosfilt", "_sosfilt")
-    if compiled is None:
-        from scipy import signal
-
-        return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
+    a, b = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
     first, last = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    rows = np.ascontiguousarray(np.concatenate([first, values, last]).T)  # (k, n + 2 padding), filtered in place
-    settled = np.array([1.0 - gain, gain - further])  # what the filter holds of a value that never changed
+    rows = np.concatenate([first, values, last])
+    diagonals = np.tile([[1.0], [a], [b]], len(rows))
     for _ in range(2):
-        compiled(sections, rows, (rows[:, :1] * settled)[:, None, :])
-        rows = np.ascontiguousarray(rows[:, ::-1])
-    return rows.T[padding : len(rows[0]) - padding]
+        before = np.concatenate([rows[:1], rows[:1], rows])
+        right = gain * (before[2:] + 2.0 * before[1:-1] + before[:-2])
+        right[:2] -= np.array([[a + b], [b]]) * rows[0]  # as if the first reading had stood for ever
+        rows = dtbtrs(diagonals, right, uplo="L", diag="U")[0][::-1]
+    return rows[padding : len(rows) - padding]
 
 
 def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:
-    """Return where values (n,) are greatest among their neighbours (p,), and how far each stands out of them (p,)."""
-    maxima, prominences = (_compiled("_peak_finding_utils", name) for name in ("_local_maxima_1d", "_peak_prominences"))
-    if maxima is None or prominences is None:
-        from scipy import signal
+    """Return where values (n,) are greatest among their neighbours (p,), and how far each stands out of them (p,).
 
-        places, properties = signal.find_peaks(values, prominence=0.0)
-        return places, properties["prominences"]
-    places = maxima(values)[0]
-    return places, prominences(values, places, -1)[0]
+    A flat top counts once, in its middle. It stands out of the higher of the least values between it and what exceeds
+    it on each side, or the end.
+    """
+    firsts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    lasts = np.append(firsts[1:], len(values)) - 1
+    level = values[firsts]
+    top = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))
+    places = (firsts[top] + lasts[top]) // 2
 
+    def base(side: Array, peak: float) -> float:
+        higher = np.flatnonzero(side > peak)
+        return float(side[: higher[0] if len(higher) else None].min())
 
-@cache
-def _compiled(module: str, function: str) -> Any:  # noqa: ANN401 - compiled, without types
-    """Return a compiled function of `scipy.signal`, None where this SciPy has it elsewhere."""
-    name = f"scipy.signal.{module}"
-    if name not in sys.modules:
-        package = find_spec("scipy")
-        folder = Path(package.origin).parent / "signal" if package is not None and package.origin else Path()
-        spec = PathFinder.find_spec(name, [str(folder)])
-        if spec is None or spec.loader is None:
-            return None
-        loaded = module_from_spec(spec)
-        try:
-            spec.loader.exec_module(loaded)
-        except ImportError:  # a SciPy whose libraries it must find first
-            return None
-        sys.modules[name] = loaded
-    return getattr(sys.modules[name], function, None)
+    bases = [max(base(values[at::way], float(values[at])) for way in (-1, 1)) for at in places.tolist()]
+    return places, values[places] - np.array(bases)
 
 
 _AXES = {"x": 0, "y": 1, "z": 2}

@@ -74,7 +74,7 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
     neighbours = steps[~broken]
     spread = np.ptp(np.percentile(neighbours, [2, 98])) if len(neighbours) else np.inf
     even = bool(not another and spread <= settings.signal.uneven * step)
-    segments = _segments(good, broken)
+    stretches = segments(good, broken)
     dead = tuple(
         name
         for name, column in zip(_AXIS_NAMES, block.raw[good].T, strict=True)
@@ -92,21 +92,19 @@ def signal_quality(block: ReadingBlock, info: TransducerInfo, settings: Analysis
         even,
         good,
         saturated,
-        tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(segments)),
-        segments,
+        tuple(_gap(a, b, block.time, frozen, saturated, wild) for a, b in pairwise(stretches)),
+        stretches,
         dead,
         flaws,
     )
 
 
-def _segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
-    """Return the stretches of good readings between which `broken` (n - 1,) marks no step."""
-    starts = good & ~np.concatenate([[False], good[:-1] & ~broken])
-    stops = good & ~np.concatenate([good[1:] & ~broken, [False]])
-    return tuple(
-        slice(int(start), int(stop) + 1)
-        for start, stop in zip(np.flatnonzero(starts), np.flatnonzero(stops), strict=True)
-    )
+def segments(good: Mask, broken: Mask) -> tuple[slice, ...]:
+    """Return the stretches of good readings (n,) within which `broken` (n - 1,) marks no step."""
+    joined = good[1:] & good[:-1] & ~broken
+    starts = np.flatnonzero(good & ~np.concatenate([[False], joined]))
+    stops = np.flatnonzero(good & ~np.concatenate([joined, [False]])) + 1
+    return tuple(slice(start, stop) for start, stop in zip(starts.tolist(), stops.tolist(), strict=True))
 
 
 def _gap(before: slice, after: slice, time: Array, frozen: Mask, saturated: Mask, wild: Mask) -> Gap:

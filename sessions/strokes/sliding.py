@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.plan.plan import Frame
 from sessions.strokes.settings import AnalysisSettings, SteadySettings
 from sessions.strokes.span import Span, Track, mean_vector
 from sessions.strokes.stroke import COEFFICIENTS, DIRECTION, SPEED, Findings, FlawName
@@ -147,8 +146,6 @@ def slide(
     findings: Findings,
     span: Span,
     track: Track,
-    frame: Frame,
-    settings: AnalysisSettings,
     decided: tuple[float, float] | None = None,
     uncut: Track | None = None,
 ) -> slice | None:
@@ -157,18 +154,18 @@ def slide(
     A window that a person `decided` [s, device clock] is taken; what speaks against it is named. `uncut` is the contact
     that turns cut the stroke out of.
     """
-    window = None
+    window, settings = None, track.settings
     if decided is not None:
-        window = _decided_window(track, decided, settings.steady.steady_readings)
+        window = _decided_window(track, decided)
     elif np.isfinite(track.speed).any():
         limit = settings.slide.sliding_share * float(np.nanpercentile(track.speed, 90))
         sliding = np.where(track.speed >= limit, track.ratio, np.nan)
         window = steady_window(sliding, track.rate, len(track.time), settings)
-    motion, trouble = _speed(span, track, window, frame, settings)
+    motion, trouble = _speed(span, track, window)
     if trouble is not None and decided is None:  # the centre of pressure does not tell when the finger slides
         window = steady_window(track.ratio, track.rate, len(track.time), settings)
-        motion, trouble = _speed(span, track, window, frame, settings)
-    at_rest = _rest(span, track, track if uncut is None else uncut, window, settings)
+        motion, trouble = _speed(span, track, window)
+    at_rest = _rest(span, track, track if uncut is None else uncut, window)
     if window is not None and at_rest is not None and decided is not None:
         sentence = f"{at_rest[1]} The window was decided by a person: its numbers are given."
         findings.flaw(at_rest[0], sentence, "doubtful")
@@ -187,38 +184,37 @@ def slide(
         findings.flaw(trouble[0], trouble[1], "doubtful", SPEED)
     elif motion is not None:
         findings.numbers |= {"speed": motion.speed, "speed_error": motion.error}
-        _slide_onset(findings, track, motion, settings)
-    _direction(findings, track, window, motion if trouble is None else None, settings.slide.along_share)
+        _slide_onset(findings, track, motion)
+    _direction(findings, track, window, motion if trouble is None else None)
     if trouble is None and motion is not None:
-        _side_load(findings, track, window, motion, settings)
+        _side_load(findings, track, window, motion)
     return window
 
 
-def _decided_window(track: Track, decided: tuple[float, float], fewest: int) -> slice | None:
+def _decided_window(track: Track, decided: tuple[float, float]) -> slice | None:
     """Return the readings between two instants; None where too few of them have a ratio."""
     start = int(np.searchsorted(track.time, decided[0] - _ROUNDING))
     stop = int(np.searchsorted(track.time, decided[1] + _ROUNDING, "right"))
-    return slice(start, stop) if np.isfinite(track.ratio[start:stop]).sum() >= fewest else None
+    enough = np.isfinite(track.ratio[start:stop]).sum() >= track.settings.steady.steady_readings
+    return slice(start, stop) if enough else None
 
 
-def _rest(
-    span: Span, track: Track, uncut: Track, window: slice | None, settings: AnalysisSettings
-) -> tuple[FlawName, str] | None:
+def _rest(span: Span, track: Track, uncut: Track, window: slice | None) -> tuple[FlawName, str] | None:
     """Say why nothing shows that the contact slides over a window, or None where it does."""
     if window is None:
         return None
-    position = track.position[window]
+    position, limits = track.position[window], track.settings.slide
     way = displacement(position)
     step = span.torque_step / float(np.nanmean(track.normal[window]))
     if np.isfinite(way):
         where = float(np.nanmedian(np.hypot(position[:, 0], position[:, 1])))
-        if where > settings.slide.farthest:
+        if where > limits.farthest:
             return FlawName.UNITS_IMPLAUSIBLE, (
                 f"The centre of pressure lies {where:.3g} mm from the axis, where no finger is: check the units of the "
                 "torques and the face's height; nothing shows that the contact slides, so no friction is given."
             )
-        if way > max(settings.slide.shear, settings.slide.shear_steps * step):
-            return _rolled(track, uncut, float(np.nanmean(track.ratio[window])), settings)
+        if way > max(limits.shear, limits.shear_steps * step):
+            return _rolled(track, uncut, float(np.nanmean(track.ratio[window])))
     moves = f"moves by {way:.2g} mm" if np.isfinite(way) else "is not known"
     return FlawName.NO_STEADY_SLIDING, (
         f"T/N holds steady for a while, but the centre of pressure {moves} meanwhile: nothing shows that the contact "
@@ -226,12 +222,13 @@ def _rest(
     )
 
 
-def _rolled(track: Track, uncut: Track, level: float, settings: AnalysisSettings) -> tuple[FlawName, str] | None:
+def _rolled(track: Track, uncut: Track, level: float) -> tuple[FlawName, str] | None:
     """Say that the centre of pressure moves no further than a finger rolls, or None where it does.
 
     It counts over the `uncut` contact, turns included, and only where T/N lies about its `level` in the steady window:
     a contact slips nowhere below that.
     """
+    settings = track.settings
     at_level = np.abs(uncut.ratio - level) <= 2.0 * settings.steady.steady_spread * level
     places = block_means(np.where(at_level[:, None], uncut.position, np.nan), track.rate, settings)
     way = float(np.hypot(*np.ptp(places, axis=0))) if len(places) else 0.0
@@ -243,31 +240,26 @@ def _rolled(track: Track, uncut: Track, level: float, settings: AnalysisSettings
     )
 
 
-def _speed(
-    span: Span, track: Track, window: slice | None, frame: Frame, settings: AnalysisSettings
-) -> tuple[Movement | None, tuple[FlawName, str] | None]:
+def _speed(span: Span, track: Track, window: slice | None) -> tuple[Movement | None, tuple[FlawName, str] | None]:
     """Return the movement over a window, and why it gives no speed, None where it does."""
     name = FlawName.SPEED_NOT_MEASURABLE
     if window is None:
         return None, (name, "")
-    time, limits = track.time[window], settings.slide
+    time, settings, limits = track.time[window], track.settings, track.settings.slide
     motion = movement(time, track.position[window], track.rate, settings)
     if motion is None:
         return None, (name, "The centre of pressure is known at too few instants of the steady window for a speed.")
     step = span.torque_step / float(np.nanmean(track.normal[window]))
-    what = f"moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s"
+    why = ""
     if step > limits.speed_step * (motion.speed * float(time[-1] - time[0])):
-        sentence = f"The torques come in steps that move the centre of pressure by {step:.2g} mm: no speed is given."
-        return motion, (name, sentence)
-    if motion.error > limits.speed_error * motion.speed:
-        return motion, (name, f"The centre of pressure {what}: no speed is given.")
-    if motion.explained < limits.speed_line:
-        share = f"{100 * motion.explained:.0f} %"
-        return motion, (
-            name,
-            f"A straight line explains {share} of the centre of pressure's movement: no speed is given.",
-        )
-    if frame.height_origin == "default":
+        why = f"The torques come in steps that move the centre of pressure by {step:.2g} mm"
+    elif motion.error > limits.speed_error * motion.speed:
+        why = f"The centre of pressure moves at {motion.speed:.2g} ± {motion.error:.2g} mm/s"
+    elif motion.explained < limits.speed_line:
+        why = f"A straight line explains {100 * motion.explained:.0f} % of the centre of pressure's movement"
+    if why:
+        return motion, (name, f"{why}: no speed is given.")
+    if span.frame.height_origin == "default":
         arm = -track.wrench[window, :2] / track.normal[window, None]
         lever = movement(time, arm, track.rate, settings)
         wrong = limits.height_doubt * (lever.speed if lever else 0.0)
@@ -280,22 +272,22 @@ def _speed(
     return motion, None
 
 
-def _slide_onset(findings: Findings, track: Track, motion: Movement, settings: AnalysisSettings) -> None:
+def _slide_onset(findings: Findings, track: Track, motion: Movement) -> None:
     """Give the first instant from which the centre of pressure keeps a share of its steady speed."""
     start = int(np.searchsorted(track.time, float(findings.numbers["steady"][0])))
-    slow = ~(track.speed[: start + 1] >= settings.slide.slide_share * motion.speed)
+    slow = ~(track.speed[: start + 1] >= track.settings.slide.slide_share * motion.speed)
     first = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
     if first <= start:
         findings.numbers["slide_onset"] = float(track.time[first])
 
 
-def _side_load(findings: Findings, track: Track, window: slice, motion: Movement, settings: AnalysisSettings) -> None:
+def _side_load(findings: Findings, track: Track, window: slice, motion: Movement) -> None:
     """Name a drag that does not lie along the movement: friction alone opposes it."""
     drag = mean_vector(track.wrench[window, :2])
     along = np.array(motion.along) / motion.speed
     across = float(abs(drag[0] * along[1] - drag[1] * along[0]))
     share = across / float(np.hypot(*drag))
-    if share > settings.slide.side_load:
+    if share > track.settings.slide.side_load:
         sentence = (
             f"{100 * share:.0f} % of the tangential force lies across the finger's movement: a load from the side, a "
             "face that leans, or axes that are turned; T/N holds it, and friction along the movement is less."
@@ -303,12 +295,9 @@ def _side_load(findings: Findings, track: Track, window: slice, motion: Movement
         findings.flaw(FlawName.SIDE_LOAD, sentence, "doubtful")
 
 
-def _direction(findings: Findings, track: Track, window: slice, motion: Movement | None, share: float) -> None:
-    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves.
-
-    Either must lie along x by a `share` of its length.
-    """
-    drag = mean_vector(track.wrench[window, :2])
+def _direction(findings: Findings, track: Track, window: slice, motion: Movement | None) -> None:
+    """Give the direction along x: from the movement, else from the drag, which points the way the finger moves."""
+    drag, share = mean_vector(track.wrench[window, :2]), track.settings.slide.along_share
     by_drag = int(np.sign(drag[0])) if abs(drag[0]) >= share * np.hypot(*drag) else None
     by_movement = None
     if motion is not None and abs(motion.along[0]) >= share * motion.speed:

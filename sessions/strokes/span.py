@@ -12,7 +12,7 @@ from sessions.strokes.contacts import Contact
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, level
 from sessions.strokes.onset import NORMAL_STEP, onset_threshold
 from sessions.strokes.settings import AnalysisSettings
-from sessions.strokes.signal_quality import SignalQuality
+from sessions.strokes.signal_quality import SignalQuality, segments
 from sessions.strokes.stroke import FlawName, StrokeCurve
 
 Array = NDArray[np.float64]
@@ -114,6 +114,8 @@ class Span:
     quality: SignalQuality
     saturated_at: Array  # times of readings left out because they were saturated [s]
     torque_step: float  # least step of a torque [N mm]; 0 where it is too fine to matter
+    frame: Frame  # of the face, in which the wrench is
+    settings: AnalysisSettings
 
 
 def span_of(
@@ -142,6 +144,8 @@ def span_of(
         sound,
         block.time[sound.saturated],
         _least_step(wrench[:, 3:]),
+        frame,
+        settings,
     )
 
 
@@ -164,20 +168,20 @@ class StrokeZero:
     filtered: Array  # (3,) noise of the filtered forces [N]
     lasts: float  # of what the noise was estimated from [s]
     error: Array  # (6,) standard uncertainty of the level during the stroke [N, N mm]
-    origin: str  # where it came from, for people
-    drift: Array | None  # (6,) after minus before; None where one of the two was not seen
-    unsure: tuple[float, float]  # how far unloaded forces near the stroke lie from it: sideways, along the normal [N]
-    flaw: FlawName | None
+    origin: str = ""  # where it came from, for people
+    drift: Array | None = None  # (6,) after minus before; None where one of the two was not seen
+    unsure: tuple[float, float] = (0.0, 0.0)  # how far unloaded forces near it lie off: sideways, along the normal [N]
+    flaw: FlawName | None = None
 
 
-def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSettings) -> StrokeZero | None:
+def zero_for(span: Span, contact: Contact, idle: Mask) -> StrokeZero | None:
     """Return the zero for a stroke from the unloaded stretches around it; None where there is none.
 
     `idle` (n,) marks the readings in which nothing presses.
     """
-    onset, lift = contact.onset, contact.lift
-    before = None if onset is None else span.windows.before(onset, settings.zero.zero_stretch)
-    after = None if lift is None else span.windows.after(lift, settings.zero.zero_stretch)
+    onset, lift, longest = contact.onset, contact.lift, span.settings.zero.zero_stretch
+    before = None if onset is None else span.windows.before(onset, longest)
+    after = None if lift is None else span.windows.after(lift, longest)
     zero = before or after
     if zero is None:
         return None
@@ -194,18 +198,16 @@ def zero_for(span: Span, contact: Contact, idle: Mask, settings: AnalysisSetting
         origin = f"unloaded before contact, {before.when}"
     else:
         origin, flaw = f"unloaded after contact, {zero.when}", FlawName.ZERO_AFTER_CONTACT
-    unsure = _unsure(span, contact, idle, level, drift, settings)
+    unsure = _unsure(span, contact, idle, level, drift)
     part = (span.time >= zero.start) & (span.time <= zero.stop)
     filtered = np.nanstd(span.smooth[part, :3], axis=0)
     return StrokeZero(level, zero.noise, filtered, zero.stop - zero.start, error, origin, drift, unsure, flaw)
 
 
-def _unsure(
-    span: Span, contact: Contact, idle: Mask, level: Array, drift: Array | None, settings: AnalysisSettings
-) -> tuple[float, float]:
+def _unsure(span: Span, contact: Contact, idle: Mask, level: Array, drift: Array | None) -> tuple[float, float]:
     """Return how far from a zero the forces lie near a contact where nothing presses, and in the valleys beside it."""
-    first, last = span.time[contact.start], span.time[contact.stop - 1]
-    near = idle & (span.time >= first - settings.zero.near) & (span.time <= last + settings.zero.near)
+    first, last, around = span.time[contact.start], span.time[contact.stop - 1], span.settings.zero.near
+    near = idle & (span.time >= first - around) & (span.time <= last + around)
     near[list(contact.valleys)] = True
     away = span.smooth[near, :3] - level[:3]
     away = away[np.isfinite(away).all(axis=1)]
@@ -222,7 +224,7 @@ def recorded_zero(span: Span, *, stated: bool) -> StrokeZero:
     noise = NORMAL_STEP * np.median(steps, axis=0) if len(steps) else np.zeros(6)
     origin = "as recorded, stated to be true" if stated else "as recorded, unknown"
     flaw = None if stated else FlawName.NO_UNLOADED_STRETCH
-    return StrokeZero(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, None, (0.0, 0.0), flaw)
+    return StrokeZero(np.zeros(6), noise, noise[:3], 0.0, np.zeros(6), origin, flaw=flaw)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,22 +240,25 @@ class Track:
     speed: Array  # (n,) of the centre of pressure [mm/s]
     floor: float  # [N]
     rate: float  # [Hz]
+    settings: AnalysisSettings
 
 
-def track_of(span: Span, contact: Contact, zero: StrokeZero, height: float, settings: AnalysisSettings) -> Track:
+def track_of(span: Span, contact: Contact, zero: StrokeZero) -> Track:
     """Return the readings of a contact, zeroed, with what follows from them."""
     part = slice(contact.start, contact.stop)
     wrench = span.smooth[part] - zero.level
     normal = -wrench[:, 2]
     peak = float(np.nanmax(normal, initial=0.0))
-    floor = max(settings.ratio.force_floor, settings.ratio.force_floor_share * peak)
+    limits = span.settings.ratio
+    floor = max(limits.force_floor, limits.force_floor_share * peak)
     tangential = np.hypot(wrench[:, 0], wrench[:, 1])
     ratio = friction_ratio(wrench, floor)
-    position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, height), np.nan)
+    position = np.where(np.isfinite(ratio)[:, None], centre_of_pressure(wrench, span.frame.height), np.nan)
     if any(name.startswith("T") for name in span.quality.dead):
         position = np.full_like(position, np.nan)
-    speed = _speed(span.time[part], position, span, settings)
-    return Track(span.time[part], wrench, normal, tangential, ratio, position, speed, floor, span.rate)
+    speed = _speed(span.time[part], position, span)
+    columns = (span.time[part], wrench, normal, tangential, ratio, position, speed)
+    return Track(*columns, floor, span.rate, span.settings)
 
 
 def mean_vector(vectors: Array) -> Array:
@@ -261,19 +266,16 @@ def mean_vector(vectors: Array) -> Array:
     return np.asarray(np.nanmean(vectors, axis=0), np.float64)
 
 
-def _speed(time: Array, position: Array, span: Span, settings: AnalysisSettings) -> Array:
+def _speed(time: Array, position: Array, span: Span) -> Array:
     """Return the speed (n,) [mm/s] of a position (n, 2) [mm], filtered within each unbroken stretch."""
     speed = np.full(len(time), np.nan)
-    smoother = Filter(settings.filter.speed_cut_off, settings.filter.shortest_segment)
-    finite = np.isfinite(position[:, 0]) & np.isfinite(position[:, 1])
-    joined = finite[1:] & finite[:-1] & (np.diff(time) < settings.signal.missing_step / span.rate)
-    starts = np.flatnonzero(finite & ~np.concatenate([[False], joined]))
-    stops = np.flatnonzero(finite & ~np.concatenate([joined, [False]])) + 1
-    for start, stop in zip(starts, stops, strict=True):
-        if stop - start < 3:
-            continue
-        part = slice(int(start), int(stop))
+    limits = span.settings
+    smoother = Filter(limits.filter.speed_cut_off, limits.filter.shortest_segment)
+    broken = ~(np.diff(time) < limits.signal.missing_step / span.rate)
+    for part in segments(np.isfinite(position[:, 0]) & np.isfinite(position[:, 1]), broken):
         path = position[part]
+        if len(path) < 3:
+            continue
         if span.quality.even and smoother.fits(span.rate):
             path = smoother.apply(path, span.rate, [slice(0, len(path))])
         velocity = np.gradient(path, time[part], axis=0)
@@ -293,21 +295,15 @@ def noise_of_ratio(zero: StrokeZero, level: float, normal: float) -> float:
     return float(np.hypot(sideways, level * float(zero.noise[2]))) / normal
 
 
-def curve_of(
-    span: Span,
-    contact: Contact,
-    zero: StrokeZero,
-    height: float,
-    settings: AnalysisSettings,
-    missed: float | None = None,
-) -> StrokeCurve:
+def curve_of(span: Span, contact: Contact, zero: StrokeZero, missed: float | None = None) -> StrokeCurve:
     """Return the stroke's course with some time around it.
 
     `missed` [N] is how far readings may miss the greatest force of a contact that sticks and slips, None of another.
     """
-    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - settings.contact.curve_before))
-    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + settings.contact.curve_after))
-    track = track_of(span, Contact(first, last, None, None), zero, height, settings)
+    around = span.settings.contact
+    first = int(np.searchsorted(span.time, float(span.time[contact.start]) - around.curve_before))
+    last = int(np.searchsorted(span.time, float(span.time[contact.stop - 1]) + around.curve_after))
+    track = track_of(span, Contact(first, last, None, None), zero)
     force = track.wrench[:, :2]
     dragging, unfiltered = unfiltered_forces(span, slice(first, last), zero)
     columns = (track.time, track.normal, unfiltered, track.tangential, force, track.ratio, track.position, track.speed)

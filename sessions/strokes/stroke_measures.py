@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.strokes.contacts import Contact
 from sessions.strokes.decisions import StrokeDecisions
-from sessions.strokes.settings import AnalysisSettings
+from sessions.strokes.settings import ZeroSettings
 from sessions.strokes.sliding import slide
 from sessions.strokes.span import (
     Span,
@@ -35,7 +35,6 @@ def measure_stroke(
     contact: Contact,
     zero: StrokeZero,
     plan: SessionPlan,
-    settings: AnalysisSettings,
     trial: Trial | None = None,
     number: int = 1,
     decided: StrokeDecisions | None = None,
@@ -44,29 +43,28 @@ def measure_stroke(
 
     `number` is that of the stroke within its trial; what was `decided` of it goes before what is found.
     """
-    findings, frame, missed = Findings(), plan.frame, None
-    decided = decided or StrokeDecisions({})
-    track = track_of(span, contact, zero, frame.height, settings)
-    _judge_ends(findings, contact, track, settings)
+    findings, missed, decided = Findings(), None, decided or StrokeDecisions({})
+    track = track_of(span, contact, zero)
+    _judge_ends(findings, contact, track)
     _judge_zero(findings, zero, track)
     if zero.flaw is not FlawName.NO_UNLOADED_STRETCH:
-        _judge_gaps(findings, span, contact, settings)
-        _judge_loads(findings, track, plan.contact_area, settings)
+        _judge_gaps(findings, span, contact)
+        _judge_loads(findings, track, plan.contact_area)
         uncut = None
         if contact.uncut is not None:
             first, last = contact.uncut
-            uncut = track_of(span, replace(contact, start=first, stop=last), zero, frame.height, settings)
-        window = slide(findings, span, track, frame, settings, decided.value("steady"), uncut)
+            uncut = track_of(span, replace(contact, start=first, stop=last), zero)
+        window = slide(findings, span, track, decided.value("steady"), uncut)
         if (onset := decided.instant("slide_onset")) is not None:
             findings.numbers["slide_onset"] = onset
         if window is not None:
-            missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area, settings)
+            missed = _stick_slip(findings, span, contact, track, window, zero, plan.contact_area)
             _friction(findings, track, window)
-            _static_peak(findings, track, window, zero, settings, turned=contact.start in contact.reversals)
-            _break_away(findings, track, window, settings)
-            _judge_way(findings, track, window, settings)
+            _static_peak(findings, track, window, zero, turned=contact.start in contact.reversals)
+            _break_away(findings, track, window)
+            _judge_way(findings, track, window)
         _take_decided(findings, track, decided)
-        _judge_drift(findings, zero, settings)
+        _judge_drift(findings, zero, track.settings.zero)
     numbers = dict(findings.allowed(EVERYTHING))
     if trial is not None and numbers["direction"] not in (None, trial.direction):
         way = "proximal to distal" if trial.direction == PROXIMAL_TO_DISTAL else "distal to proximal"
@@ -81,17 +79,17 @@ def measure_stroke(
         zero_drift=None if zero.drift is None else float(np.linalg.norm(zero.drift[:3])),
         flaws=tuple(dict.fromkeys(str(flaw.name) for flaw in findings.flaws)),
         reasons=dict(findings.reasons),
-        area_exponent=settings.area.exponent,
+        area_exponent=track.settings.area.exponent,
         number=number,
         kept=decided.kept,
         decided=decided.sentences,
-        curve=curve_of(span, contact, zero, frame.height, settings, missed),
+        curve=curve_of(span, contact, zero, missed),
         **numbers,
     )
     return stroke, tuple(findings.flaws)
 
 
-def _judge_ends(findings: Findings, contact: Contact, track: Track, settings: AnalysisSettings) -> None:
+def _judge_ends(findings: Findings, contact: Contact, track: Track) -> None:
     if contact.onset is None:
         sentence = "The recording begins in contact: no onset, and what came before is not known."
         findings.flaw(FlawName.BEGINS_IN_CONTACT, sentence, "doubtful")
@@ -110,9 +108,9 @@ def _judge_ends(findings: Findings, contact: Contact, track: Track, settings: An
         )
         findings.flaw(FlawName.TURNED, sentence, "note")
     peak = float(np.nanmax(track.normal, initial=0.0))
-    pressed = np.flatnonzero(track.normal >= settings.ratio.force_floor_share * peak)
+    pressed = np.flatnonzero(track.normal >= track.settings.ratio.force_floor_share * peak)
     crept = float(track.time[pressed[0]]) - contact.onset if contact.onset is not None and len(pressed) else 0.0
-    if crept > settings.contact.slow_onset:
+    if crept > track.settings.contact.slow_onset:
         sentence = (
             f"The force crept for {crept:.2f} s from leaving its zero to a fifth of its peak: the onset marks where it "
             "left, which may not be the touch."
@@ -133,7 +131,7 @@ def _judge_zero(findings: Findings, zero: StrokeZero, track: Track) -> None:
         findings.flaw(zero.flaw, sentence, "doubtful")
 
 
-def _judge_gaps(findings: Findings, span: Span, contact: Contact, settings: AnalysisSettings) -> None:
+def _judge_gaps(findings: Findings, span: Span, contact: Contact) -> None:
     """Withhold peaks that missing readings may hide."""
     first, last = span.time[contact.start], span.time[contact.stop - 1]
     if ((span.saturated_at >= first) & (span.saturated_at <= last)).any():
@@ -141,7 +139,7 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact, settings: Anal
         findings.flaw(FlawName.SATURATED, sentence, "doubtful", PEAKS)
     inside = [gap for gap in span.quality.gaps if first <= gap.start and gap.stop <= last]
     widest = max(inside, key=lambda gap: gap.stop - gap.start, default=None)
-    if widest is not None and widest.stop - widest.start > settings.contact.longest_gap + 1.0 / span.rate:
+    if widest is not None and widest.stop - widest.start > span.settings.contact.longest_gap + 1.0 / span.rate:
         sentence = (
             f"No sound readings from {widest.start:.2f} to {widest.stop:.2f} s of this stroke ({widest.cause}), which "
             "may hide its peaks."
@@ -154,13 +152,13 @@ def _judge_gaps(findings: Findings, span: Span, contact: Contact, settings: Anal
         findings.flaw(FlawName.WILD, sentence, "doubtful")
 
 
-def _judge_loads(findings: Findings, track: Track, contact_area: float, settings: AnalysisSettings) -> None:
+def _judge_loads(findings: Findings, track: Track, planned: float) -> None:
     """Give the greatest forces, and say where they are implausible."""
-    peak = float(np.nanmax(track.normal, initial=0.0))
+    peak, settings = float(np.nanmax(track.normal, initial=0.0)), track.settings
     greatest = float(np.nanmax(track.tangential, initial=0.0))
-    traction, area = _greatest_traction(track, track.tangential, contact_area, settings)
+    traction, area = _greatest_traction(track, track.tangential, planned)
     findings.numbers |= {"peak_normal": peak, "peak_tangential": greatest, "tau_max": traction, "contact_area": area}
-    findings.numbers["mu_max"] = _greatest_ratio(track, track.floor, settings)
+    findings.numbers["mu_max"] = _greatest_ratio(track, track.floor)
     if peak < settings.ratio.force_floor:
         sentence = (
             f"The normal force reaches {peak:.2g} N: below {settings.ratio.force_floor:g} N friction means nothing."
@@ -178,29 +176,29 @@ def _judge_loads(findings: Findings, track: Track, contact_area: float, settings
             "the ratio there; its maximum is that above half the peak."
         )
         findings.flaw(FlawName.RATIO_ABOVE_ONE, sentence, "doubtful", ("mu_static",))
-        findings.numbers["mu_max"] = _greatest_ratio(track, half, settings)
+        findings.numbers["mu_max"] = _greatest_ratio(track, half)
 
 
-def _greatest_traction(
-    track: Track, tangential: Array, planned: float, settings: AnalysisSettings
-) -> tuple[float | None, float | None]:
+def _greatest_traction(track: Track, tangential: Array, planned: float) -> tuple[float | None, float | None]:
     """Return the greatest mean traction [MPa] and the area [mm2] it acts on; None where an area that grows has no N."""
-    if settings.area.law == "fixed":
+    law = track.settings.area
+    if law.law == "fixed":
         return float(np.nanmax(tangential, initial=0.0)) / planned, planned
     pressed = np.flatnonzero(track.normal >= track.floor)
     if not len(pressed):
         return None, None
-    areas = settings.area.area(track.normal[pressed], planned)
+    areas = law.area(track.normal[pressed], planned)
     tractions = tangential[pressed] / areas
     top = int(np.argmax(tractions))
     return float(tractions[top]), float(areas[top])
 
 
-def _greatest_ratio(track: Track, floor: float, settings: AnalysisSettings) -> float | None:
+def _greatest_ratio(track: Track, floor: float) -> float | None:
     """Return the greatest T/N of forces averaged over a moving window, wherever N stays above `floor` [N] in it.
 
     Forces are averaged, not the ratio: noise then raises the maximum far less.
     """
+    settings = track.settings
     length = max(1, round(settings.filter.smoothing * track.rate))
     if len(track.time) < length:
         return None
@@ -232,25 +230,18 @@ def _friction(findings: Findings, track: Track, window: slice) -> None:
 
 
 def _stick_slip(
-    findings: Findings,
-    span: Span,
-    contact: Contact,
-    track: Track,
-    window: slice,
-    zero: StrokeZero,
-    planned: float,
-    settings: AnalysisSettings,
+    findings: Findings, span: Span, contact: Contact, track: Track, window: slice, zero: StrokeZero, planned: float
 ) -> float | None:
     """Tell tau_max by the unfiltered force where the contact sticks and slips; return how far it may be missed [N]."""
     dragging, normal = unfiltered_forces(span, slice(contact.start, contact.stop), zero)
     ratio = np.where(normal >= track.floor, dragging / np.maximum(normal, track.floor), np.nan)
     level, pressing = float(np.nanmean(track.ratio[window])), float(np.nanmean(track.normal[window]))
-    slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, pressing), settings)
+    slips = stick_slip(track.time[window], ratio[window], noise_of_ratio(zero, level, pressing), track.settings)
     if slips is None:
         return None
     missed = slips.missed * pressing
     filtered, unfiltered = findings.numbers["peak_tangential"], float(np.nanmax(dragging))
-    traction, area = _greatest_traction(track, dragging, planned, settings)
+    traction, area = _greatest_traction(track, dragging, planned)
     findings.numbers |= {"tau_max": traction, "contact_area": area, "peak_tangential": unfiltered}
     above = 100 * (unfiltered / filtered - 1.0)
     sentence = (
@@ -262,15 +253,15 @@ def _stick_slip(
     return missed
 
 
-def _judge_drift(findings: Findings, zero: StrokeZero, settings: AnalysisSettings) -> None:
+def _judge_drift(findings: Findings, zero: StrokeZero, limits: ZeroSettings) -> None:
     """Say how far a zero that moves may have changed mu, and withhold the numbers where that is too much."""
     sideways, pressing = zero.unsure
     tangential = findings.numbers.get("tangential_force", findings.numbers["peak_tangential"])
     normal = findings.numbers.get("normal_force", findings.numbers["peak_normal"])
     share = sideways / tangential + pressing / normal if tangential > 0.0 and normal > 0.0 else float("inf")
-    if share <= settings.zero.drift_doubted:
+    if share <= limits.drift_doubted:
         return
-    refused = share > settings.zero.drift_refused
+    refused = share > limits.drift_refused
     sentence = (
         f"With nothing pressing, the forces around this stroke lie {sideways:.2g} N sideways and {pressing:.2g} N "
         f"along the normal from its zero: mu may be wrong by {100 * share:.0f} %"
@@ -279,9 +270,7 @@ def _judge_drift(findings: Findings, zero: StrokeZero, settings: AnalysisSetting
     findings.flaw(FlawName.DRIFT, sentence, "refused" if refused else "doubtful", EVERYTHING if refused else ())
 
 
-def _static_peak(
-    findings: Findings, track: Track, window: slice, zero: StrokeZero, settings: AnalysisSettings, *, turned: bool
-) -> None:
+def _static_peak(findings: Findings, track: Track, window: slice, zero: StrokeZero, *, turned: bool) -> None:
     """Give the static peak where one stands out of what follows it by its noise and by a share.
 
     What follows is both the level just after it and the highest crest of the steady window, for a contact that sticks
@@ -289,7 +278,7 @@ def _static_peak(
     follow that. The filter overshoots a sudden change by 3.5 % of it, which is twice the level where the finger
     `turned`.
     """
-    began = findings.numbers.get("slide_onset", track.time[window.start])
+    settings, began = track.settings, findings.numbers.get("slide_onset", track.time[window.start])
     last = int(np.searchsorted(track.time, float(began + settings.ratio.static_late)))
     before = track.ratio[:last]
     findings.reasons.setdefault("mu_static", _NO_PEAK)
@@ -312,13 +301,13 @@ def _static_peak(
             del findings.reasons["mu_static"]
 
 
-def _break_away(findings: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:
+def _break_away(findings: Findings, track: Track, window: slice) -> None:
     """Give the end of the stick phase, unless the contact slides before it."""
     peaked = "mu_static" in findings.numbers
-    away = break_away(track.time[: window.stop], track.ratio[: window.stop], settings, peaked=peaked)
+    away = break_away(track.time[: window.stop], track.ratio[: window.stop], track.settings, peaked=peaked)
     findings.numbers["break_away"] = away
-    # The speed's filter may tell the onset of a slide early by half of its period.
-    if away is not None and away > findings.numbers.get("slide_onset", np.inf) + 0.5 / settings.filter.speed_cut_off:
+    early = 0.5 / track.settings.filter.speed_cut_off  # its filter may tell the onset of a slide by half of its period
+    if away is not None and away > findings.numbers.get("slide_onset", np.inf) + early:
         findings.reasons["break_away"] = _SLIDES_BEFORE
 
 
@@ -341,20 +330,19 @@ def _take_decided(findings: Findings, track: Track, decided: StrokeDecisions) ->
             findings.reasons.pop(name, None)
 
 
-def _judge_way(findings: Findings, track: Track, window: slice, settings: AnalysisSettings) -> None:
+def _judge_way(findings: Findings, track: Track, window: slice) -> None:
     """Say where the tangential force turns: then there is no one direction, or this is not one stroke.
 
     A finger that rests has hardly a drag, and its noise points anywhere.
     """
-    dragging = np.isfinite(track.ratio) & (
-        track.tangential >= settings.slide.drag_share * np.nanmax(track.tangential, initial=0.0)
-    )
+    limits, greatest = track.settings.slide, np.nanmax(track.tangential, initial=0.0)
+    dragging = np.isfinite(track.ratio) & (track.tangential >= limits.drag_share * greatest)
     way = track.wrench[:, :2] / np.where(dragging, track.tangential, np.nan)[:, None]
     inside = float(np.linalg.norm(mean_vector(way[window])))
     overall = float(np.linalg.norm(mean_vector(way)))
-    if inside < settings.slide.one_way:
+    if inside < limits.one_way:
         sentence = "The tangential force turns within the steady window: no one direction, no speed along it."
         findings.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful", (*SPEED, *DIRECTION))
-    elif overall < settings.slide.one_way:
+    elif overall < limits.one_way:
         sentence = "The tangential force turns during the contact: speed and direction are those of the steady window."
         findings.flaw(FlawName.DIRECTION_TURNS, sentence, "doubtful")

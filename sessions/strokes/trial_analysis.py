@@ -7,14 +7,14 @@ weight in place of a finger, tell the face from the hand.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.plan.plan import Frame, SessionPlan, Trial
+from sessions.plan.plan import SessionPlan, Trial
 from sessions.strokes.contacts import Contact, find_contacts, split_at_reversals, split_at_valleys
 from sessions.strokes.decisions import Decisions, StrokeDecisions
 from sessions.strokes.onset import Baseline, onset_threshold
@@ -24,9 +24,6 @@ from sessions.strokes.sliding import block_means, displacement
 from sessions.strokes.span import Span, StrokeZero, recorded_zero, span_of, track_of, zero_for
 from sessions.strokes.stroke import Flaw, FlawName, Stroke
 from sessions.strokes.stroke_measures import measure_stroke
-
-if TYPE_CHECKING:  # the runner imports the detector from here: it must not pay for the reader
-    pass
 
 ZERO_SETTING = "zero"  # of `TransducerInfo.settings`: who says that the recording's own zero is true
 ZERO_STATED = "as recorded, stated to be true"
@@ -104,7 +101,7 @@ def analyse_trial(trial: Trial | None, block: ReadingBlock, context: TrialContex
         return TrialAnalysis(
             flaws=(*flaws, Flaw(FlawName.NO_UNLOADED_STRETCH, sentence, "refused")), filtered=span.filtered
         )
-    pull = _pull(span, zero, context)
+    pull = _pull(span, zero)
     if pull is not None:
         return TrialAnalysis(flaws=(*flaws, pull), filtered=span.filtered)
     pieces, idle, more = _pieces(span, zero, context)
@@ -119,13 +116,13 @@ def _common_zero(span: Span, context: TrialContext) -> StrokeZero | None:
         return recorded_zero(span, stated=True)
     first = span.windows.after(-np.inf, context.settings.zero.zero_stretch)
     if first is not None:
-        return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error, "", None, (0.0, 0.0), None)
+        return StrokeZero(first.level, first.noise, first.noise[:3], 0.0, first.error)
     return recorded_zero(span, stated=False) if context.info.calibration.raw_unit == RAW_WRENCH else None
 
 
-def _pull(span: Span, zero: StrokeZero, context: TrialContext) -> Flaw | None:
+def _pull(span: Span, zero: StrokeZero) -> Flaw | None:
     """Return the flaw of a normal axis along which the recording pulls rather than presses."""
-    axis, settings = context.plan.frame.normal, context.settings
+    axis, settings = span.frame.normal, span.settings
     low, high = np.percentile(zero.level[2] - span.wrench[:, 2], [0.5, 99.5])
     if -low <= max(settings.contact.pull_share * high, onset_threshold(float(zero.noise[2]), settings.detector)):
         return None
@@ -151,29 +148,27 @@ def _pieces(span: Span, zero: StrokeZero, context: TrialContext) -> tuple[list[C
         pieces += split_at_valleys(contact, span.time, smooth, settings)
     strokes: list[Contact] = []
     for piece in pieces:
-        own = zero if context.zero_is_stated else zero_for(span, piece, idle, settings)
+        own = zero if context.zero_is_stated else zero_for(span, piece, idle)
         strokes += (
             (piece,)
             if own is None
             else split_at_reversals(piece, span.time, span.smooth - own.level, own.unsure[0], settings)
         )
-    kept, flaws = _worth_measuring(strokes, span, smooth, settings)
+    kept, flaws = _worth_measuring(strokes, span, smooth)
     return kept, idle, flaws
 
 
-def _worth_measuring(
-    pieces: list[Contact], span: Span, smooth: Array, settings: AnalysisSettings
-) -> tuple[list[Contact], list[Flaw]]:
+def _worth_measuring(pieces: list[Contact], span: Span, smooth: Array) -> tuple[list[Contact], list[Flaw]]:
     """Return the contacts without taps and light touches, and a flaw for each of these."""
     peaks = [float(np.nanmax(smooth[piece.start : piece.stop], initial=0.0)) for piece in pieces]
-    greatest = max(peaks, default=0.0)
-    near = settings.contact.gap_beside / span.rate
+    greatest, limits = max(peaks, default=0.0), span.settings.contact
+    near = limits.gap_beside / span.rate
     kept: list[Contact] = []
     flaws: list[Flaw] = []
     for piece, peak in zip(pieces, peaks, strict=True):
         start, stop = span.time[piece.start], span.time[piece.stop - 1]
-        tapped = stop - start < settings.contact.shortest_stroke
-        if not tapped and peak >= settings.contact.light_share * greatest:
+        tapped = stop - start < limits.shortest_stroke
+        if not tapped and peak >= limits.light_share * greatest:
             kept.append(piece)
             continue
         gaps = [gap for gap in span.quality.gaps if abs(gap.stop - start) < near or abs(gap.start - stop) < near]
@@ -194,7 +189,6 @@ def _measure(
     pieces: list[Contact], idle: Mask, span: Span, zero: StrokeZero, trial: Trial | None, context: TrialContext
 ) -> TrialAnalysis:
     """Measure contacts as they were found or decided, each from its own zero unless one was stated."""
-    settings, plan = context.settings, context.plan
     number = None if trial is None else trial.number
     decided = [context.decisions.of_stroke(number, at) for at in range(1, len(pieces) + 1)]
     flaws: list[Flaw] = []
@@ -208,12 +202,12 @@ def _measure(
     for at, (piece, decisions) in enumerate(zip(pieces, decided, strict=True)):
         own = zero
         if not context.zero_is_stated:
-            own = zero_for(span, piece, idle, settings) or recorded_zero(span, stated=False)
-        stroke, more = measure_stroke(span, piece, own, plan, settings, trial, at + 1, decisions)
+            own = zero_for(span, piece, idle) or recorded_zero(span, stated=False)
+        stroke, more = measure_stroke(span, piece, own, context.plan, trial, at + 1, decisions)
         flaws += [replace(flaw, stroke=at) for flaw in more]
         strokes.append(stroke)
         if stroke.mu_dynamic is None and own.flaw is not FlawName.NO_UNLOADED_STRETCH:
-            press = press_of(span, piece, own, plan.frame, number, settings)
+            press = press_of(span, piece, own, number)
             presses += [] if press is None else [press]
     return TrialAnalysis(tuple(strokes), tuple(flaws), tuple(presses), span.filtered)
 
@@ -254,35 +248,32 @@ def strokes_for_model(strokes: tuple[Stroke, ...], trial: Trial | None, decision
     return tuple(one for one in kept if choice is not None and one.number == choice.new) or kept[:1]
 
 
-def press_of(
-    span: Span, contact: Contact, zero: StrokeZero, frame: Frame, trial: int | None, settings: AnalysisSettings
-) -> Press | None:
+def press_of(span: Span, contact: Contact, zero: StrokeZero, trial: int | None) -> Press | None:
     """Return the press in a contact; None where it slides, is short, or drags more than a press does."""
-    track = track_of(span, contact, zero, frame.height, settings)
+    track, limits, settings = track_of(span, contact, zero), span.settings.press, span.settings
     peak = float(np.nanmax(track.normal, initial=0.0))
     if peak < settings.ratio.force_floor:
         return None
-    pressed = np.flatnonzero(track.normal >= settings.press.press_held * peak)
+    pressed = np.flatnonzero(track.normal >= limits.press_held * peak)
     hold = slice(int(pressed[0]), int(pressed[-1]) + 1)
     lasted = float(track.time[hold.stop - 1] - track.time[hold.start])
     distance = displacement(track.position[hold])
-    if lasted < settings.press.press_shortest or not distance <= settings.press.press_moves:
+    if lasted < limits.press_shortest or not distance <= limits.press_moves:
         return None
     values = np.column_stack([track.wrench[hold, :2], track.normal[hold]])
     blocks = block_means(values, track.rate, settings)
-    if len(blocks) < settings.press.press_fewest:
+    if len(blocks) < limits.press_fewest:
         return None
     ratio = -blocks[:, :2] / blocks[:, 2:]
-    if np.hypot(*ratio.mean(axis=0)) > settings.press.press_ratio:
+    if np.hypot(*ratio.mean(axis=0)) > limits.press_ratio:
         return None
     scatter = ratio.std(axis=0, ddof=1) / np.sqrt(len(ratio))
     error = np.degrees(np.hypot(scatter, zero.error[:2] / float(blocks[:, 2].mean())))
-    lean = np.degrees(np.arctan(ratio.mean(axis=0)))
-    start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
     # What was levelled before counts too: the lean is that against the transducer.
-    x, y = lean.tolist()
+    x, y = (np.degrees(np.arctan(ratio.mean(axis=0))) + settings.tilt).tolist()
     error_x, error_y = error.tolist()
-    return Press(trial, start, stop, (x + settings.tilt[0], y + settings.tilt[1]), (error_x, error_y))
+    start, stop = float(track.time[hold.start]), float(track.time[hold.stop - 1])
+    return Press(trial, start, stop, (x, y), (error_x, error_y))
 
 
 def tilt_of(presses: Sequence[Press], settings: AnalysisSettings) -> Tilt | None:

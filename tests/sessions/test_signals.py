@@ -1,4 +1,4 @@
-"""The filter and the peaks are SciPy's, whether its compiled loops are found where they are sought or not."""
+"""The filter and the peaks are those of `scipy.signal`, which is not loaded for them."""
 
 import subprocess
 import sys
@@ -10,13 +10,6 @@ from scipy import signal
 from sessions.strokes import forces as signals
 
 
-@pytest.fixture(params=["compiled", "by the front door"])
-def either(request, monkeypatch):
-    if request.param == "by the front door":
-        monkeypatch.setattr(signals, "_compiled", lambda *_: None)
-
-
-@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize(("n", "cut_off", "rate", "padding"), [(300, 24.9, 200.0, 30), (12, 24.9, 62.5, 11)])
 def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(n, cut_off, rate, padding):
     values = np.random.default_rng(1).normal(size=(n, 6)).cumsum(axis=0) + 5.0
@@ -25,7 +18,6 @@ def test_the_filter_is_scipys_butterworth_run_forwards_and_backwards(n, cut_off,
     assert signals.low_pass(values, cut_off, rate, padding) == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.usefixtures("either")
 def test_peaks_and_how_far_they_stand_out_are_scipys_flat_tops_included():
     values = np.maximum(np.round(np.random.default_rng(2).normal(size=200).cumsum(), 0), 0.0)
     places, found = signal.find_peaks(values, prominence=0.0)
