@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from daq_app.accuracy_page.page import PAGES as TABLES
-from daq_app.accuracy_page.page import filled
+from daq_app.accuracy_page.page import fill_marks
 from daq_app.cli.main import VERBS
 
 ROOT = Path(__file__).parents[1]
@@ -51,4 +51,4 @@ def test_every_table_that_the_accuracy_run_writes_has_its_place_on_one_page():
     assert sorted(marks) == sorted([*of_the_survey, *(name for names in TABLES.values() for name in names)])
     for page, names in TABLES.items():
         text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-        assert all("new" in filled(text, name, "new") for name in names), page
+        assert all("new" in fill_marks(text, name, "new") for name in names), page

@@ -11,9 +11,9 @@ from matplotlib.ticker import NullFormatter
 
 from sessions.report.figures import style
 from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate, Guaranteed
+from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import FEWEST, Growth, exponent
-from solver.verification.measuring import Measured
+from solver.verification.measuring import RunResults
 from solver.verification.orders import Order
 from solver.verification.speed import Speed
 from solver.verification.truth import JUDGED, NUMBERS, Truth
@@ -23,9 +23,9 @@ MARKS = {"small": "o", "finite": "s"}
 WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
 
 
-def plates(measured: Measured) -> dict[str, style.Plate]:
+def plates(measured: RunResults) -> dict[str, style.Plate]:
     """Return the figures that there are numbers for, by name."""
-    drawings: tuple[Callable[[Measured], style.Plate], ...] = (
+    drawings: tuple[Callable[[RunResults], style.Plate], ...] = (
         speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate
     )  # fmt: skip
     with style.look():
@@ -33,7 +33,7 @@ def plates(measured: Measured) -> dict[str, style.Plate]:
     return {plate.name: plate for plate in drawn if plate.panels}
 
 
-def speed_plate(measured: Measured) -> style.Plate:
+def speed_plate(measured: RunResults) -> style.Plate:
     """Draw time against true error, one curve a way of solving."""
     rows: list[Speed] = measured.of(Speed)
     truths: list[Truth] = [truth for truth in measured.of(Truth) if truth.case in JUDGED]
@@ -41,7 +41,7 @@ def speed_plate(measured: Measured) -> style.Plate:
     panels = [
         _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
         _speed_panel(rows, doubt, "next_s", "each further surface"),
-        _guaranteed_panel(measured.of(Guaranteed)),
+        _guaranteed_panel(measured.of(GuaranteedCost)),
     ]
     caption = (
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
@@ -84,7 +84,7 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
     )
 
 
-def _guaranteed_panel(rows: Sequence[Guaranteed]) -> style.Panel | None:
+def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
     if not rows:
         return None
     drawn = style.sheet(*SQUARE)
@@ -121,7 +121,7 @@ def _guaranteed_panel(rows: Sequence[Guaranteed]) -> style.Panel | None:
     return style.Panel(name, words, style.svg(drawn, name, words, simulated=False), header, table)
 
 
-def benchmark_plate(measured: Measured) -> style.Plate:
+def benchmark_plate(measured: RunResults) -> style.Plate:
     """Draw time against true error on the published problems."""
     panel = _order_panel(measured.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
     caption = (
@@ -131,7 +131,7 @@ def benchmark_plate(measured: Measured) -> style.Plate:
     return style.Plate("benchmarks", caption, () if panel is None else (panel,))
 
 
-def order_plate(measured: Measured) -> style.Plate:
+def order_plate(measured: RunResults) -> style.Plate:
     """Draw errors against element size."""
     panel = _order_panel(measured.of(Order), "orders", "error [–]", None)
     caption = (
@@ -183,7 +183,7 @@ def _mark(problem: str) -> str:
     return marks.get(problem.split(",")[0], "x")
 
 
-def estimate_plate(measured: Measured) -> style.Plate:
+def estimate_plate(measured: RunResults) -> style.Plate:
     """Draw estimates against true errors, a panel a number."""
     rows: list[Estimate] = measured.of(Estimate)
     panels = [_estimate_panel([r for r in rows if r.number == number], number) for number in NUMBERS]
@@ -224,7 +224,7 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None
     return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, table)
 
 
-def cost_plate(measured: Measured) -> style.Plate:
+def cost_plate(measured: RunResults) -> style.Plate:
     """Draw where the time of one solve goes."""
     rows: list[Cost] = measured.of(Cost)
     caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
@@ -273,7 +273,7 @@ def _distinct(count: int) -> list[str]:
     return [base[n % len(base)] for n in range(count)]
 
 
-def growth_plate(measured: Measured) -> style.Plate:
+def growth_plate(measured: RunResults) -> style.Plate:
     """Draw the time of one linear system against its unknowns."""
     rows: list[Growth] = measured.of(Growth)
     caption = (

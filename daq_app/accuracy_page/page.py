@@ -18,10 +18,10 @@ from solver.prediction import percent
 from solver.verification.costs import Cost
 from solver.verification.estimates import Estimate
 from solver.verification.hard_cases import HardCase
-from solver.verification.histories import Marched
+from solver.verification.histories import March
 from solver.verification.machine import Machine
-from solver.verification.marked_page import filled
-from solver.verification.measuring import Measured
+from solver.verification.marked_page import fill_marks
+from solver.verification.measuring import RunResults
 from solver.verification.orders import Order
 from solver.verification.processes import Cold
 from solver.verification.published.problems import Problem
@@ -68,16 +68,16 @@ def _of_rows(name: str, caption: str, rows: Sequence[R], columns: Mapping[str, C
     return Table(name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows))
 
 
-def tables(measured: Measured) -> dict[str, Table]:
+def tables(measured: RunResults) -> dict[str, Table]:
     """Return the tables that there are rows for, by name."""
-    builders: tuple[Callable[[Measured], Table], ...] = (
+    builders: tuple[Callable[[RunResults], Table], ...] = (
         machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems,
         *(partial(_hard, kinematics=kinematics) for kinematics in ("small", "finite")),
     )  # fmt: skip
     return {table.name: table for table in (make(measured) for make in builders) if table.rows}
 
 
-def machine(measured: Measured) -> Table:
+def machine(measured: RunResults) -> Table:
     """Return what the run was made on."""
     rows: list[tuple[str, str]] = []
     for row in measured.of(Machine):
@@ -93,7 +93,7 @@ def machine(measured: Measured) -> Table:
     return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
 
 
-def targets(measured: Measured) -> Table:
+def targets(measured: RunResults) -> Table:
     """Return the table of speeds with their targets."""
     rows: list[Target] = measured.of(Target)
     caption = (
@@ -109,7 +109,7 @@ def targets(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def truths(measured: Measured) -> Table:
+def truths(measured: RunResults) -> Table:
     """Return the reference cases."""
     rows: list[Truth] = measured.of(Truth)
     cells: list[tuple[str, ...]] = []
@@ -127,7 +127,7 @@ def truths(measured: Measured) -> Table:
     return Table("truths", caption, header, tuple(cells))
 
 
-def speeds(measured: Measured) -> Table:
+def speeds(measured: RunResults) -> Table:
     """Return time against error, mesh by mesh."""
     rows: list[Speed] = sorted(measured.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
     caption = (
@@ -144,7 +144,7 @@ def speeds(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def estimates(measured: Measured) -> Table:
+def estimates(measured: RunResults) -> Table:
     """Return how often estimates are above and near, by kinematics and number."""
     rows: list[Estimate] = measured.of(Estimate)
     cells: list[tuple[str, ...]] = []
@@ -170,7 +170,7 @@ def _share(answers: Sequence[bool | None]) -> str:
     return f"{sum(verdicts)} of {len(verdicts)}" if verdicts else "–"
 
 
-def warm(measured: Measured) -> Table:
+def warm(measured: RunResults) -> Table:
     """Return the warm stepper's rows."""
     rows: list[Warm] = measured.of(Warm)
     caption = "The warm stepper, fed reading by reading; p99 of each reading's median over five passes."
@@ -182,9 +182,9 @@ def warm(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def histories(measured: Measured) -> Table:
+def histories(measured: RunResults) -> Table:
     """Return courses against direct states."""
-    rows: list[Marched] = measured.of(Marched)
+    rows: list[March] = measured.of(March)
     return _of_rows("histories", "A course of 200 substeps against the state found directly.", rows, {
         "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
         "unknowns": lambda row: str(row.dofs), "direct [ms]": lambda row: _ms(row.direct_s),
@@ -194,7 +194,7 @@ def histories(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def costs(measured: Measured) -> Table:
+def costs(measured: RunResults) -> Table:
     """Return where the time goes."""
     rows: list[Cost] = measured.of(Cost)
     caption = (
@@ -210,7 +210,7 @@ def costs(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def starts(measured: Measured) -> Table:
+def starts(measured: RunResults) -> Table:
     """Return cold starts."""
     rows: list[Cold] = measured.of(Cold)
     caption = (
@@ -222,7 +222,7 @@ def starts(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def orders(measured: Measured) -> Table:
+def orders(measured: RunResults) -> Table:
     """Return observed orders of convergence."""
     rows: list[Order] = measured.of(Order)
     caption = "Observed orders of convergence. Time: of a solve on each mesh, the mesh included."
@@ -235,7 +235,7 @@ def orders(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def problems(measured: Measured) -> Table:
+def problems(measured: RunResults) -> Table:
     """Return the published problems."""
     rows: list[Problem] = measured.of(Problem)
     return _of_rows("problems", "Published problems, run through the same code as the finger.", rows, {
@@ -246,7 +246,7 @@ def problems(measured: Measured) -> Table:
     })  # fmt: skip
 
 
-def _hard(measured: Measured, kinematics: str) -> Table:
+def _hard(measured: RunResults, kinematics: str) -> Table:
     rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
@@ -270,7 +270,7 @@ def fill(docs: Path, tables: Mapping[str, Table]) -> None:
         text = (docs / page).read_text(encoding="utf-8")
         for name in names:
             if name in tables:
-                text = filled(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
+                text = fill_marks(text, name, f"{tables[name].caption}\n\n{tables[name].markdown()}")
         (docs / page).write_text(text, encoding="utf-8")
 
 
@@ -290,7 +290,7 @@ SECTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
 )
 
 
-def page(measured: Measured, figures: Mapping[str, Plate] | None = None) -> str:
+def page(measured: RunResults, figures: Mapping[str, Plate] | None = None) -> str:
     """Return the page: no script, nothing asked of any network; `figures` where they are drawn already."""
     figures, listed = plates(measured) if figures is None else figures, tables(measured)
     environment = Environment(
@@ -313,7 +313,7 @@ def page(measured: Measured, figures: Mapping[str, Plate] | None = None) -> str:
     )
 
 
-def write(measured: Measured, folder: Path) -> tuple[Path, ...]:
+def write(measured: RunResults, folder: Path) -> tuple[Path, ...]:
     """Write page, pictures and data to `folder`; return the files. Raises ReportError where that cannot be done."""
     data = folder / DATA
     swap_in(data, json.dumps(measured.to_dict(), indent=1, allow_nan=False) + "\n")

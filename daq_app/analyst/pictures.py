@@ -11,7 +11,7 @@ from solver import Cancelled, Prediction
 from solver.equilibrium.load_path import Instant as Step
 from solver.prediction import ROW, Skin
 from solver.quantities import SED
-from solver.response.fields import Fields, Sketch, Still, fields_of, most_squeezed, stills, way_until
+from solver.response.fields import Fields, Sketch, Still, fields_of, place_of_least_stretch, stills, way_until
 
 MOST = 150  # states of a way that did not settle, which may be long
 AT_ONCE = 8  # states that are drawn between two reports of progress
@@ -43,7 +43,7 @@ def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
     if failure is None:
         return film, ""
     last = instants[-1]
-    lost = most_squeezed(way.finger, last.state, last.depth)
+    lost = place_of_least_stretch(way.finger, last.state, last.depth)
     return Film(film.parts, film.frames, film.instants, film.arcs, lost), str(failure.in_a_sentence())
 
 

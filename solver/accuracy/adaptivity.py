@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from solver.accuracy.error_estimate import NestedState, Steps, edge_changes, nested_state, steps_asked
+from solver.accuracy.error_estimate import NestedState, Steps, choose_steps, edge_changes, nested_state
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
 from solver.continuation.finite_states import nearby, roughly, settled
 from solver.equilibrium import EquilibriumState
@@ -119,7 +119,7 @@ def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, mesh
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _plain(scene.undragged(), sizing, meshes)
+        return _plain(scene.without_drag(), sizing, meshes)
 
 
 def _plain(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
@@ -138,7 +138,7 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
     if drag is None:
         return roughly(finger, scene, near)
     try:
-        slide = roughly(finger, scene.undragged(), near)
+        slide = roughly(finger, scene.without_drag(), near)
     except SolveFailure:
         return march(scene, finger).last  # the drag may be met before sliding would fold the skin
     return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger).last
@@ -146,7 +146,7 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
 
 def refine(scene: Scene, fineness: float | Lines, low: MeshSolution, meshes: Meshes) -> NestedSolution:
     """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
-    steps = steps_asked(scene, low.finger, low.state)
+    steps = choose_steps(scene, low.finger, low.state)
     sizing = replace(low.sizing, fineness=fineness)
     top = solution_on(scene, sizing, low, meshes, 1 if steps is None else steps.times)
     if top.sizing.margin < WIDER and top.state.reaches_end:
@@ -161,7 +161,7 @@ def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshe
     A course takes so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
     neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
     """
-    begun = _begun(scene, sizing, below, meshes)
+    begun = _starting_solution(scene, sizing, below, meshes)
     try:
         return replace(begun, state=settled(begun.finger, scene, begun.state, times))
     except NotConverged:
@@ -172,11 +172,11 @@ def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshe
         elsewhere = lines.divided(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
     else:
         elsewhere = ELSEWHERE * lines
-    begun = _begun(scene, replace(sizing, fineness=elsewhere), below, meshes)
+    begun = _starting_solution(scene, replace(sizing, fineness=elsewhere), below, meshes)
     return replace(begun, state=settled(begun.finger, scene, begun.state, times))
 
 
-def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
+def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
     """Return a mesh above the state `below`, with the state that a settled one is sought from."""
     begun = perf_counter()
     finger = meshes.finger(scene, sizing)
@@ -186,19 +186,19 @@ def _begun(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) ->
     return MeshSolution(finger, sizing, start, perf_counter() - begun)
 
 
-def on_nested(
+def solve_nested(
     scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedState | None, Steps | None]:
     """Return the state of a scene on the nested mesh of `top`, None where it has none there, and its steps.
 
     `steps` are those taken where the state depends on its way. Raises Cancelled.
     """
-    begun = _begun(scene, replace(top.sizing, halved=True), top, meshes)
+    begun = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
     finger = begun.finger
     try:
         if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
-                judged = steps_asked(scene, top.finger, top.state)
+                judged = choose_steps(scene, top.finger, top.state)
                 steps = None if judged is None else replace(judged, times=1)
             state = end(scene, finger)
         else:

@@ -68,7 +68,7 @@ def audits(
     }
 
 
-def forces_missed(scene: Scene, normal: float, tangential: float) -> dict[str, float]:
+def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str, float]:
     """Return by how much a state with these forces [N/mm] misses those that `scene` gives; nothing where it gives none.
 
     `normal_force_missed` by the force given, `drag_missed` by what friction could carry under it. Raises NotConverged
@@ -85,14 +85,14 @@ def forces_missed(scene: Scene, normal: float, tangential: float) -> dict[str, f
     return missed
 
 
-def unbalanced(checks: Mapping[str, float]) -> float:
+def imbalance(checks: Mapping[str, float]) -> float:
     """Return what `audits` leave unbalanced at most, of forces and of work."""
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
 
 def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
     """Raise NotConverged where round-off has spoilt the answer at `depth` [mm]."""
-    if (left := unbalanced(checks)) > UNSOUND:
+    if (left := imbalance(checks)) > UNSOUND:
         raise NotConverged(
             f"Forces balance to {left:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
             f"contacts far smaller than the mesh, {MIXED} do that."
@@ -115,7 +115,7 @@ def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displ
 def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
     """Return a sentence for each of `audits` that shows more round-off than answers usually have."""
     warnings: list[str] = []
-    if (left := unbalanced(checks)) > DOUBTED:
+    if (left := imbalance(checks)) > DOUBTED:
         warnings.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
     if (low := checks["penetration"]) > PIERCED:
         warnings.append(f"The skin lies {low:.1g} of the indentation too low: stiff layers magnify round-off.")

@@ -85,12 +85,12 @@ class Steps:
         """By how much numbers may be off for not taking more steps (c,)."""
         return self.bound / self.times
 
-    def taken(self, usual: Array) -> Array:
+    def extrapolate(self, usual: Array) -> Array:
         """Return what the numbers (c,) after the usual steps would be after these."""
         return usual - (1.0 - 1.0 / self.times) * self.excess
 
 
-def steps_asked(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
+def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
     """Return the load steps that a scene asks for, judged on one mesh, whose `settled` state may be known.
 
     None where that does not depend on its way. Raises SolveFailure, Cancelled.
@@ -105,11 +105,11 @@ def steps_asked(scene: Scene, finger: Finger[Patches], settled: EquilibriumState
 def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
     """Return how many times the usual load steps a history takes whose end does not depend on them.
 
-    Those that a tolerance asks for at the end of its press. Raises as `steps_asked`.
+    Those that a tolerance asks for at the end of its press. Raises as `choose_steps`.
     """
     if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
         return 1
-    steps = steps_asked(scene.pressed_only(), finger)
+    steps = choose_steps(scene.press_only(), finger)
     return 1 if steps is None else steps.times
 
 
@@ -136,7 +136,7 @@ def edge_changes(
     That is (m, n), by a node to the worse side. `states` are equilibria, each with the forces it is under or None for
     its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no equilibrium.
     """
-    moved = [_with_moved_edges(newton, state, forces) for state, forces in states]
+    moved = [_move_edges(newton, state, forces) for state, forces in states]
     known = [one for edges in moved for sides in edges for one in sides if one is not None]
     values = numbers([*(state for state, _ in states), *known])
     here, there = values[: len(states)], iter(values[len(states) :])
@@ -172,12 +172,12 @@ def nested_state(
     of_edges = np.linalg.norm(changes, axis=0)
     if np.isinf(of_edges).any():
         return None
-    numbers = values[:COUNT] if steps is None else steps.taken(values[:COUNT])
+    numbers = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
     nested = NestedNumbers(numbers, of_edges[:COUNT], values[COUNT:], of_edges[COUNT:])
     return NestedState(nested, finger, state, changes[:, 0])
 
 
-def _with_moved_edges(
+def _move_edges(
     newton: Newton, state: EquilibriumState, forces: ForceLoad | None
 ) -> list[list[EquilibriumState | None]]:
     """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge by edge.
@@ -191,7 +191,7 @@ def _with_moved_edges(
     alone = np.count_nonzero(state.touching) == 1
     return [
         [
-            _moved(newton, state, forces, x, *pair) if solvable else None
+            _move_edge(newton, state, forces, x, *pair) if solvable else None
             for pair in ((edge, edge + 1), (edge + 1, edge))
             if not (alone and state.touching[pair[0]])
         ]
@@ -199,7 +199,7 @@ def _with_moved_edges(
     ]
 
 
-def _moved(
+def _move_edge(
     newton: Newton, state: EquilibriumState, forces: ForceLoad | None, x: Array, node: int, other: int
 ) -> EquilibriumState | None:
     """Return the equilibrium of the body, linearised at `state`, with `node` in the contact state of the `other`.
@@ -224,14 +224,14 @@ def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: St
     course has taken whose end depends on its way.
     """
     if nested is None:
-        return _without_given(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
+        return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
     off = half_width(nested.numbers - numbers, nested.of_edges, _PARTS_OF_EDGES)
     if steps is not None:
         off += steps.error
     relative = off / np.maximum(np.abs(numbers), np.finfo(float).tiny)
     sed, normal, tangential, depth, _, width, point = relative[:FORCES_AND_PLACES].tolist()
     estimates = Errors(sed, normal, tangential, depth, float(off[SHIFT]), width, point, off[FORCES_AND_PLACES:])
-    return _without_given(scene, estimates)
+    return _without_prescribed(scene, estimates)
 
 
 def responses(numbers: Array, errors: Errors) -> dict[str, Response]:
@@ -248,7 +248,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
     return off / np.maximum(row, np.finfo(float).tiny)
 
 
-def _without_given(scene: Scene, estimates: Errors) -> Errors:
+def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
     """Return the errors without those of what the scene gives, and of the drag where nothing rubs."""
     by_force, dragged = scene.normal_force is not None, scene.loading.dragged
     rubs = not scene.friction.frictionless
@@ -275,7 +275,7 @@ def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
     sets: dict[object, list[int]] = {}
     for number, scene in enumerate(scenes):
         if scene.solve.evidence != "quick":
-            sets.setdefault(scene.pressed, []).append(number)
+            sets.setdefault(scene.loading_group, []).append(number)
     return [numbers for numbers in sets.values() if len({scenes[n] for n in numbers}) > 1]
 
 
@@ -321,7 +321,7 @@ def _in_a_sentence(name: str, share: float) -> str:
 Numbers = Callable[[Newton, EquilibriumState], Array]
 
 
-class Estimated(NamedTuple):
+class ErrorInterval(NamedTuple):
     """Numbers (n,) of a state, each in its own unit."""
 
     value: Array
@@ -329,14 +329,14 @@ class Estimated(NamedTuple):
     error: Array  # half width of the interval about either
 
 
-def estimated(
+def estimate_errors(
     numbers: Numbers,
     newton: Newton,
     state: EquilibriumState,
     nested: tuple[Newton, EquilibriumState],
     forces: ForceLoad | None = None,
     fewer: Sequence[EquilibriumState] = (),
-) -> Estimated:
+) -> ErrorInterval:
     """Return the `numbers` (n,) of a state and how far each may be off.
 
     `nested` is the same state on the halved mesh (`solver.mesh`), `forces` the forces it is under, if any. Where
@@ -353,4 +353,4 @@ def estimated(
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")
         error += Steps.of(value, np.array([numbers(newton, one) for one in fewer]), None).bound
-    return Estimated(value, corrected, error)
+    return ErrorInterval(value, corrected, error)

@@ -30,7 +30,7 @@ WORTH_TELLING = 0.02  # part of the SED from which something left out is worth a
 LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
 
 
-def _laws(scene: Scene) -> str:
+def _describe_laws(scene: Scene) -> str:
     """Say which law every tissue follows."""
     usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
     said: list[str] = []
@@ -47,7 +47,7 @@ def _ogden(tissue: Material) -> str:
     return f"Ogden, exponent {HUMAN_SKIN:g} (default: human skin, ascribed to Shergold and Fleck 2004)"
 
 
-def _held(scene: Scene) -> str:
+def _describe_support(scene: Scene) -> str:
     """Say what moves with the bone, and how the bone itself is modelled."""
     finger = scene.finger
     said = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
@@ -68,12 +68,12 @@ def model(
     modes, skin, tractions = ("pressure", "skin", "tractions") if small else ("ln J", "deformed skin", "true tractions")
     return {
         "kinematics": f"{scene.solve.kinematics} strain, plane strain",
-        "material": _laws(scene),
+        "material": _describe_laws(scene),
         "element": f"Q2/P-1: nine nodes, three modes of {modes} condensed in the element",
         "contact": f"unilateral on the {skin}, Coulomb with |t| <= min(mu p, tau_max) on {tractions}, each node of the "
         "skin open, in stick, in slip or in slip at the bound",
-        "course": _course(scene),
-        "bone": _held(scene),
+        "course": _describe_course(scene),
+        "bone": _describe_support(scene),
         "width": "forces are per mm of width",
         "left_out": small
         | {
@@ -129,7 +129,7 @@ def _of_strain(entry: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _course(scene: Scene) -> str:
+def _describe_course(scene: Scene) -> str:
     if scene.loading.direction == 0:
         return "pre-indentation, marched with stick and slip"
     if scene.solve.course == "history":
@@ -203,13 +203,13 @@ def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
             "it would scale all surfaces alike"
         )
     return {
-        "estimate": max(_held_after(lasting, terms) for terms in series),
+        "estimate": max(_overstress_after(lasting, terms) for terms in series),
         "from": {"slide_s": lasting, "relaxation_s": sorted({tau for terms in series for tau, _ in terms})},
         "how": f"stress above its relaxed value when sliding has settled, {whose}",
     }
 
 
-def _held_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
+def _overstress_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
     """Return the stress above its relaxed value, relative, after a press of 1 s and a slide `lasting` so long [s]."""
     after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
     return float(after) / (1.0 - sum(g for _, g in terms))
@@ -244,7 +244,7 @@ Answers = Callable[[Sequence[Scene]], tuple[Answer, ...]]
 MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 
-def measured(prediction: Prediction, answers: Answers) -> Prediction:
+def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
     """Return `prediction` with measured differences in place of estimates where they can be had."""
     begun = perf_counter()
     scene = replace(prediction.scene, solve=replace(prediction.scene.solve, evidence="estimated", tolerance=COARSE))

@@ -71,13 +71,13 @@ class NestedGrid:
         `displacement` (nodes, 2) and the contact of `state` are those on this mesh.
         """
         dual = adjoint(self.finger, displacement, state)
-        primal, dual = (self._curved(one) for one in (displacement, dual))
+        primal, dual = (self._curvature(one) for one in (displacement, dual))
         five = (*self.nodes.shape, 2)
         columns = [one - (QUADRATIC @ one[:, :, ::2].reshape(*five[:2], 3, 10)).reshape(five) for one in (primal, dual)]
         rows = [one - QUADRATIC @ one[:, :, :, ::2] for one in (primal, dual)]
         return np.abs(self._energy(*columns).sum(axis=1)), np.abs(self._energy(*rows).sum(axis=0))
 
-    def _curved(self, values: Array) -> Array:
+    def _curvature(self, values: Array) -> Array:
         """Return nodal values (nodes, 2) by element (a, b, 5, 5, 2) less what fits 1, x, y best.
 
         Nodes of divided elements lie on the outline, and not where the element that they divide has it.
@@ -143,7 +143,7 @@ def _grid(finger: Finger[Any]) -> NestedGrid:
     return NestedGrid.of(finger if isinstance(finger, LinearFinger) else LinearFinger.on(finger.scene, finger.geometry))
 
 
-def refined(mesh: FingerMesh, parts: Array | None) -> Lines | None:
+def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     """Return the lines of a finer mesh; None where none may be finer.
 
     `parts` (a + b,) are the errors of each column and row of `mesh`, by the tolerance; None where they are not known.

@@ -114,7 +114,7 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
 
 def _small(scene: Scene) -> tuple[Way, float]:
     """Return the untouched finger of a scene at the beginning of its course, and the settled SED [MPa]."""
-    finger, body = _rough(scene.unloaded(scene.loading.depth))
+    finger, body = _rough(scene.frictionless_press(scene.loading.depth))
     body = copy(body)  # each course has a past of its own
     body.rest()
     tissue = LinearTissue(body, (finger.ending.endings,))

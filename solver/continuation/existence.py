@@ -67,7 +67,7 @@ def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
 
     Raises NotConverged where not even the frictionless state is found, Cancelled.
     """
-    return _reach(_Search(scene.unloaded(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target))
+    return _reach(_Search(scene.frictionless_press(SHALLOW), load._replace(mu=0.0, travel=0.0), BY_FRICTION, target))
 
 
 def of_depth(scene: Scene, load: LoadState) -> Reach:
@@ -75,7 +75,7 @@ def of_depth(scene: Scene, load: LoadState) -> Reach:
 
     Raises NotConverged where there is none even at a hundredth of it, Cancelled.
     """
-    return _reach(_Search(scene.unloaded(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
+    return _reach(_Search(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
 
 
 def sound(finger: FiniteFinger, state: EquilibriumState, least: float = PROOF.sound) -> bool:

@@ -255,7 +255,7 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return settled(scene.undragged(), finger)
+        return settled(scene.without_drag(), finger)
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise

@@ -28,7 +28,7 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
     if not scenes:
         return ()
     deepest = DEEPEST * scenes[0].finger.pulp_thickness()
-    finger = _finger(scenes[0].unloaded(deepest))
+    finger = _finger(scenes[0].frictionless_press(deepest))
     pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
     return tuple(None if state is None else state.load.depth for state in pressed)
 
@@ -40,7 +40,7 @@ def expected_depth(scene: Scene) -> float:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
-        finger = _finger(scene.unloaded(deepest))
+        finger = _finger(scene.frictionless_press(deepest))
     except (SceneError, NotConverged):  # who makes the meshes that count will tell
         return deepest
     state = _pressed(finger, scene, force, deepest)

@@ -19,7 +19,7 @@ from solver.scene import Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solved:
+class SceneSolution:
     """The state of a scene on one mesh."""
 
     scene: Scene
@@ -39,7 +39,12 @@ class Solved:
 
 
 def prediction(
-    solved: Solved, finger: Finger[Patches], numbers: Array, row: Array, nested: NestedNumbers | None, estimate_s: float
+    solved: SceneSolution,
+    finger: Finger[Patches],
+    numbers: Array,
+    row: Array,
+    nested: NestedNumbers | None,
+    estimate_s: float,
 ) -> Prediction:
     """Return the prediction of a state with its `numbers` (COUNT,), and the SED (r,) of the row of receptors [MPa]."""
     scene, state = solved.scene, solved.state

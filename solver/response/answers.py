@@ -12,8 +12,8 @@ from time import perf_counter
 import numpy as np
 
 from solver.accuracy import audits as audit
-from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, on_nested, refine
-from solver.accuracy.error_estimate import Steps, edge_changes, nested_state, steps_asked, steps_of_press
+from solver.accuracy.adaptivity import Meshes, NestedSolution, coarse_solution, refine, solve_nested
+from solver.accuracy.error_estimate import Steps, choose_steps, edge_changes, nested_state, steps_of_press
 from solver.accuracy.refinement import with_shares
 from solver.arrays import Array
 from solver.body import Patches
@@ -31,7 +31,7 @@ from solver.mesh import Lines
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, FORCES_AND_PLACES, NestedNumbers, Prediction
 from solver.progress import Progress, check_stop, interruptible, report_part, report_progress
-from solver.response.answer import Solved, prediction
+from solver.response.answer import SceneSolution, prediction
 from solver.scene import Scene
 
 # unbalanced part of the forces from which displacements are corrected further [-]
@@ -49,7 +49,7 @@ BEYOND_THE_SKIN = NotConverged(
 )
 
 Answer = Prediction | SolveFailure
-Pressed = tuple[float, float, str]  # how deep or hard, and which way: `Scene.pressed`
+LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
 Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # called with each answer, and its way
 
 
@@ -68,8 +68,8 @@ class Meshing(ABC):
         """
 
 
-def _audited(
-    scene: Scene, finger: Finger[Patches], one: Solved, newton: Newton, settled_sed: Callable[[], float]
+def _audit(
+    scene: Scene, finger: Finger[Patches], one: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
 ) -> None:
     """Complete the audits of a state and of its course, or raise the SolveFailure that they ask for.
 
@@ -79,7 +79,7 @@ def _audited(
     checks, state, way = one.audits, one.state, one.way
     audit.refuse_unsound(checks, state.load.depth)
     audit.refuse_beyond_finger(finger, state, one.displacement)
-    checks |= audit.forces_missed(scene, float(state.force[1]), float(state.force[0]))
+    checks |= audit.force_residuals(scene, float(state.force[1]), float(state.force[0]))
     if way is None:
         return
     relaxing = way.tissue is not None
@@ -127,12 +127,12 @@ class SmallMeshing(Meshing):
         steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
         marched = any(scene.solve.course == "history" for scene in scenes)
         for batch in [[number] for number in every] if marched else [steepest_first]:
-            states: dict[int, Solved] = {}
+            states: dict[int, SceneSolution] = {}
             for number in batch:
                 position = len(done) + len(states)
                 report_part(self.progress, position / len(scenes))
                 try:
-                    solved = self._solved(scenes[number], finger, position, len(scenes))
+                    solved = self._solve_state(scenes[number], finger, position, len(scenes))
                 except SolveFailure as failure:
                     done[number] = failure.in_a_sentence()
                     continue
@@ -143,14 +143,14 @@ class SmallMeshing(Meshing):
                 else:
                     return []
             if states:
-                done |= zip(states, self._estimated(list(states.values()), finger, sizing), strict=True)
+                done |= zip(states, self._predict(list(states.values()), finger, sizing), strict=True)
             if watch is not None:
                 for number in batch:
                     if done[number] is not BEYOND_THE_SKIN:
                         watch(number, done[number], finger, states[number].elastic_way if number in states else None)
         return [done[number] for number in every]
 
-    def _solved(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> Solved | None:
+    def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
         """Return the state of one of `count` scenes; None where contact must be looked for on more of the skin.
 
         Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its
@@ -162,7 +162,7 @@ class SmallMeshing(Meshing):
             direct(leg, finger)
         steady = direct(scene, finger)
         try:
-            steps = steps_asked(scene, finger, settled=steady)
+            steps = choose_steps(scene, finger, settled=steady)
             times = steps_of_press(scene, finger) if steps is None else steps.times
         except SolveFailure:
             steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # nor will there be an estimate
@@ -187,15 +187,15 @@ class SmallMeshing(Meshing):
         if simple:  # round-off is taken out at once, else where it shows
             state, displacement = refined(scene, finger, state, displacement)
         checks = audit.audits(finger, state, displacement)
-        if not relaxing and audit.unbalanced(checks) > SMALL_IMBALANCE:
+        if not relaxing and audit.imbalance(checks) > SMALL_IMBALANCE:
             state, displacement = refined(scene, finger, state, displacement)
             checks = audit.audits(finger, state, displacement)
-        solved = Solved(scene, state, displacement, checks, steps, way)
-        _audited(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
+        solved = SceneSolution(scene, state, displacement, checks, steps, way)
+        _audit(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audit.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
         return replace(solved, warnings=warnings, wall_s=perf_counter() - begun + finger.solve_s / count)
 
-    def _estimated(self, solved: list[Solved], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
+    def _predict(self, solved: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
         """Return the prediction of each state, with its error; numbers of all are made at once."""
         begun = perf_counter()
         numbers = finger.all_numbers([one.state for one in solved])
@@ -211,7 +211,9 @@ class SmallMeshing(Meshing):
         ]
 
 
-def nested_numbers_of_all(mesh: LinearFinger, solved: Sequence[Solved], numbers: Array) -> list[NestedNumbers | None]:
+def nested_numbers_of_all(
+    mesh: LinearFinger, solved: Sequence[SceneSolution], numbers: Array
+) -> list[NestedNumbers | None]:
     """Return the numbers of solved scenes on the nested `mesh`, None where one has no state there.
 
     `numbers` (c, COUNT) are theirs on the mesh that counts.
@@ -243,7 +245,7 @@ class FiniteMeshing(Meshing):
     def __init__(self, depth: float, progress: Progress | None) -> None:
         """Make none yet."""
         super().__init__(depth, progress)
-        self._meshes: dict[Pressed, Meshes] = {}
+        self._meshes: dict[LoadingGroup, Meshes] = {}
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
@@ -253,22 +255,22 @@ class FiniteMeshing(Meshing):
                 check_stop()
                 begun, scene = perf_counter(), scenes[number]
                 report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
-                meshes = self._meshes.setdefault(scene.pressed, Meshes())
+                meshes = self._meshes.setdefault(scene.loading_group, Meshes())
                 meshes.keep(fineness)
                 try:
                     low = coarse_solution(scene, self.depth, fineness, meshes)
-                    done[number] = _predicted(scene, refine(scene, fineness, low, meshes), meshes, begun)
+                    done[number] = _predict(scene, refine(scene, fineness, low, meshes), meshes, begun)
                 except SolveFailure as failure:
                     done[number] = failure
         return [done[number] for number in range(len(scenes))]
 
 
-def alike(scene: Scene) -> tuple[Pressed, float]:
+def alike(scene: Scene) -> tuple[LoadingGroup, float]:
     """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
-    return scene.pressed, float(scene.friction.mu)
+    return scene.loading_group, float(scene.friction.mu)
 
 
-def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: float) -> Prediction:
+def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: float) -> Prediction:
     """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
     top, steps = nested.top, nested.steps
     finger, state, way = top.finger, top.state, None
@@ -283,13 +285,13 @@ def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: floa
         raise NotConverged(f"No contact was found at {state.load.depth:g} mm of indentation: ask for more depth.")
     within_reach(scene, state.load.depth)
     newton = finger.newton if way is None else way.newton
-    state, checks = _balanced(finger, newton, state)
-    solved = Solved(scene, state, state.u, checks, steps, way)
-    _audited(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
+    state, checks = _balance(finger, newton, state)
+    solved = SceneSolution(scene, state, state.u, checks, steps, way)
+    _audit(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
     before_estimate = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    there, steps = on_nested(scene, top, steps, meshes)
+    there, steps = solve_nested(scene, top, steps, meshes)
     finer = None if there is None else with_shares(scene, numbers, there, steps)
     row = finger.row.average(state.u)
     took = perf_counter() - before_estimate
@@ -298,7 +300,7 @@ def _predicted(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: floa
     return prediction(solved, finger, numbers, row, finer, took)
 
 
-def _balanced(
+def _balance(
     finger: FiniteFinger, newton: Newton, state: EquilibriumState
 ) -> tuple[EquilibriumState, dict[str, float]]:
     """Return a state and its checks, its displacements so good that no force is left over but by round-off.
@@ -308,7 +310,7 @@ def _balanced(
     """
     checks = _audits(finger, newton, state)
     for _ in range(CORRECTIONS):
-        if audit.unbalanced(checks) <= FINITE_IMBALANCE:
+        if audit.imbalance(checks) <= FINITE_IMBALANCE:
             break
         x = state.place(newton.condensed)[:, 0]
         if not newton.linearise(state, state.load, x):
@@ -317,7 +319,7 @@ def _balanced(
         after = replace(after, state=state.state, sense=state.sense)  # a step of nanometres turns no slip into stick
         better = _audits(finger, newton, after)
         worse = _contradicting(better) > max(_contradicting(checks), FINITE_IMBALANCE)
-        if worse or audit.unbalanced(better) >= audit.unbalanced(checks):
+        if worse or audit.imbalance(better) >= audit.imbalance(checks):
             break
         state, checks = after, better
     return state, checks

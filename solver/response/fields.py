@@ -87,7 +87,7 @@ class Sketch:
         depths = {"skin": 0.0, "epidermis": skin, "dermis": skin + scene.finger.dermis}
         lines = {name: outline.tissue(arcs, np.asarray(depth)) for name, depth in depths.items()}
         lines["patch"] = _patch(outline, scene)
-        followed = {name: _followed(mesh, line) for name, line in lines.items()}
+        followed = {name: _locate(mesh, line) for name, line in lines.items()}
         element, shape = followed["skin"]
         return Sketch(
             mesh=mesh,
@@ -163,7 +163,7 @@ def _patch(outline: Outline, scene: Scene) -> Array:
     return np.concatenate([near, far[::-1], near[:1]])
 
 
-def _followed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
+def _locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     """Return the element (m,) that holds each undeformed point (m, 2), and its shape functions there (m, 9)."""
     element = _holding(mesh, points)
     local = local_coordinates(mesh.nodes[mesh.elements[element]], points, np.zeros(points.shape))
@@ -222,11 +222,11 @@ def way_until(
     try:
         follow(way, finger, scene.loading_per_mm, SMALL, 1.0, lambda _, part: report_part(progress, part))
     except SolveFailure as failure:
-        return _unfolded(finger, way.instants), failure
+        return _before_folding(finger, way.instants), failure
     return tuple(way.instants), None
 
 
-def _unfolded(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:
+def _before_folding(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instant, ...]:
     """Return the states before the first in which tissue is turned inside out; what folds stays folded."""
 
     def folds(instant: Instant) -> bool:
@@ -235,7 +235,7 @@ def _unfolded(finger: LinearFinger, instants: Sequence[Instant]) -> tuple[Instan
     return tuple(instants[: max(bisect_left(instants, True, key=folds), 1)])
 
 
-def most_squeezed(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
+def place_of_least_stretch(finger: LinearFinger, state: EquilibriumState, depth: float) -> tuple[float, float]:
     """Return the place [mm] in the world where tissue is squeezed most: the corner that stretches least."""
     displacement = finger.displacement(state)
     mesh = finger.geometry.mesh

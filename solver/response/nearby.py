@@ -209,7 +209,7 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
             finger = KINDS[scene.solve.kinematics].on(scene, prediction.geometry)
         try:
             if isinstance(finger, FiniteFinger):
-                yield Nearby(scene, _met_again(finger, prediction), finger)
+                yield Nearby(scene, _recover_slide(finger, prediction), finger)
             elif isinstance(finger, LinearFinger):
                 yield Nearby(scene, _small_slide(finger, scene, states(prediction.skin)), finger)
         except NotConverged:
@@ -239,7 +239,7 @@ def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer])
     return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
-def _met_again(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:
+def _recover_slide(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:
     """Return the settled slide of `prediction` at finite strain. Raises NotConverged where it is not met."""
     scene, skin, sense = prediction.scene, prediction.skin, -prediction.scene.loading.direction
     length = np.empty(len(skin.x))

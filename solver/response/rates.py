@@ -92,12 +92,12 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     kind = KINDS[scene.solve.kinematics]
     mesh, nested = kind.on(scene, geometry), kind.of(scene, replace(geometry.sizing, halved=True))
 
-    def marched(finger: Finger[Any], part: float) -> Way:
+    def march_on(finger: Finger[Any], part: float) -> Way:
         return march(scene, finger, part, relaxing=scene.materials.relax)
 
     try:
-        fewer = [course_numbers(history(scene, mesh, marched(mesh, part))) for part in PARTS.tolist()]
-        way = marched(nested, float(PARTS[0]))
+        fewer = [course_numbers(history(scene, mesh, march_on(mesh, part))) for part in PARTS.tolist()]
+        way = march_on(nested, float(PARTS[0]))
     except SolveFailure:
         return CourseNumbers(usual.at * np.nan, usual.rate * np.nan)
     course = history(scene, nested, way)

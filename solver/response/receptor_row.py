@@ -49,7 +49,7 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
         predictions, lambda prediction: (id(prediction.geometry), prediction.scene.solve.kinematics)
     ):
         group = list(same)
-        along = _probed(group[0], arcs, receptor or group[0].scene.receptor)
+        along = _row_patches(group[0], arcs, receptor or group[0].scene.receptor)
         out += [along.responses(prediction.displacement) for prediction in group]
     return np.array(out)
 
@@ -68,23 +68,23 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     """Return the errors of a row (q, r). Raises SolveFailure where the nested mesh has no such state."""
     scene, sizing = prediction.scene, replace(prediction.geometry.sizing, halved=True)
 
-    def probed(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
+    def row_numbers(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
         row = finger.patches(endings(finger.geometry, finger.body.centre, receptor, arcs))
         return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
 
-    nested, state, coarse = _nested(prediction, sizing)
+    nested, state, coarse = _solve_nested(prediction, sizing)
     in_steps = state.load.path_dependent
     if in_steps:
         state = end(scene, nested)
-    (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], probed(nested))
+    (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], row_numbers(nested))
     errors = half_width(finer - values.ravel(), np.linalg.norm(edges, axis=0))
     if in_steps:
-        usual, *fewer = probed(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
+        usual, *fewer = row_numbers(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound
     return errors.reshape(values.shape)
 
 
-def _nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
+def _solve_nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
     """Return the nested finger, its state, and the finger on which a course in fewer steps is judged."""
     scene, meshes = prediction.scene, Meshes()
     if scene.solve.kinematics == "small":
@@ -95,7 +95,7 @@ def _nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], Equili
     return top.finger, top.state, low.finger
 
 
-def _probed(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:
+def _row_patches(prediction: Prediction, arcs: Array, receptor: Receptor) -> Patches:
     """Return endings like that of `receptor` on the mesh of a prediction."""
     mesh, materials = prediction.geometry.mesh, prediction.scene.materials
     elastic = Elastic.of(mesh, settled_moduli(materials))
@@ -116,8 +116,8 @@ def rough_responses(scenes: Sequence[Scene], arcs: Sequence[float] = (0.0,)) -> 
     """
     out = np.full((len(scenes), len(NAMES), len(arcs)), np.nan)
     finite = scenes[0].solve.kinematics == "finite"
-    order = sorted(range(len(scenes)), key=lambda n: (scenes[n].pressed, float(scenes[n].friction.mu)))
-    for _, numbers in groupby(order, lambda n: scenes[n].pressed if finite else None):
+    order = sorted(range(len(scenes)), key=lambda n: (scenes[n].loading_group, float(scenes[n].friction.mu)))
+    for _, numbers in groupby(order, lambda n: scenes[n].loading_group if finite else None):
         group = list(numbers)
         depth = max(expected_depth(scenes[number]) for number in group)
         sizing = Sizing(COARSE, depth, margin=WIDER) if finite else Sizing(FINENESS, depth, margin=WIDE)

@@ -7,8 +7,8 @@ import numpy as np
 
 from solver._kernels.contact_system import STEEP
 from solver.accuracy.error_estimate import ContrastError, compared_sets, contrast_error
-from solver.accuracy.omitted_effects import COARSE, Answers, measured
-from solver.accuracy.refinement import refined
+from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
+from solver.accuracy.refinement import refine_lines
 from solver.accuracy.residual_overstress import with_viscosity
 from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
@@ -63,19 +63,19 @@ def solve_many(
     """
     known: dict[int, tuple[Answer, Answer]] = {}  # an answer's evidence is made once
 
-    def evident(answer: Answer) -> Answer:
+    def add_evidence(answer: Answer) -> Answer:
         if id(answer) not in known:
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
             known[id(answer)] = answer, _with_evidence(answer, progress)
         return known[id(answer)][1]
 
-    def seen(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+    def watch_with_evidence(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
         assert watch is not None
-        watch(number, evident(answer), finger, way)
+        watch(number, add_evidence(answer), finger, way)
 
-    answers = _answers(scenes, progress, seen if watch else None, rough)
-    return tuple(evident(answer) for answer in answers)
+    answers = _answers(scenes, progress, watch_with_evidence if watch else None, rough)
+    return tuple(add_evidence(answer) for answer in answers)
 
 
 def _answers(
@@ -101,7 +101,7 @@ def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
     if prediction.scene.solve.evidence == "estimated":
         return prediction
     report_progress("measuring what the model leaves out")
-    return measured(prediction, lambda scenes: _answers(scenes, progress))
+    return measure_differences(prediction, lambda scenes: _answers(scenes, progress))
 
 
 def _with_earlier_slides(prediction: Prediction, solved: Answers) -> Prediction:
@@ -140,31 +140,31 @@ def _solve_group(
     on_mesh = MESHINGS[kind](depth, progress)
     marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
     if marched and (limited or compared_sets(scenes)):
-        return _marched(scenes, fineness, on_mesh, watch)
-    refined = _refined(scenes, fineness, on_mesh, watch, rough)
-    return [_warned(answer, more) for answer, more in zip(refined.answers, refined.warnings, strict=True)]
+        return _march(scenes, fineness, on_mesh, watch)
+    refined = _refine(scenes, fineness, on_mesh, watch, rough)
+    return [_add_warnings(answer, more) for answer, more in zip(refined.answers, refined.warnings, strict=True)]
 
 
-def _marched(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None) -> list[Answer]:
+def _march(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None) -> list[Answer]:
     """March courses on the mesh that their settled ends ask for, so that each is marched, and watched, once.
 
     What is to be said of an end is said of its course.
     """
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-    ended = _refined(ends, fineness, on_mesh, None, None)
+    ended = _refine(ends, fineness, on_mesh, None, None)
     out: dict[int, Answer] = {}
 
-    def noted(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
-        out[number] = _warned(answer, ended.warnings[number])
+    def record(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
+        out[number] = _add_warnings(answer, ended.warnings[number])
         if watch is not None:
             watch(number, out[number], finger, way)
 
-    answers = on_mesh.answers(scenes, ended.fineness, noted)
+    answers = on_mesh.answers(scenes, ended.fineness, record)
     return [out.get(number, answer) for number, answer in enumerate(answers)]
 
 
 @dataclass(frozen=True, slots=True)
-class _Refined:
+class _Refinement:
     """What was found of scenes that share a mesh."""
 
     answers: list[Answer]
@@ -172,9 +172,9 @@ class _Refined:
     fineness: float | Lines  # of the last mesh
 
 
-def _refined(
+def _refine(
     scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None, rough: Rough | None
-) -> _Refined:
+) -> _Refinement:
     """Refine until every estimate is known and meets its tolerance, of differences too, or no mesh is finer.
 
     Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
@@ -190,14 +190,14 @@ def _refined(
         for last, todo in work.items():
             solved = on_mesh.answers([scenes[i] for i in todo], last, watch)
             for i, answer in zip(todo, solved, strict=True):
-                failure = _why_lost(answer, answers.get(i))
+                failure = _loss(answer, answers.get(i))
                 if failure is not None:
                     lost[i] = failure
                     continue
                 answers[i] = answer
                 best[i] = min(answer, best.get(i, answer), key=_estimate)
         limits = last != FIRST
-        missed = [0.0 if i in lost else _missed(answers[i], limits=limits) for i in range(len(scenes))]
+        missed = [0.0 if i in lost else _error_by_tolerance(answers[i], limits=limits) for i in range(len(scenes))]
         apart = [
             contrast_error([p for i in together if isinstance(p := answers[i], Prediction)]) for together in surfaces
         ]
@@ -205,7 +205,7 @@ def _refined(
         refinable = [
             [i for i in together if isinstance(answers[i], Prediction) and i not in lost] for together in surfaces
         ]
-        wanted = _wanted(scenes, missed, refinable, apart)
+        wanted = _error_reductions(scenes, missed, refinable, apart)
         work = _finer({i: answers[i] for i in sorted(wanted)}, wanted, DEFAULT[kind])
         if not work:
             break
@@ -216,11 +216,11 @@ def _refined(
     if kind == "finite":  # where a fine mesh may lose its way
         lost |= _fallen_back(scenes, answers, fineness, on_mesh)
     of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    warnings = [_undone(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
-    return _Refined([answers[i] for i in range(len(scenes))], warnings, last)
+    warnings = [_sentences(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
+    return _Refinement([answers[i] for i in range(len(scenes))], warnings, last)
 
 
-def _wanted(
+def _error_reductions(
     scenes: Sequence[Scene], missed: Sequence[float], surfaces: Sequence[Sequence[int]], apart: Sequence[ContrastError]
 ) -> dict[int, float]:
     """Return by what the errors of scenes to be solved again have to fall: what is compared shares a mesh.
@@ -253,7 +253,7 @@ def _finer(
             nested = [(wanted[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
             parts = [miss * one.shares for miss, one in nested if one is not None and one.shares is not None]
             unknown = any(one is None for _, one in nested)
-            finer = refined(mesh, None if unknown or not parts else np.max(parts, axis=0))
+            finer = refine_lines(mesh, None if unknown or not parts else np.max(parts, axis=0))
         if finer is not None:
             out.setdefault(finer, []).extend(together)
     return out
@@ -268,7 +268,7 @@ def _fallen_back(
     """
     lost: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
-        if isinstance(failure := answers[i], SolveFailure) and _doubtful(scene, failure):
+        if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
             answer = on_mesh.answers([scene], first / NEXT)[0]
             if _stands(answer, failure):
                 answers[i], lost[i] = answer, failure
@@ -277,7 +277,7 @@ def _fallen_back(
     return lost
 
 
-def _doubtful(scene: Scene, failure: SolveFailure) -> bool:
+def _is_doubtful(scene: Scene, failure: SolveFailure) -> bool:
     """Return whether there may be a state nevertheless: none was found, or the limit is as near as limits are known."""
     if isinstance(failure, NotConverged):
         return True
@@ -291,12 +291,12 @@ def _stands(coarser: Answer, failure: SolveFailure) -> bool:
     Where the finer one is sure that there is none it is not; nor near a limit at which numbers grow so that the coarser
     mesh knows little of them: then the limit is the answer.
     """
-    if not isinstance(coarser, Prediction) or not _doubtful(coarser.scene, failure):
+    if not isinstance(coarser, Prediction) or not _is_doubtful(coarser.scene, failure):
         return False
     return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
 
 
-def _why_lost(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
+def _loss(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
     """Return why the answer of a coarser mesh, if there is one, counts in place of this one; None where it does not."""
     failure = answer if isinstance(answer, SolveFailure) else None
     if isinstance(answer, Prediction) and answer.nested is None and _estimate(coarser) < 1.0:
@@ -309,7 +309,7 @@ def _estimate(answer: Answer | None) -> float:
     return answer.error_estimate if isinstance(answer, Prediction) and answer.nested is not None else 1.0
 
 
-def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
+def _sentences(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
     """Return what is to be said of an answer for what the finest mesh has left undone."""
     warnings: list[str] = []
     if lost is not None:
@@ -325,12 +325,12 @@ def _undone(off: ContrastError | None, missed: float, answer: Answer, lost: Solv
     return tuple(warnings)
 
 
-def _warned(answer: Answer, more: tuple[str, ...]) -> Answer:
+def _add_warnings(answer: Answer, more: tuple[str, ...]) -> Answer:
     """Return the answer with more warnings."""
     return replace(answer, warnings=(*answer.warnings, *more)) if more and isinstance(answer, Prediction) else answer
 
 
-def _missed(answer: Answer, *, limits: bool) -> float:
+def _error_by_tolerance(answer: Answer, *, limits: bool) -> float:
     """Return an answer's error estimate by the tolerance of its scene; 4 where nothing is known of the error.
 
     So it is of a refusal on a mesh whose `limits` are not known to 3 %.

@@ -187,18 +187,18 @@ class FiniteStepper(Stepper):
         force has eased. One that has not caught up with the forces is not shown.
         """
         if self._lost_at is None:
-            return self._followed(normal, tangential)
+            return self._follow(normal, tangential)
         if self._hopeless and normal >= CONTROL.eased * self._lost_at:
             return float("nan")
-        return self._led(normal, tangential)
+        return self._lead(normal, tangential)
 
-    def _led(self, normal: float, tangential: float) -> float:
+    def _lead(self, normal: float, tangential: float) -> float:
         """Return what `step` does of a finger led from nothing to these forces."""
         self.forget()
         sed = float("nan")
         for part in np.linspace(1.0 / CONTROL.stairs, 1.0, CONTROL.stairs).tolist():
             self._behind = part == 1.0
-            sed = self._followed(part * normal, part * tangential, CONTROL.leading)
+            sed = self._follow(part * normal, part * tangential, CONTROL.leading)
             if self.lost:
                 self._lost_at, self._hopeless = normal, True
                 break
@@ -209,7 +209,7 @@ class FiniteStepper(Stepper):
         """Whether there is no state until the normal force eases."""
         return self._lost_at is not None
 
-    def _followed(self, normal: float, tangential: float, iterations: int = 1) -> float:
+    def _follow(self, normal: float, tangential: float, iterations: int = 1) -> float:
         """Return what `step` does of a state that is not lost, or of the untouched finger."""
         newton = self.newton
         state = self._ready(normal, tangential)

@@ -73,7 +73,7 @@ class Scene:
         return self._per_mm(self.loading.normal_force)
 
     @property
-    def pressed(self) -> tuple[float, float, str]:
+    def loading_group(self) -> tuple[float, float, str]:
         """How deep [mm] or hard [N/mm] the finger is pressed, and which way it slides: what like scenes share."""
         return self.loading.indentation or 0.0, self.normal_force or 0.0, str(self.loading.slide)
 
@@ -96,12 +96,12 @@ class Scene:
         forces = {"normal_force": self.normal_force, "tangential_force": self.tangential_force}
         return replace(self.loading, **forces, force_unit="N/mm")
 
-    def unloaded(self, depth: float) -> "Scene":
+    def frictionless_press(self, depth: float) -> "Scene":
         """Return the same finger pressed to a `depth` [mm] without friction: meshes depend on nothing more."""
         bare = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
         return replace(bare, solve=Solve(self.solve.kinematics))
 
-    def undragged(self) -> "Scene":
+    def without_drag(self) -> "Scene":
         """Return the scene that slides on, where a drag was asked for."""
         return replace(self, loading=replace(self.loading, tangential_force=None))
 
@@ -112,7 +112,7 @@ class Scene:
         solve = replace(self.solve, course="steady")
         return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in opposite)
 
-    def pressed_only(self) -> "Scene":
+    def press_only(self) -> "Scene":
         """Return the scene up to the end of its pre-indentation, as a scene of its own."""
         loading = replace(self.loading, slide="none", tangential_force=None)
         return replace(self, loading=loading, solve=replace(self.solve, course="steady"))

@@ -17,7 +17,7 @@ from typing import cast
 from solver.response.solution import solve
 from solver.scene.tables import Solve
 from solver.verification.methods import Kinematics
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
+from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
 from solver.verification.truth import KINEMATICS, cases
 
 # The part of a solve that a folder of the solver works for, or a file or a compiled loop of it that differs.
@@ -69,7 +69,7 @@ def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
     begun, before = clock(), perf_counter()
     answer = solve(scene)
     own = (clock() - begun) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
-    span = timed(partial(solve, scene), 5, 1.5)
+    span = median_time(partial(solve, scene), 5, 1.5)
     profile = cProfile.Profile()
     profile.enable()
     solve(scene)

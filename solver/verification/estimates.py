@@ -17,7 +17,7 @@ from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES, random_scene
 from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within
-from solver.verification.truth import KINEMATICS, NUMBERS, cases, judged, known
+from solver.verification.truth import KINEMATICS, NUMBERS, cases, known_truths, mean_and_doubt
 
 TOLERANCES = (0.01, 0.003, 0.001)
 SMALL = 2e-4  # relative error below which nobody minds by how much an estimate is too large
@@ -58,7 +58,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
-class Guaranteed:
+class GuaranteedCost:
     """What it takes to be sure of a tolerance, in compiled loops: every mesh tried and every estimate included."""
 
     kinematics: Kinematics
@@ -73,23 +73,23 @@ class Guaranteed:
     worst_error: float | None  # where the truth is known
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | Guaranteed | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
     """Yield the published surfaces at each tolerance, then random scenes until time is over."""
     for kinematics in KINEMATICS:
-        yield from _published(request, measurements, kinematics)
+        yield from _estimate_published(request, measurements, kinematics)
     for kinematics in KINEMATICS:
         yield from _random(request, kinematics)
 
 
-def _published(
+def _estimate_published(
     request: Request, measurements: Measurements, kinematics: Kinematics
-) -> Iterator[Estimate | Guaranteed | LeftOut]:
-    truths = known(measurements, kinematics)
+) -> Iterator[Estimate | GuaranteedCost | LeftOut]:
+    truths = known_truths(measurements, kinematics)
     chosen = [scene for scene in cases(kinematics) if scene.title in truths]
     if not chosen:
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
 
-    def rows_at(tolerance: float) -> Iterator[Estimate | Guaranteed]:
+    def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost]:
         begun = clock()
         found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
         took = clock() - begun
@@ -97,10 +97,10 @@ def _published(
         good = [a for a in found_all if isinstance(a, Prediction)]
         for answer in good:
             truth = truths[answer.scene.title]
-            rows += compared(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
+            rows += compare(answer, tolerance, np.array(truth.numbers), np.array(truth.doubt))
         yield from rows
         if good:
-            yield Guaranteed(
+            yield GuaranteedCost(
                 kinematics, tolerance, len(chosen), max(a.dofs for a in good), took, sum(a.wall_s for a in good),
                 good[0].setup_s, sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
@@ -119,20 +119,20 @@ def _random(request: Request, kinematics: Kinematics) -> Iterator[Estimate | Lef
         scene = random_scene(list(FAMILIES)[number % len(FAMILIES)], number, kinematics)
         (answer,) = solve_many([replace(scene, solve=replace(scene.solve, tolerance=TOLERANCES[0]))])
         try:
-            truth = judged(fine_numbers([scene])[:, 0])
+            truth = mean_and_doubt(fine_numbers([scene])[:, 0])
         except SolveFailure:
             truth = None
         if isinstance(answer, SolveFailure) or truth is None:
             refused += 1
         else:
-            yield from compared(answer, TOLERANCES[0], *truth)
+            yield from compare(answer, TOLERANCES[0], *truth)
 
     yield from rows_within(request, range(wanted), f"random scenes at {kinematics} strain", rows_of)
     if refused:
         yield LeftOut(f"{refused} of {wanted} random scenes at {kinematics} strain have no settled state to compare.")
 
 
-def compared(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
+def compare(answer: Prediction, tolerance: float, truth: np.ndarray, doubt: np.ndarray) -> list[Estimate]:
     """Return the estimates of an answer's numbers beside their errors against `truth` (3,) of relative `doubt` (3,)."""
     values = np.abs((answer.sed_ending, answer.normal_force, answer.tangential_force))
     estimates = (answer.error_estimate, answer.normal_force_error, answer.tangential_force_error)

@@ -40,11 +40,11 @@ def fine_numbers(scenes: Sequence[Scene]) -> Array:
         with suppress(SolveFailure):
             solves.append(numbers_on_mesh(scenes, *mesh))
         if len(solves) == ENOUGH:
-            return np.array([*solves, _refined(scenes)])
+            return np.array([*solves, _solve_refined(scenes)])
     raise NotConverged("Fewer than two fine meshes have a state.")
 
 
-def _refined(scenes: Sequence[Scene]) -> Array:
+def _solve_refined(scenes: Sequence[Scene]) -> Array:
     """Return the same (n, 3) as the nested mesh has it of an answer that was refined to a tight tolerance."""
     tolerance = REFINED[scenes[0].solve.kinematics]
     tight = {"tolerance": tolerance, "contrast_tolerance": tolerance if len(scenes) > 1 else None, "evidence": "quick"}

@@ -37,7 +37,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Growth | L
             if last is not None and not request.quick:
                 larger = last.dofs * (fineness / last.fineness) ** 1.6
                 awaited = (last.setup_s + 5.0 * last.floor_s) * (larger / last.dofs) ** 2.2
-                if awaited > SHARE * request.left:
+                if awaited > SHARE * request.seconds_left:
                     yield LeftOut(
                         f"Growth at {kinematics} strain was not followed beyond {last.dofs} unknowns: no time."
                     )

@@ -7,7 +7,7 @@ from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import march
 from solver.scene import Scene
 from solver.verification.methods import MESHED, Kinematics
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
+from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
 from solver.verification.truth import JUDGED, KINEMATICS, cases
 
 PRESS, SLIDES, DISTANCE = 40, 160, 8.0  # substeps of the press and of the slide, and how far it goes [mm]
@@ -15,7 +15,7 @@ FINENESS: dict[Kinematics, float] = {"small": 4.0, "finite": 3.0}
 
 
 @dataclass(frozen=True, slots=True)
-class Marched:
+class March:
     """One surface marched and solved directly, on the same mesh."""
 
     kinematics: Kinematics
@@ -26,12 +26,12 @@ class Marched:
     difference: float  # of the SED, relative
 
 
-def measure(request: Request, measurements: Measurements) -> Iterator[Marched | LeftOut]:
+def measure(request: Request, measurements: Measurements) -> Iterator[March | LeftOut]:
     """Return an iterator over a row a surface and kinematics."""
     del measurements
     names = ("slipperiness 100", "stickiness 0") if request.quick else JUDGED
     scenes = [s for kind in KINEMATICS for s in cases(kind) if s.title in names]
-    return rows_within(request, scenes, "courses of 200 substeps", lambda scene: [_marched(scene)])
+    return rows_within(request, scenes, "courses of 200 substeps", lambda scene: [_march(scene)])
 
 
 def press_and_slide(
@@ -49,7 +49,7 @@ def press_and_slide(
     return down + along
 
 
-def _marched(scene: Scene) -> Marched:
+def _march(scene: Scene) -> March:
     kind = scene.solve.kinematics
     mesh = MESHED[kind](scene, FINENESS[kind], False)
     friction, loading = scene.friction, scene.loading
@@ -57,10 +57,10 @@ def _marched(scene: Scene) -> Marched:
         loading.depth, float(friction.mu), friction.cap, loading.direction,
         press=PRESS, slides=SLIDES, distance=DISTANCE,
     )  # fmt: skip
-    span = timed(lambda: mesh.numbers(mesh.solve(scene)), 5)
+    span = median_time(lambda: mesh.numbers(mesh.solve(scene)), 5)
     begun = clock()
     *_, last = march(mesh.finger.newton, course)
     sed = float(mesh.numbers(last)[0])
     took = mesh.prepared_s + clock() - begun
     off = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
-    return Marched(kind, scene.title, mesh.dofs, mesh.prepared_s + span, took, off)
+    return March(kind, scene.title, mesh.dofs, mesh.prepared_s + span, took, off)

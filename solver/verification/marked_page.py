@@ -1,10 +1,10 @@
 """Pages of the docs with tables that are made and not typed, each between its marks."""
 
 
-def filled(text: str, name: str, text_between: str) -> str:
+def fill_marks(text: str, name: str, text_between: str) -> str:
     r"""Return the page with the table put between its marks. Raises ValueError where the marks are not there.
 
-    >>> filled("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
+    >>> fill_marks("a <!-- x: begin -->old<!-- x: end --> b", "x", "new")
     'a <!-- x: begin -->\nnew\n<!-- x: end --> b'
     """
     begin, end = f"<!-- {name}: begin -->", f"<!-- {name}: end -->"

@@ -12,10 +12,10 @@ from solver.failures import SolveFailure
 from solver.response.solution import solve
 from solver.response.stepper import stepper
 from solver.verification.costs import Cost
-from solver.verification.estimates import Estimate, Guaranteed
+from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth
 from solver.verification.hard_cases import HardCase
-from solver.verification.histories import Marched
+from solver.verification.histories import March
 from solver.verification.machine import Machine
 from solver.verification.orders import Order
 from solver.verification.processes import Cold, Memory
@@ -35,7 +35,7 @@ FULL_S, QUICK_S = 140.0, 12.5  # what the subjects may take; what was begun is e
 KINDS = {
     kind.__name__: kind
     for kind in (
-        Machine, Truth, Speed, Estimate, Guaranteed, Cost, Warm, Marched, Cold, Memory, Problem, Order, Growth,
+        Machine, Truth, Speed, Estimate, GuaranteedCost, Cost, Warm, March, Cold, Memory, Problem, Order, Growth,
         HardCase, Target,
     )
 }  # fmt: skip
@@ -44,7 +44,7 @@ Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class RunResults:
     """All that one run found."""
 
     begun: str  # date and time, UTC
@@ -71,7 +71,7 @@ class Measured:
         return msgspec.json.decode(msgspec.json.encode(whole))
 
 
-def restored(document: dict[str, Any]) -> Measured:
+def restore(document: dict[str, Any]) -> RunResults:
     """Return what `to_dict` made plain data of. Raises msgspec.ValidationError where it is something else."""
     rows = {
         subject.name: tuple(
@@ -81,21 +81,21 @@ def restored(document: dict[str, Any]) -> Measured:
         for subject in SUBJECTS
         if subject.name in document
     }
-    return Measured(
+    return RunResults(
         document["begun"], document["quick"], document["stopped"], document["took_s"], rows, tuple(document["left_out"])
     )
 
 
-def measured(
+def measure(
     quick: bool, progress: Progress, host: Host, subjects: Sequence[Subject] = SUBJECTS,
     seconds: float | None = None, clock: Callable[[], float] = perf_counter,
-) -> Measured:  # fmt: skip
+) -> RunResults:  # fmt: skip
     """Return what the subjects find. Ctrl-C ends the measuring and keeps what was found until then.
 
     `seconds` of `clock` are there for all: with one of processor time a busy machine measures as much as a quiet one.
     """
     begun = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-    loaded(progress)  # before the clock starts: the first run ever compiles what later ones load
+    warm_up(progress)  # before the clock starts: the first run ever compiles what later ones load
     start = clock()
     end = start + (seconds or (QUICK_S if quick else FULL_S))
     measurements = Measurements()
@@ -125,10 +125,10 @@ def measured(
         except (SolveFailure, ArithmeticError, ValueError) as failure:
             left_out.append(f"{subject.doing.capitalize()} broke off: {failure}")
         rows[subject.name], took[subject.name] = tuple(mine), clock() - now
-    return Measured(begun, quick, stopped, took, rows, tuple(left_out))
+    return RunResults(begun, quick, stopped, took, rows, tuple(left_out))
 
 
-def loaded(progress: Progress) -> None:
+def warm_up(progress: Progress) -> None:
     """Solve once in each kinematics and follow one reading, so that compiled loops are in memory and nothing waits."""
     progress(0.0, "loading compiled loops")
     for kinematics in ("small", "finite"):

@@ -26,7 +26,7 @@ Kinematics = Literal["small", "finite"]
 AnyFinger = TypeVar("AnyFinger", bound=Finger[Any])
 
 
-class Meshed(ABC, Generic[AnyFinger]):
+class MeshMethod(ABC, Generic[AnyFinger]):
     """One finger on one mesh; `fineness` is elements to a tip radius, `shift` moves its lines by half an element."""
 
     finger: AnyFinger
@@ -58,7 +58,7 @@ class Meshed(ABC, Generic[AnyFinger]):
         return np.abs(self.finger.numbers(states))
 
 
-class SmallMeshed(Meshed[LinearFinger]):
+class SmallMethod(MeshMethod[LinearFinger]):
     """Small strain: all but the skin eliminated once, contact on what remains."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
@@ -70,19 +70,19 @@ class SmallMeshed(Meshed[LinearFinger]):
         self.setup_s = took - self.prepared_s
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Do as `Meshed` says; every surface begins at the same guess, so `before` is not used."""
+        """Do as `MeshMethod` says; every surface begins at the same guess, so `before` is not used."""
         del before
         return settled(scene, self.finger)
 
     def floor(self) -> float:
-        """Do as `Meshed` says."""
+        """Do as `MeshMethod` says."""
         skin, moduli = np.ones(self.finger.body.condensed.rest.shape), settled_moduli(self.finger.scene.materials)
         begun = clock()
         LinearBody.of(self.finger.geometry.mesh, moduli).displacement(skin)
         return clock() - begun
 
 
-class FiniteMeshed(Meshed[FiniteFinger]):
+class FiniteMethod(MeshMethod[FiniteFinger]):
     """Finite strain on one mesh, begun on a coarse one, which is kept for other surfaces."""
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
@@ -93,14 +93,14 @@ class FiniteMeshed(Meshed[FiniteFinger]):
         self.setup_s = clock() - begun
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
-        """Do as `Meshed` says."""
+        """Do as `MeshMethod` says."""
         if before is None:
             with suppress(SolveFailure):  # a steep slide may fold the skin of a coarse mesh alone
                 before = self.finger.transfer(roughly(self._coarse, scene), self._coarse)
         return steady(self.finger, sliding_load(scene), start=before)
 
     def floor(self) -> float:
-        """Do as `Meshed` says."""
+        """Do as `MeshMethod` says."""
         newton = self.finger.newton
         shape = EquilibriumState.undeformed(newton.condensed)
         begun = clock()
@@ -108,4 +108,4 @@ class FiniteMeshed(Meshed[FiniteFinger]):
         return clock() - begun
 
 
-MESHED: Mapping[Kinematics, type[SmallMeshed | FiniteMeshed]] = {"small": SmallMeshed, "finite": FiniteMeshed}
+MESHED: Mapping[Kinematics, type[SmallMethod | FiniteMethod]] = {"small": SmallMethod, "finite": FiniteMethod}

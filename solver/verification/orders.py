@@ -48,7 +48,7 @@ def slope(sizes: Errors, errors: Errors) -> float:
 def measure(request: Request, measurements: Measurements) -> Iterator[Order | LeftOut]:
     """Return an iterator over a row for each quantity, until time is over."""
     del measurements
-    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, pressed]
+    works: list[Callable[[bool], Iterator[Order]]] = [cylinders, membranes, small_finger, finite_finger, press_orders]
     return rows_within(request, works, "problems whose order is observed", lambda work: work(request.quick))
 
 
@@ -83,7 +83,7 @@ def membranes(quick: bool) -> Iterator[Order]:
     yield _row("Cook's membrane, nu 0.4999", "displacement", "small", sizes, gained.tolist(), took[:-1], 0.9)
 
 
-def pressed(quick: bool) -> Iterator[Order]:
+def press_orders(quick: bool) -> Iterator[Order]:
     """Yield the force on a half-plane under a round body: order 2, root mean square over meshes of nearly one size."""
     sizes = (0.4, 0.2, 0.1) if quick else (0.4, 0.2, 0.1, 0.05)
     true = float(np.mean([contacts.press(0.025 * s, 0.4999) for s in (1.0, 1.1)]))

@@ -72,7 +72,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Cold | Mem
     del measurements
     with tempfile.TemporaryDirectory() as folder:
         for what, command in _commands(Path(folder), request.host.python):
-            if request.left <= 0.0 and not what.startswith("daq-app"):
+            if request.seconds_left <= 0.0 and not what.startswith("daq-app"):
                 continue
             runs = 5 if not request.quick else 2 if what.startswith("daq-app") else 1
             try:

@@ -44,7 +44,7 @@ class Request:
     host: Host = Host()
 
     @property
-    def left(self) -> float:
+    def seconds_left(self) -> float:
         """Seconds left; below 0 when time is over."""
         return self.until - self.now()
 
@@ -64,7 +64,7 @@ class Measurements:
         return [row for row in self.rows if isinstance(row, kind)]
 
 
-def timed(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
+def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
     """Return the median time of `work()` [s] over up to `repeats` runs; slow work is run less often, at least once."""
     spans: list[float] = []
     begun = clock()
@@ -83,7 +83,7 @@ def rows_within(
     """Yield the `rows` of each item of `work`, of one at least, until time is over; then that the rest is left out."""
     items = list(work)
     for number, item in enumerate(items):
-        if number and request.left <= 0.0:
+        if number and request.seconds_left <= 0.0:
             yield LeftOut(f"Time was over after {number} of {len(items)} {what}.")
             return
         yield from rows(item)

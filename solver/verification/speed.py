@@ -9,9 +9,9 @@ import numpy as np
 from solver.failures import SolveFailure
 from solver.response.answers import alike
 from solver.scene import Scene
-from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
-from solver.verification.request import LeftOut, Measurements, Request, clock, rows_within, timed
-from solver.verification.truth import JUDGED, Truth, cases, known
+from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
+from solver.verification.request import LeftOut, Measurements, Request, clock, median_time, rows_within
+from solver.verification.truth import JUDGED, Truth, cases, known_truths
 
 MESHES: dict[
     Kinematics, tuple[float, ...]
@@ -53,13 +53,13 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Speed | Le
     pairs: list[tuple[float, Kinematics]] = [
         (fineness, kind) for kind, all_of in (QUICK if request.quick else MESHES).items() for fineness in all_of
     ]
-    if not all(known(measurements, kind) for kind in MESHED):
+    if not all(known_truths(measurements, kind) for kind in MESHED):
         yield LeftOut("Speeds need the truth of both kinematics, which is not known.")
         return
     patience = LITTLE if request.quick else 1.0
     yield from rows_within(
         request, sorted(pairs), "meshes whose speed is measured",
-        lambda pair: [_row(pair[1], pair[0], known(measurements, pair[1]), patience)],
+        lambda pair: [_row(pair[1], pair[0], known_truths(measurements, pair[1]), patience)],
     )  # fmt: skip
 
 
@@ -83,8 +83,8 @@ def _row(kind: Kinematics, fineness: float, truths: dict[str, Truth], patience: 
         off = np.abs(mesh.numbers(state) - true) / np.where(true > 0.0, true, 1.0)
         errors[scene.title] = tuple(off.tolist())
         solved.append(scene)
-        first.append(timed(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
-    together = timed(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
+        first.append(median_time(lambda s=scene: mesh.numbers(mesh.solve(s)), 5, 0.25 * patience))
+    together = median_time(lambda: mesh.numbers_together([mesh.solve(scene) for scene in solved]), 5, 0.5 * patience)
     onward, between = _onward(mesh, solved, patience)
     floors = floors_before if prepared else between  # of the same moments as most of the work
     next_s = median(onward) if onward else None
@@ -111,7 +111,7 @@ def _prepare(kind: Kinematics, scene: Scene, fineness: float, most_s: float) -> 
     return median(prepared), median(setup), floors
 
 
-def _onward(mesh: SmallMeshed | FiniteMeshed, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
+def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float) -> tuple[list[float], list[float]]:
     """Return what each surface took that was begun at one solved just before, pressed as deep and moved the same way.
 
     Medians over passes through all of `scenes`, in the order the solver takes them, after one in which meshes are made.

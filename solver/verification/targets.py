@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from statistics import median
 
 from solver.prediction import percent
-from solver.verification.estimates import Guaranteed
+from solver.verification.estimates import GuaranteedCost
 from solver.verification.growth import Growth, between, exponent
-from solver.verification.histories import Marched
+from solver.verification.histories import March
 from solver.verification.methods import Kinematics
 from solver.verification.processes import Cold, Memory
 from solver.verification.request import Measurements, Request
@@ -68,9 +68,9 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Target]:
         yield _at_error(measurements, meshes, *row)
     yield _warm(measurements, "warm stepper, finite strain, p99 of a reading", "finite", 1.5, 1.0)
     yield _warm(measurements, "warm stepper, small strain, p99 of a reading", "small", 0.3, 0.1)
-    yield _marched(measurements)
+    yield _march(measurements)
     yield _cold(measurements)
-    yield from map(_guaranteed, measurements.of(Guaranteed))
+    yield from map(_guarantee, measurements.of(GuaranteedCost))
     for row in measurements.of(Memory):
         yield Target(
             f"memory of a solve, {row.kinematics} strain, above idle", percent(row.tolerance), "MB", 100.0, None,
@@ -121,8 +121,8 @@ def _warm(measurements: Measurements, work: str, kinematics: str, reach: float, 
     return Target(work, at, "ms", reach, aim, slowest if worst <= PEAK else None, None, how, part=part)
 
 
-def _marched(measurements: Measurements) -> Target:
-    work, rows = "a course of 200 substeps, by the direct solve", measurements.of(Marched)
+def _march(measurements: Measurements) -> Target:
+    work, rows = "a course of 200 substeps, by the direct solve", measurements.of(March)
     if not rows:
         return Target(work, "1e-10", "times", 60.0, 30.0, None, None, "")
     off = max(abs(row.difference) for row in rows)
@@ -142,7 +142,7 @@ def _cold(measurements: Measurements) -> Target:
     return Target(work, "", "ms", 1000.0, 400.0, 1e3 * max(row.took_s for row in rows), None, how)
 
 
-def _guaranteed(row: Guaranteed) -> Target:
+def _guarantee(row: GuaranteedCost) -> Target:
     error = "" if row.worst_error is None else f", true error {percent(row.worst_error)}"
     how = f"{row.dofs} unknowns, estimate {percent(row.worst_estimate)}{error}"
     work = f"guaranteed tolerance, {row.kinematics} strain, {row.surfaces} surfaces, mesh to evidence included"

@@ -16,7 +16,7 @@ from solver.response.solution import solve_many
 from solver.scene import Scene
 from solver.scene.published import scenes
 from solver.scene.tables import Solve
-from solver.verification.methods import MESHED, FiniteMeshed, Kinematics, SmallMeshed
+from solver.verification.methods import MESHED, FiniteMethod, Kinematics, SmallMethod
 from solver.verification.request import LeftOut, Measurements, Request, clock
 
 KINEMATICS = tuple(MESHED)
@@ -60,21 +60,21 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Truth | Le
         yield from _truths(request, kinematics, chosen)
 
 
-def judged(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return mean and doubt (3,) of the numbers found on three meshes (3, 3)."""
     mean = solves.mean(axis=0)
     return mean, np.abs(solves / np.where(mean > 0.0, mean, 1.0) - 1.0).max(axis=0)
 
 
 def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
-    refused, todo = _sorted_out(kinematics, chosen)
+    refused, todo = _split_refusals(kinematics, chosen)
     yield from refused
     begun = clock()
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
     meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
     shared = (clock() - begun) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
-        if request.left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
+        if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
             yield LeftOut(
                 f"Time was over before the truth of {len(todo) - number} cases at {kinematics} strain was known."
             )
@@ -82,18 +82,18 @@ def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> It
         yield _truth(scene, meshes, shared)
 
 
-def _truth(scene: Scene, meshes: Sequence[SmallMeshed | FiniteMeshed], shared: float) -> Truth:
+def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: float) -> Truth:
     begun, kinematics = clock(), scene.solve.kinematics
     try:
         solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
     except SolveFailure as failure:
         return Truth(kinematics, scene.title, (), (), (), clock() - begun, f"On an overkill mesh: {failure}")
-    mean, doubt = judged(solves)
+    mean, doubt = mean_and_doubt(solves)
     took, dofs = clock() - begun + shared, tuple(mesh.dofs for mesh in meshes)
     return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, took, "")
 
 
-def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
+def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
     """Return the cases that the solver refuses, each with its sentence, and the others."""
     refused: list[Truth] = []
     todo: list[Scene] = []
@@ -110,6 +110,6 @@ def _sorted_out(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth
     return refused, todo
 
 
-def known(measurements: Measurements, kinematics: Kinematics) -> dict[str, Truth]:
+def known_truths(measurements: Measurements, kinematics: Kinematics) -> dict[str, Truth]:
     """Return the cases whose truth is known, by name."""
     return {t.case: t for t in measurements.of(Truth) if t.kinematics == kinematics and t.numbers}

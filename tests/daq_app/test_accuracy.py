@@ -14,16 +14,16 @@ from solver import solve
 from solver.response.solution import DEFAULT
 from solver.verification import estimates, targets
 from solver.verification.costs import Cost, shares
-from solver.verification.estimates import Estimate, Guaranteed
+from solver.verification.estimates import Estimate, GuaranteedCost
 from solver.verification.growth import Growth, exponent
 from solver.verification.hard_cases import HardCase
 from solver.verification.machine import Machine
-from solver.verification.measuring import Measured, measured, restored
-from solver.verification.methods import FiniteMeshed
+from solver.verification.measuring import RunResults, measure, restore
+from solver.verification.methods import FiniteMethod
 from solver.verification.orders import Order
 from solver.verification.published.problems import Problem
 from solver.verification.random_scenes import random_scene
-from solver.verification.request import Host, LeftOut, Measurements, Request, rows_within, timed
+from solver.verification.request import Host, LeftOut, Measurements, Request, median_time, rows_within
 from solver.verification.speed import Speed
 from solver.verification.subjects import Subject
 from solver.verification.truth import JUDGED, Truth, cases
@@ -58,7 +58,7 @@ ROWS = {
     ),
     "estimates": (
         estimate(0.01, 0.004), estimate(0.002, 0.004), estimate(0.003, 0.0001, 0.1),
-        Guaranteed("small", 0.01, 6, 900, 0.3, 0.1, 0.1, 0.1, 0.009, 0.003),
+        GuaranteedCost("small", 0.01, 6, 900, 0.3, 0.1, 0.1, 0.1, 0.009, 0.003),
     ),
     "costs": (Cost("small", 0.01, 900, 0.1, 0.04, 0.03, 0.03, {"assembly": 0.75, "the rest": 0.25}),),
     "warm": (Warm("finite", "slipperiness 0", 260, 5e-4, 9e-4, 1e-3, 0.013, 0.1),),
@@ -80,7 +80,7 @@ def example():
     found = Measurements([row for rows in ROWS.values() for row in rows])
     rows = {**ROWS, "targets": tuple(targets.measure(FOREVER, found))}
     took = dict.fromkeys(rows, 1.0)
-    return Measured("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
+    return RunResults("2026-11-21T20:00:00+00:00", False, False, took, rows, ("Growth was not followed further.",))
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def test_time_is_drawn_against_the_error_that_is_guaranteed_and_against_the_true
 
 def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
     scene = next(s for s in cases("finite") if s.title == "slipperiness 100")
-    timed_way = FiniteMeshed(scene, DEFAULT["finite"], False)
+    timed_way = FiniteMethod(scene, DEFAULT["finite"], False)
     found = timed_way.numbers(timed_way.solve(scene))
     answer = solve(scene)
     assert found == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)
@@ -140,7 +140,7 @@ def test_an_aim_met_by_a_part_of_what_was_asked_says_by_which_part(example):
 
 def test_pictures_and_tables_can_be_made_again_from_the_data_alone(example, written):
     data = json.loads((written[0].parent / "accuracy.json").read_text(encoding="utf-8"))
-    again = restored(data)
+    again = restore(data)
     assert again == example
     assert tables(again) == tables(example)
 
@@ -226,9 +226,9 @@ def test_when_time_is_over_one_thing_is_still_measured_and_the_rest_is_named():
 
 def test_a_time_is_the_median_of_runs_and_slow_work_is_run_once():
     runs = []
-    timed(lambda: runs.append(1), repeats=5)
+    median_time(lambda: runs.append(1), repeats=5)
     assert len(runs) == 5
-    timed(lambda: runs.append(1), repeats=5, most_s=-1.0)
+    median_time(lambda: runs.append(1), repeats=5, most_s=-1.0)
     assert len(runs) == 6
 
 
@@ -250,14 +250,14 @@ def quiet(*_):
 
 @pytest.fixture
 def unloaded(monkeypatch):
-    monkeypatch.setattr("solver.verification.measuring.loaded", quiet)
+    monkeypatch.setattr("solver.verification.measuring.warm_up", quiet)
 
 
 @pytest.mark.usefixtures("unloaded")
 def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first), subject("two", second, KeyboardInterrupt), subject("three", first)]
-    found = measured(True, quiet, HOST, parts, seconds=5.0)
+    found = measure(True, quiet, HOST, parts, seconds=5.0)
     assert found.stopped
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("Stopped during: the two.", "Stopped before: the three.")
@@ -268,7 +268,7 @@ def test_ctrl_c_keeps_what_was_measured_and_names_what_was_not():
 def test_a_subject_that_breaks_off_loses_nothing_of_the_others():
     first, second = ROWS["growth"][:2]
     parts = [subject("one", first, ValueError("bad luck")), subject("two", second)]
-    found = measured(True, quiet, HOST, parts, seconds=5.0)
+    found = measure(True, quiet, HOST, parts, seconds=5.0)
     assert found.rows == {"one": (first,), "two": (second,)}
     assert found.left_out == ("The one broke off: bad luck",)
 
@@ -288,7 +288,7 @@ def test_time_within_a_part_of_the_solver_counts_for_that_part_and_that_outside_
 
 @pytest.mark.slow
 def test_a_quick_run_measures_something_of_every_subject(tmp_path):
-    found = measured(True, quiet, HOST, seconds=1.0)
+    found = measure(True, quiet, HOST, seconds=1.0)
     assert {name for name, rows in found.rows.items() if not rows} == set()
     assert not [told for told in found.left_out if "broke off" in told]
     write(found, tmp_path)

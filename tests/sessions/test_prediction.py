@@ -10,7 +10,7 @@ from paper_friction import MEASURED, PLAN, analysis, parameters, stroke
 from sessions.plan.plan import Finger as OwnFinger
 from sessions.prediction import PredictionOptions, predict, with_own_finger
 from solver import Finger, Friction, Loading, Scene, SceneError, solve, solve_many
-from solver.response.fields import Sketch, most_squeezed, stills, way_until
+from solver.response.fields import Sketch, place_of_least_stretch, stills, way_until
 from solver.scene.published import SLIPPERINESS, STICKINESS
 
 
@@ -77,7 +77,7 @@ def test_a_solve_without_an_answer_is_followed_to_its_last_good_state(watched):
     assert times[-1] >= 1.0  # it was pressed, and lost while it slid
     last = instants[-1]
     assert np.prod(way.finger.body.stretches(way.finger.displacement(last.state)), axis=0).min() > 0.0  # nothing folds
-    x, y = most_squeezed(way.finger, last.state, last.depth)
+    x, y = place_of_least_stretch(way.finger, last.state, last.depth)
     nodes = way.finger.geometry.mesh.nodes + way.finger.displacement(last.state)
     assert nodes[:, 0].min() <= x <= nodes[:, 0].max()
     assert y <= nodes[:, 1].max()

@@ -10,7 +10,7 @@ from solver.constitutive import LAWS, stress
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import settled
 from solver.mesh import block, quality
-from solver.verification.published.bodies import distorted
+from solver.verification.published.bodies import distort
 from solver.verification.published.finite_contacts import ELEMENT, light_finite
 from solver.verification.published.problems import CAPPED, FINITE_PARTS
 from tests.solver.finite_examples import finger
@@ -27,7 +27,7 @@ def sheet(kind):
     edge = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
     mesh = replace(mesh, held=edge)
     if kind == "distorted":
-        mesh = distorted(mesh, 0.45, 2)
+        mesh = distort(mesh, 0.45, 2)
     if kind == "curved":
         nodes = mesh.nodes.copy()
         inner = np.setdiff1d(np.arange(len(nodes)), edge)
@@ -93,14 +93,14 @@ def test_a_light_contact_is_that_of_hertz():
 
 @pytest.mark.parametrize(("k", "force"), CAPPED)
 def test_a_bound_on_it_carries_the_elementary_integral(k, force):
-    drag, width = light_finite().capped(0.3, k)
+    drag, width = light_finite().slide_at_bound(0.3, k)
     assert drag == pytest.approx(force, rel=0.005)
     assert width == pytest.approx(np.sqrt(1 - k**2), rel=0.005, abs=ELEMENT if k == 1.0 else 0.0)
 
 
 @pytest.mark.parametrize("part", FINITE_PARTS)
 def test_its_partial_slip_is_that_of_cattaneo_and_mindlin(part):
-    drag, width, traction = light_finite().sheared(0.3, part)
+    drag, width, traction = light_finite().shear(0.3, part)
     half = np.sqrt(1 - drag)
     assert drag == pytest.approx(part, abs=0.05)
     assert width == pytest.approx(half, rel=0.02)

@@ -105,7 +105,7 @@ def test_the_stress_along_a_sliding_surface_is_the_closed_form_and_pulls_behind_
 @pytest.mark.parametrize("mu", [0.01, 0.3])
 def test_partial_slip_is_that_of_cattaneo_and_mindlin(light, mu, part):
     """Stick for |x| < c = sqrt(1 - Q/(mu P)); q = mu p less mu p0 c sqrt(1 - x^2/c^2) inside."""
-    found = light.sheared(FrictionLaw(mu, np.inf), part)
+    found = light.shear(FrictionLaw(mu, np.inf), part)
     x, c, top = light.x, np.sqrt(1 - part), mu * light.peak
     assert -found.tangential.sum() == pytest.approx(part * mu * light.load, rel=1e-10)
     assert contacts.stick_width(light, found, mu) == pytest.approx(c, rel=0.02)

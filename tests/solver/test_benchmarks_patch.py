@@ -12,7 +12,7 @@ from solver.constitutive import Hooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.load_stepping import settled
 from solver.mesh import Q2P1, Mesh, block, quality
-from solver.verification.published.bodies import distorted
+from solver.verification.published.bodies import distort
 from tests.solver.oracle.laws import hooke_energy
 
 GRADIENT = np.array([[0.01, 0.03], [-0.02, -0.01]])  # keeps volume, as an incompressible body asks
@@ -25,7 +25,7 @@ def sheet(kind: str) -> Mesh:
     edge = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
     mesh = replace(mesh, held=edge, skin=mesh.skin[:0])
     if kind == "distorted":
-        return distorted(mesh, 0.45, 2)
+        return distort(mesh, 0.45, 2)
     if kind == "curved":
         rng = np.random.default_rng(4)
         nodes = mesh.nodes.copy()
@@ -54,7 +54,7 @@ def test_a_linear_field_on_the_boundary_is_linear_inside_and_its_stress_constant
 
 def pressed(nu: float, shear: float, seed: int):
     """A block distorted to 0.45 under uniform pressure 1e-3 and shear, its sides pressed so that it stays as wide."""
-    mesh = distorted(block(np.linspace(-1, 1, 6), np.linspace(0, 1.5, 4), held=False), 0.45, seed)
+    mesh = distort(block(np.linspace(-1, 1, 6), np.linspace(0, 1.5, 4), held=False), 0.45, seed)
     order = np.arange(len(mesh.nodes)).reshape(11, 7)
     aside = 1e-3 * nu / (1.0 - nu)
     loads = edge_load(mesh, order[:, 0], np.tile([shear, -1e-3], (11, 1)))

@@ -14,7 +14,7 @@ from solver.equilibrium.load_stepping import settled
 from solver.response import answers
 from solver.response.solution import UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
-from solver.verification.methods import FiniteMeshed
+from solver.verification.methods import FiniteMethod
 from tests.solver.finite_examples import published
 
 # Ending-averaged SED [MPa], normal and tangential force [N/mm] of the published finger: means of two independent codes
@@ -101,7 +101,7 @@ def test_differences_between_five_surfaces_are_those_of_separate_overkill_solves
     scenes = [finite(surface, tolerance=0.01) for surface in SLIPPERINESS]
     found = np.array([[p.sed_ending, p.normal_force, p.tangential_force] for p in solve_many(scenes)])
     meshes = [
-        FiniteMeshed(scenes[0], fineness, shift) for fineness, shift in ((15.0, False), (15.0, True), (13.0, False))
+        FiniteMethod(scenes[0], fineness, shift) for fineness, shift in ((15.0, False), (15.0, True), (13.0, False))
     ]
     true = np.mean([[mesh.numbers(mesh.solve(scene)) for scene in scenes] for mesh in meshes], axis=0)
     apart = (found[:, None] - found) - (true[:, None] - true)
@@ -161,12 +161,12 @@ def test_small_and_finite_strain_agree_where_the_press_is_shallow():
 def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said_to_be_of_unknown_error(
     monkeypatch, lost_below, known
 ):
-    nested = answers.on_nested
+    nested = answers.solve_nested
 
     def lost(scene, top, *more):
         return (None, None) if top.finger.body.dofs < lost_below else nested(scene, top, *more)
 
-    monkeypatch.setattr(answers, "on_nested", lost)
+    monkeypatch.setattr(answers, "solve_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
     assert (UNKNOWN in found.warnings) == (not known)

@@ -20,7 +20,7 @@ from solver import (
     solve,
     solve_many,
 )
-from solver.verification.hard_cases import cases, judged
+from solver.verification.hard_cases import cases, judge
 from solver.verification.hard_cases.light import of_light_touch
 from solver.verification.hard_cases.outcome import of_scene
 from solver.verification.hard_cases.suite import TELLING, Case
@@ -37,7 +37,7 @@ def shown(case: Case):
 @pytest.mark.parametrize("case", [shown(case) for case in SUITE.values()])
 def test_a_hard_case_ends_as_it_must(case):
     neighbour = SUITE[case.kinematics, case.same_as].run() if case.same_as else None
-    assert judged(case, neighbour).flaw == ""
+    assert judge(case, neighbour).flaw == ""
 
 
 @pytest.mark.parametrize("kinematics", ["small", "finite"])
@@ -66,10 +66,10 @@ def test_a_case_that_fails_is_told_as_one():
     assert not hopeless.answered
     assert hopeless.numbers == ()
     refused = Case("small", "refused", "answer", lambda: hopeless)
-    assert judged(refused).flaw == "no answer"
+    assert judge(refused).flaw == "no answer"
     one, other = SUITE["small", "mu 0"].run(), SUITE["small", "mu 0.44"]
     apart = Case("small", "apart", "answer", other.run, "mu 0", 1e-3)
-    assert judged(apart, one).flaw.endswith("from mu 0, not 0.001")
+    assert judge(apart, one).flaw.endswith("from mu 0, not 0.001")
 
 
 def test_a_touch_that_is_not_hertz_s_is_told_as_one():

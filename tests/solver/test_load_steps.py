@@ -31,7 +31,7 @@ def test_half_the_tolerance_asks_for_twice_the_steps_up_to_a_limit(tolerance, ti
 def test_an_error_in_proportion_to_the_step_is_taken_out_of_what_a_coarse_mesh_says():
     excess = np.resize([4e-3, 0.0, 1e-3, 0.0, -2e-3, 0.0, 4e-3], COUNT)
     steps = Steps.of(USUAL, after(PARTS, excess), 0.003)
-    np.testing.assert_allclose(steps.taken(USUAL), USUAL - excess + excess / steps.times, rtol=1e-12)
+    np.testing.assert_allclose(steps.extrapolate(USUAL), USUAL - excess + excess / steps.times, rtol=1e-12)
     np.testing.assert_allclose(steps.error, 2.0 * np.abs(excess) / steps.times, atol=1e-15)
 
 

@@ -25,7 +25,7 @@ def test_at_the_singular_corner_of_cook_s_membrane_the_order_is_that_of_the_sing
 
 def test_the_force_of_a_contact_whose_edge_falls_anywhere_converges_with_order_2():
     """The root mean square over meshes of nearly one size, since a single one may be right by chance."""
-    (row,) = orders.pressed(quick=False)
+    (row,) = orders.press_orders(quick=False)
     assert held([row])
     assert row.errors[-1] < 1e-4
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.accuracy.error_estimate import PARTS, estimated
+from solver.accuracy.error_estimate import PARTS, estimate_errors
 from solver.body.finite import FiniteBody
 from solver.body.linear import Elastic, LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke
@@ -76,7 +76,7 @@ def test_errors_of_the_forces_on_a_round_foot_lie_above_the_true_ones_and_below_
     fine = [settled(made(foot(n)), SLIDES).force for n in (64, 72)]
     mesh = foot(columns)
     newton, nested = made(mesh), made(HalvedMesh.of(mesh).mesh)
-    found = estimated(force, newton, settled(newton, SLIDES), (nested, settled(nested, SLIDES)))
+    found = estimate_errors(force, newton, settled(newton, SLIDES), (nested, settled(nested, SLIDES)))
     true = np.abs(found.value - fine[1])
     assert np.all(np.abs(fine[1] - fine[0]) < found.error / 3.0)
     assert np.all(true <= found.error)
@@ -91,7 +91,7 @@ def test_under_a_given_force_the_depth_has_an_error():
     def depth(_, state):
         return np.array([state.load.depth])
 
-    found = estimated(depth, newton, states[0], (nested, states[1]), ForceLoad(0.02, None))
+    found = estimate_errors(depth, newton, states[0], (nested, states[1]), ForceLoad(0.02, None))
     assert abs(found.value - states[2].load.depth) <= found.error
     assert found.error < 0.02 * found.value
 
@@ -109,9 +109,9 @@ def test_a_press_with_friction_errs_by_its_load_steps_too():
     usual, finer = pressed(newton, 25), pressed(nested, 25)
     true = drag_of_half(None, pressed(small(foot(48)), 400))
     fewer = [pressed(newton, round(25 * part)) for part in PARTS]
-    found = estimated(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
-    without = estimated(drag_of_half, newton, usual, (nested, finer))
+    found = estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer)
+    without = estimate_errors(drag_of_half, newton, usual, (nested, finer))
     assert abs(found.value - true) <= found.error
     assert found.error > without.error
     with pytest.raises(ValueError, match="fewer has 1 states"):
-        estimated(drag_of_half, newton, usual, (nested, finer), fewer=fewer[:1])
+        estimate_errors(drag_of_half, newton, usual, (nested, finer), fewer=fewer[:1])

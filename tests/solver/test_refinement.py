@@ -7,7 +7,7 @@ import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import adaptivity, refinement
-from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refined
+from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refine_lines
 from solver.continuation.small_states import WIDE
 from solver.continuation.small_states import settled as settled_state
 from solver.equilibrium import Newton
@@ -88,8 +88,8 @@ def test_dividing_what_has_the_largest_part_changes_the_sed_most():
 def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
     mesh = LinearFinger.of(SLIDES["slip"], COARSE).geometry
     gaps = len(mesh.lines.arcs) - 1 + mesh.lines.rows
-    few, many = (refined(mesh, np.full(gaps, error)) for error in (1e-6, 1e6))
-    halves = refined(mesh, None)
+    few, many = (refine_lines(mesh, np.full(gaps, error)) for error in (1e-6, 1e6))
+    halves = refine_lines(mesh, None)
     for lines in (few, many, halves):
         assert set(mesh.lines.arcs) < set(lines.arcs)
         assert np.all(np.diff(lines.arcs) > 0.0)
@@ -110,7 +110,10 @@ def test_refinement_comes_to_an_end(monkeypatch):
     assert dofs[-1] <= 4000
     # elements so small that none may be divided
     monkeypatch.setattr(refinement, "FINEST", 1.0)
-    assert refined(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9)) is None
+    assert (
+        refine_lines(tight.geometry, np.full(len(tight.geometry.lines.arcs) - 1 + tight.geometry.lines.rows, 1e9))
+        is None
+    )
 
 
 def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
@@ -141,7 +144,7 @@ def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
     meshes = adaptivity.Meshes()
     low = adaptivity.coarse_solution(scene, 1.0, 4.0, meshes)
     tried[:] = [low.finger]
-    lines = refined(low.finger.geometry, None)
+    lines = refine_lines(low.finger.geometry, None)
     top = adaptivity.solution_on(scene, replace(low.sizing, fineness=lines), low, meshes)
     assert len(top.finger.geometry.lines.arcs) == 2 * len(lines.arcs) - 1
     assert top.finger.geometry.lines.rows == lines.rows

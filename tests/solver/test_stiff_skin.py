@@ -36,7 +36,7 @@ def meshing(monkeypatch, finer, *, missed=None):
 
     monkeypatch.setattr(FiniteMeshing, "answers", solved)
     if missed is not None:
-        monkeypatch.setattr(solution, "_missed", missed)
+        monkeypatch.setattr(solution, "_error_by_tolerance", missed)
     return asked
 
 

@@ -13,7 +13,7 @@ from daq_app.child_process import interpreter
 from daq_app.console import DONE, STOPPED, Console, WrongValue, table
 
 if TYPE_CHECKING:
-    from solver.verification.measuring import Measured
+    from solver.verification.measuring import RunResults
 
 EXAMPLE = "daq-app accuracy --quick --out accuracy"
 
@@ -50,16 +50,16 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return STOPPED if measured.stopped else DONE
 
 
-def _measured(options: argparse.Namespace, console: Console) -> "Measured":
+def _measured(options: argparse.Namespace, console: Console) -> "RunResults":
     """Return what is measured, or what an earlier run measured. Raises WrongValue for a file that is none."""
     from sessions.file_access import read_limited
     from sessions.recording.head import software_versions
-    from solver.verification.measuring import measured, restored
+    from solver.verification.measuring import measure, restore
     from solver.verification.request import Host
 
     if options.data is None:
-        return measured(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
+        return measure(options.quick, console.progress, Host(software_versions(), tuple(interpreter())))
     try:
-        return restored(json.loads(read_limited(options.data)))
+        return restore(json.loads(read_limited(options.data)))
     except (ValueError, KeyError, TypeError) as error:
         raise WrongValue(f"{options.data} is no accuracy.json of this program ({error}); give another file") from error

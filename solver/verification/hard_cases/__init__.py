@@ -4,6 +4,6 @@ A case is a scene or a body, and what must happen: an answer, an answer where a 
 passes when what came out is that, balances, exceeds no law, holds no nan, and is what a neighbouring case gives.
 """
 
-from solver.verification.hard_cases.suite import Case, HardCase, cases, judged, measure
+from solver.verification.hard_cases.suite import Case, HardCase, cases, judge, measure
 
-__all__ = ["Case", "HardCase", "cases", "judged", "measure"]
+__all__ = ["Case", "HardCase", "cases", "judge", "measure"]

@@ -18,7 +18,7 @@ from solver.scene.published import STICKINESS, scene
 from solver.verification.hard_cases.meshes import slabs, two_parts
 from solver.verification.hard_cases.outcome import Outcome, agree, power
 from solver.verification.methods import Kinematics
-from solver.verification.published.bodies import distorted
+from solver.verification.published.bodies import distort
 
 DEPTH = 1.5  # [mm]
 TISSUES = ((0.136, 0.48), (0.08, 0.48), (0.034, 0.48))  # Young's modulus [MPa] and Poisson's ratio
@@ -140,7 +140,7 @@ def edge_at_node(bodies: Bodies) -> Outcome:
 def distorted_finger(bodies: Bodies) -> Outcome:
     """Move every free inner node of the finger's mesh by 0.45 of its distance to the next, at random."""
     geometry = bodies.finger(8.0).geometry
-    meshes = [distorted(geometry.mesh, 0.45, seed, geometry.whole) for seed in range(bodies.meshes)]
+    meshes = [distort(geometry.mesh, 0.45, seed, geometry.whole) for seed in range(bodies.meshes)]
     forces = [_force(bodies.newton(mesh, TISSUES), DEPTH, bodies.sense) for mesh in (geometry.mesh, *meshes)]
     spread = max(abs(f / forces[0] - 1) for f in forces)
     flaw = "" if spread < 0.01 else f"the force changes by {spread:.1g}"

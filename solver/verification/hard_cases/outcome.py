@@ -34,16 +34,16 @@ def of_scene(scene: Scene) -> Outcome:
 
 def of_answer(answer: Prediction | SolveFailure) -> Outcome:
     """Return how a solve ended."""
-    return _refused(answer) if isinstance(answer, SolveFailure) else _answered(answer)
+    return _of_refusal(answer) if isinstance(answer, SolveFailure) else _of_answer(answer)
 
 
-def _refused(failure: SolveFailure) -> Outcome:
+def _of_refusal(failure: SolveFailure) -> Outcome:
     summary = str(failure)
     flaw = "" if summary.endswith(".") and "nan" not in summary.split() else "its reason is no sentence"
     return Outcome(False, (), flaw, summary)
 
 
-def _answered(answer: Prediction) -> Outcome:
+def _of_answer(answer: Prediction) -> Outcome:
     checks = answer.audits
     flaws = [name for name in BALANCE if name in checks and not checks[name] < UNBALANCED]
     flaws += [name for name in LIMITS if not checks[name] < EXCEEDED]

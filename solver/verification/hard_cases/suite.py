@@ -49,12 +49,12 @@ def cases(kinematics: Kinematics) -> tuple[Case, ...]:
     return (*hard_scenes(kinematics), *of_bodies)
 
 
-def judged(case: Case, neighbour: Outcome | None = None) -> HardCase:
+def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
     """Run one case and say what is wrong, if anything; `neighbour` is the outcome of the case it must be `same_as`."""
-    return _judged(case, neighbour)[0]
+    return _judge(case, neighbour)[0]
 
 
-def _judged(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
+def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
     begun, outcome = clock(), case.run()
     flaws = [outcome.flaw] if outcome.flaw else []
     if not outcome.answered and case.must == ANSWER:
@@ -80,7 +80,7 @@ def measure(request: Request, measurements: Measurements) -> Iterator[HardCase |
     kept: dict[tuple[Kinematics, str], Outcome] = {}
 
     def rows(case: Case) -> Iterator[HardCase]:
-        row, kept[case.kinematics, case.name] = _judged(case, kept.get((case.kinematics, case.same_as)))
+        row, kept[case.kinematics, case.name] = _judge(case, kept.get((case.kinematics, case.same_as)))
         yield row
 
     yield from rows_within(request, todo, "hard cases", rows)

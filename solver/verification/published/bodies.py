@@ -16,7 +16,7 @@ from solver.mesh import Q2P1, Mesh, grid_mesh, local_coordinates, with_middles
 NONE: Indices = np.zeros(0, np.int64)
 
 
-def graded(finest: float, growth: float, zone: float, end: float) -> Array:
+def grade(finest: float, growth: float, zone: float, end: float) -> Array:
     """Return lines from 0 to `end`, `finest` apart up to `zone` and then further and further apart."""
     steps = [0.0]
     while steps[-1] < end:
@@ -24,12 +24,12 @@ def graded(finest: float, growth: float, zone: float, end: float) -> Array:
     return np.array(steps) * end / steps[-1]
 
 
-def mirrored(lines: Array) -> Array:
+def mirror(lines: Array) -> Array:
     """Return the lines from 0 up, and as many below 0."""
     return np.concatenate([-lines[:0:-1], lines])
 
 
-def joined(grids: Sequence[Array]) -> Mesh:
+def join(grids: Sequence[Array]) -> Mesh:
     """Return the mesh of several grids of points (2 a + 1, 2 b + 1, 2), nodes at one place made one.
 
     Nothing is held, nothing may touch.
@@ -54,7 +54,7 @@ def ring(inner: float, outer: float, radial: int, around: int) -> tuple[Mesh, In
     """Return a thick cylinder that nothing holds, and the nodes of its hole in order; its skin is one outer edge."""
     r = with_middles(np.geomspace(inner, outer, radial + 1))
     turn = np.linspace(-np.pi, np.pi, 2 * around + 1)
-    mesh = joined([np.stack([r * np.cos(turn)[:, None], r * np.sin(turn)[:, None]], axis=-1)])
+    mesh = join([np.stack([r * np.cos(turn)[:, None], r * np.sin(turn)[:, None]], axis=-1)])
     x, y = mesh.nodes.T
     radius = np.hypot(x, y)
     angle = np.asarray(np.round(np.arctan2(y, x), 9) % round(2 * np.pi, 9), np.float64)
@@ -70,7 +70,7 @@ def membrane(across: int, up: int) -> Mesh:
     points = np.empty((len(x), len(part), 2))
     points[..., 0] = x[:, None]
     points[..., 1] = high[:, None] + (low - high)[:, None] * part  # from the upper edge downwards
-    mesh = joined([points])
+    mesh = join([points])
     left = np.flatnonzero(np.isclose(mesh.nodes[:, 0], 0.0))
     right = chain(np.isclose(mesh.nodes[:, 0], 48.0), mesh.nodes[:, 1])
     return replace(mesh, held=left, skin=right)
@@ -93,9 +93,9 @@ def mound(x_lines: Array, y_lines: Array, radius: float, zone: float) -> Mesh:
 
 def disc(radius: float, finest: float, zone: float) -> Mesh:
     """Return a whole cylinder standing on the surface, fine below and above; its skin is the lower quarter."""
-    fine = mirrored(graded(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
+    fine = mirror(grade(finest, 0.3, zone, radius * np.pi / 4)) / radius  # angles from the foot
     coarse = np.linspace(-np.pi / 4, np.pi / 4, 13)
-    out = 1 - graded(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
+    out = 1 - grade(finest, 0.3, 0.0, 0.45 * radius)[::-1] / radius  # radii by the outer one
     half = 0.4 * radius
 
     def quarter(angles: Array, turn: float) -> Array:
@@ -110,7 +110,7 @@ def disc(radius: float, finest: float, zone: float) -> Mesh:
     x, y = half * np.tan(with_middles(fine)), half * np.tan(with_middles(coarse))
     core = np.stack(np.meshgrid(x, y[::-1], indexing="ij"), axis=-1)
     quarters = [quarter(fine if n % 2 == 0 else coarse, n * np.pi / 2) for n in range(4)]
-    mesh = joined([core, *quarters])
+    mesh = join([core, *quarters])
     nodes = mesh.nodes + np.array([0.0, radius])
     on = np.isclose(np.hypot(*mesh.nodes.T), radius)
     low = on & (mesh.nodes[:, 1] < -radius * np.cos(np.pi / 4) + 1e-9)
@@ -126,7 +126,7 @@ def _clockwise(grid: Array) -> bool:
     return bool(first[0] * second[1] - first[1] * second[0] < 0)
 
 
-def distorted(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
+def distort(mesh: Mesh, by: float, seed: int, still: Indices | None = None) -> Mesh:
     """Return the mesh with inner corners of elements moved at random by up to `by` of their shortest edge.
 
     Corners on the boundary, between layers, held, on the skin or in `still` stay, so that the body stays the same;
@@ -159,7 +159,7 @@ def distorted(mesh: Mesh, by: float, seed: int, still: Indices | None = None) ->
         moved[np.unique(corners[folded])] *= 0.8
 
 
-def placed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
+def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     """Return the element that holds each point (p, 2), and the point's local coordinates there."""
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :24]
@@ -175,7 +175,7 @@ def placed(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
 def stress(body: LinearBody, displacement: Array, points: Array) -> Array:
     """Return the in-plane stress (p, 2, 2) [MPa] at `points` (p, 2) for displacements (nodes, 2)."""
     mesh, elastic = body.mesh, body.elastic
-    element, local = placed(mesh, points)
+    element, local = locate(mesh, points)
     probes = Probes.at(mesh, elastic.centre, element, local)
     strain = probes.displacement_gradient(mesh, displacement)
     at = elastic.state(elastic.places(probes), displacement)

@@ -15,7 +15,7 @@ from solver.constitutive import Hooke
 from solver.contact import OPEN, STICK, FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
 from solver.equilibrium.load_stepping import balanced, settled, slide_beside
-from solver.verification.published.bodies import chain, disc, graded, mirrored, mound, stress, touching_within
+from solver.verification.published.bodies import chain, disc, grade, mirror, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 
 ELEMENT = 1 / 30  # of the half-width
@@ -25,19 +25,19 @@ NONE = LoadState(0.0, 0.0, sense=-1)
 
 def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0) -> LinearBody:
     """Return a half-plane with elements of 1/30 of the half-width where it touches; radius inf: flat."""
-    x = mirrored(graded(ELEMENT, 0.3, 1.2, wide)) * half_width
-    y = graded(ELEMENT, 0.3, 0.0, wide) * half_width
+    x = mirror(grade(ELEMENT, 0.3, 1.2, wide)) * half_width
+    y = grade(ELEMENT, 0.3, 0.0, wide) * half_width
     return LinearBody.of(mound(x, y, radius, 3.0 * half_width), [law])
 
 
-def pressed(newton: Newton, load: float, half_width: float) -> EquilibriumState:
+def press_under_load(newton: Newton, load: float, half_width: float) -> EquilibriumState:
     """Return the contact of a body pressed by `load` [N/mm]."""
     return slide_beside(newton, NONE, touching_within(newton, 1.05 * half_width), load)
 
 
 def press(finest: float, nu: float) -> float:
     """Return the force [N/mm] of a light half-plane on elements of that size, pressed by 1e-3 half-widths."""
-    x, y = mirrored(graded(finest, 0.3, 1.2, 20.0)), graded(finest, 0.3, 0.0, 20.0)
+    x, y = mirror(grade(finest, 0.3, 1.2, 20.0)), grade(finest, 0.3, 0.0, 20.0)
     body = LinearBody.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
     return float(settled(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
 
@@ -58,7 +58,7 @@ def hertz(young: float, nu: float, radius: float, load: float, half_width: float
     body = half_plane(half_width, np.inf, Hooke(young, nu))
     x = body.mesh.nodes[body.mesh.skin, 0]
     body.condensed.rest[:, 1] = x**2 / (2 * radius)
-    slide = pressed(Newton(body.condensed), load, half_width)
+    slide = press_under_load(Newton(body.condensed), load, half_width)
     pressure = slide.normal / body.condensed.fixed_length
     inside = np.abs(x) < 0.9 * half_width
     ellipse = peak * np.sqrt(1 - (x[inside] / half_width) ** 2)
@@ -115,7 +115,7 @@ class Light:
         """Return the stress (p, 2, 2) at `points` (p, 2), by the peak pressure."""
         return stress(self.body, self.body.displacement(state.u), points) / self.peak
 
-    def sheared(self, law: FrictionLaw, part: float) -> EquilibriumState:
+    def shear(self, law: FrictionLaw, part: float) -> EquilibriumState:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
         stuck = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
         before = replace(self.press, state=stuck, load=LoadState(self.press.load.depth, law.mu, law.tau_max))
@@ -135,7 +135,9 @@ def light(nu: float = 0.4999, wide: float = 100.0) -> Light:
     body = half_plane(1.0, RADIUS, Hooke(0.08, nu), wide)
     x = body.mesh.nodes[body.mesh.skin, 0]
     newton = Newton(body.condensed)
-    return Light(body, load, 2 * load / np.pi, x, body.condensed.fixed_length, newton, pressed(newton, load, 1.0))
+    return Light(
+        body, load, 2 * load / np.pi, x, body.condensed.fixed_length, newton, press_under_load(newton, load, 1.0)
+    )
 
 
 def stick_width(light: Light, state: EquilibriumState, mu: float) -> float:

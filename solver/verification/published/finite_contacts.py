@@ -12,7 +12,7 @@ from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.load_stepping import march, settled
-from solver.verification.published.bodies import graded, mirrored, mound
+from solver.verification.published.bodies import grade, mirror, mound
 from solver.verification.published.zones import half_above, half_width
 
 ELEMENT = 1 / 10  # of the half-width expected
@@ -64,7 +64,7 @@ class LightFinite:
         middle = len(self.x) // 2
         return float(self.pressed.reaction[middle, 1] / self.length[middle])
 
-    def capped(self, mu: float, k: float) -> tuple[float, float]:
+    def slide_at_bound(self, mu: float, k: float) -> tuple[float, float]:
         """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
         load = self.pressed.load._replace(mu=mu, tau=k * mu * self.peak, sense=1)
         state = settled(self.newton, load)
@@ -72,7 +72,7 @@ class LightFinite:
         width = half_above(self.x, state.reaction[:, 1] / self.length - k * self.peak)
         return drag, width / self.half_width
 
-    def sheared(self, mu: float, part: float) -> tuple[float, float, float]:
+    def shear(self, mu: float, part: float) -> tuple[float, float, float]:
         """Return Q/(mu P) once the surface has moved so that `part` acts or more, half the stick by a, q(0)/(mu p0).
 
         What friction could carry and does not, mu p - q, falls to nothing at the ends of the stick.
@@ -93,8 +93,8 @@ class LightFinite:
 @cache
 def light_finite() -> LightFinite:
     """Return the half-plane, pressed without friction."""
-    x = mirrored(graded(ELEMENT, 0.3, 1.2, WIDE))
-    y = graded(ELEMENT, 0.3, 0.0, WIDE)
+    x = mirror(grade(ELEMENT, 0.3, 1.2, WIDE))
+    y = grade(ELEMENT, 0.3, 0.0, WIDE)
     newton = Newton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]).condensed)
     pressed = settled(newton, LoadState(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
     return LightFinite(newton, pressed, float(pressed.force[1]))

@@ -7,7 +7,7 @@ from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.mesh import Q2P1, Mesh
-from solver.verification.published.bodies import distorted, membrane, ring
+from solver.verification.published.bodies import distort, membrane, ring
 
 INNER, OUTER, YOUNG = 3.0, 9.0, 1000.0  # radii [mm] and modulus [MPa] of the cylinder, under an inner pressure of 1 MPa
 _SHARE = INNER**2 / (OUTER**2 - INNER**2)
@@ -23,7 +23,7 @@ def widening(nu: float) -> float:
     return (1 + nu) / YOUNG * ((1 - 2 * nu) * _SHARE * INNER + _SHARE * OUTER**2 / INNER)
 
 
-def widened(nu: float, radial: int, around: int) -> float:
+def hole_displacement(nu: float, radial: int, around: int) -> float:
     """Return the displacement of the hole that is found, mean over corner nodes [mm]."""
     mesh, hole = ring(INNER, OUTER, radial, around)
     at = mesh.nodes[hole]
@@ -40,7 +40,7 @@ def _free(body: LinearBody) -> Array:
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     """Return the errors of displacement, stress (root mean squares) and energy on distorted elements."""
     mesh, hole = ring(INNER, OUTER, radial, 4 * radial)
-    mesh = distorted(mesh, 0.2, 5)
+    mesh = distort(mesh, 0.2, 5)
     loads = edge_load(mesh, hole, mesh.nodes[hole] / INNER)
     body = LinearBody.of(mesh, [Hooke(YOUNG, nu)], loads, free=("x", "y", "turn"))
     displacement = _free(body)
@@ -56,7 +56,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     probes = Probes.at(mesh, body.elastic.centre, element, np.tile(_POINTS, (len(mesh.elements), 1)))
     gradient = probes.displacement_gradient(mesh, displacement)
     shear = (gradient + np.swapaxes(gradient, 1, 2))[:, 0, 1] * body.elastic.elements.shear[element]
-    at = _placed(mesh, element)
+    at = _locate(mesh, element)
     closed = -2 * _SHARE * OUTER**2 * at[:, 0] * at[:, 1] / np.sum(at * at, axis=1) ** 2
     energy = 0.5 * float(np.sum(loads * displacement))
     true = 0.5 * 2 * np.pi * INNER * widening(nu)
@@ -67,7 +67,7 @@ def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
     )
 
 
-def _placed(mesh: Mesh, element: Indices) -> Array:
+def _locate(mesh: Mesh, element: Indices) -> Array:
     values = Q2P1.shape(np.tile(_POINTS, (len(mesh.elements), 1)))[0]
     return (values[:, None] @ mesh.nodes[mesh.elements[element]])[:, 0]
 

@@ -71,7 +71,7 @@ PARTS = (0.1, 0.25, 0.5, 0.75, 0.9, 0.99)  # Q/(mu P) of partial slip
 def measure(request: Request, measurements: Measurements) -> Iterator[Problem | LeftOut]:
     """Return an iterator over every number, until time is over."""
     del measurements
-    works = [thick_cylinders, membranes, hertz, partial_slip, capped, cylinder, below, at_finite_strain]
+    works = [thick_cylinders, membranes, hertz, partial_slip, bound_on_hertz, cylinder, below, at_finite_strain]
     return rows_within(request, works, "groups of published problems", lambda work: work())
 
 
@@ -86,7 +86,7 @@ def thick_cylinders() -> Iterator[Problem]:
     """Yield the widening of a thick cylinder, five elements across its wall."""
     for nu in (0.3, 0.48, 0.49, 0.499, 0.4999, 0.49999, 0.4999999):
         begun = clock()
-        numbers = locking.widened(nu, 5, 20)
+        numbers = locking.hole_displacement(nu, 5, 20)
         source = "MacNeal and Harder 1985"
         yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), numbers, 2e-4, begun)
 
@@ -151,7 +151,7 @@ def partial_slip() -> Iterator[Problem]:
     light, law = contacts.light(), FrictionLaw(0.3, math.inf)
     for part in PARTS:
         begun = clock()
-        numbers = light.sheared(law, part)
+        numbers = light.shear(law, part)
         half = math.sqrt(1 - part)
         problem, source = f"partial slip, Q/(mu P) {part:g}", "Cattaneo 1938, Mindlin 1949"
         width = contacts.stick_width(light, numbers, law.mu)
@@ -160,7 +160,7 @@ def partial_slip() -> Iterator[Problem]:
         yield _row(problem, source, "q(0)/(mu p0)", 1 - half, traction / (law.mu * light.peak), 0.02, begun)
 
 
-def capped() -> Iterator[Problem]:
+def bound_on_hertz() -> Iterator[Problem]:
     """Yield the drag of a bound on a Hertz pressure."""
     light, mu = contacts.light(), 0.3
     for k, force in CAPPED:
@@ -168,10 +168,12 @@ def capped() -> Iterator[Problem]:
         law = FrictionLaw(mu, k * mu * light.peak)
         numbers = light.slip(law)
         drag, width = -float(numbers.tangential.sum()) / (mu * light.load), contacts.capped_width(light, numbers, law)
-        yield from _bounded(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, begun)
+        yield from _bound_problems(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, begun)
 
 
-def _bounded(problem: str, k: float, drags: tuple[float, float], width: float, begun: float) -> Iterator[Problem]:
+def _bound_problems(
+    problem: str, k: float, drags: tuple[float, float], width: float, begun: float
+) -> Iterator[Problem]:
     """Yield the drag, expected and found, and half the width in which the bound acts, where it does anywhere."""
     yield _row(problem, "elementary integral", "Q/(mu P)", *drags, 0.005, begun)
     if k < 1.0:
@@ -190,11 +192,11 @@ def at_finite_strain() -> Iterator[Problem]:
     for k, force in CAPPED:
         begun = clock()
         name = f"bound on a Hertz pressure at finite strain, k {k:g}"
-        drag, width = light.capped(0.3, k)
-        yield from _bounded(name, k, (force, drag), width, begun)
+        drag, width = light.slide_at_bound(0.3, k)
+        yield from _bound_problems(name, k, (force, drag), width, begun)
     for part in FINITE_PARTS:
         begun = clock()
-        drag, width, traction = light.sheared(0.3, part)
+        drag, width, traction = light.shear(0.3, part)
         half = math.sqrt(1 - drag)
         name, source = f"partial slip at finite strain, Q/(mu P) {drag:.3f}", "Cattaneo 1938, Mindlin 1949"
         yield _row(name, source, "half stick c/a", half, width, 0.02, begun)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from solver.verification.marked_page import filled
+from solver.verification.marked_page import fill_marks
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import FAMILIES
 from solver.verification.survey.answers import SURFACES, Row, report, solve, table
@@ -23,7 +23,7 @@ CAPTION = (
 )
 
 
-def stored(keep: Path | None) -> list[Row]:
+def read_rows(keep: Path | None) -> list[Row]:
     """Return the rows of a file; none where there is none."""
     lines = keep.read_bytes().splitlines() if keep is not None and keep.exists() else []
     return [msgspec.json.decode(line, type=Row) for line in lines]
@@ -31,7 +31,7 @@ def stored(keep: Path | None) -> list[Row]:
 
 def rows(keys: Sequence[Key], keep: Path | None, solve: Callable[[str, int, Kinematics], Row] = solve) -> Iterator[Row]:
     """Yield what scenes give, from the lines of `keep` where it has them; the others are solved and appended."""
-    by_key = {(row.family, row.number, row.kinematics): row for row in stored(keep)}
+    by_key = {(row.family, row.number, row.kinematics): row for row in read_rows(keep)}
     for key in keys:
         row = by_key.get(key)
         if row is None:
@@ -58,10 +58,10 @@ def main() -> None:
     for line in report(list(rows(keys, options.keep))):
         print(line)
     if options.page is not None:
-        every = sorted(stored(options.keep), key=lambda row: (row.kinematics != "small", row.family, row.number))
+        every = sorted(read_rows(options.keep), key=lambda row: (row.kinematics != "small", row.family, row.number))
         caption = CAPTION.format(first=min(row.number for row in every))
         judgements = "\n".join([caption, "", *table(every)])
-        options.page.write_text(filled(options.page.read_text("utf-8"), "judged", judgements), "utf-8")
+        options.page.write_text(fill_marks(options.page.read_text("utf-8"), "judged", judgements), "utf-8")
 
 
 if __name__ == "__main__":

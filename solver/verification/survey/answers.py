@@ -11,12 +11,12 @@ from solver.failures import SolveFailure
 from solver.prediction import Prediction
 from solver.response.solution import solve_many
 from solver.scene import Scene
-from solver.verification.estimates import Estimate, compared
+from solver.verification.estimates import Estimate, compare
 from solver.verification.fine_meshes import fine_numbers
 from solver.verification.methods import Kinematics
 from solver.verification.random_scenes import random_scene, surface_set
 from solver.verification.survey.statistics import HEADER, TOLERANCES, judgement, misses
-from solver.verification.truth import NUMBERS, judged
+from solver.verification.truth import NUMBERS, mean_and_doubt
 
 SURFACES = "surfaces"  # the set of three surfaces solved together, whose differences are judged by their range
 BY_TOLERANCE = 5.0  # tolerance of a difference by that of a number
@@ -50,7 +50,7 @@ def solve(family: str, number: int, kinematics: Kinematics) -> Row:
         if together and len(good) == len(scenes):
             estimates.append(_difference(good, BY_TOLERANCE * (tolerance or 0.0), truth))
         elif good:
-            estimates += compared(good[0], tolerance or 0.0, *judged(truth[:, 0]))
+            estimates += compare(good[0], tolerance or 0.0, *mean_and_doubt(truth[:, 0]))
     return Row(family, number, kinematics, tuple(estimates), tuple(dict.fromkeys(refusals)))
 
 
