@@ -1,13 +1,14 @@
 """Device addresses as people type them, scheme://host?option=value&option=value, and what a driver does with one."""
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl, urlsplit
 
 from drivers.clock import Clock
 from drivers.deadline import Deadline
-from drivers.transducer import SetupError, Transducer, TransducerInfo
+from drivers.notation import number
+from drivers.transducer import DeviceFault, LinkLost, SetupError, Transducer, TransducerInfo
 
 
 class AddressError(SetupError):
@@ -58,6 +59,15 @@ def parse_address(uri: str) -> Address:
     return Address(uri, parts.scheme, parts.hostname or "", options)
 
 
+@contextmanager
+def at(address: Address) -> Generator[None]:
+    """Put the address before what a link or a device says of its failure inside."""
+    try:
+        yield
+    except (LinkLost, DeviceFault) as error:
+        raise type(error)(f"{address.uri}: {error}") from None
+
+
 def check_options(address: Address, allowed: frozenset[str]) -> None:
     """Raise SetupError when the address has an option that is not `allowed`."""
     for option in address.options:
@@ -92,7 +102,7 @@ def without_tool(address: Address) -> tuple[Address, Tool]:
     text = address.options.get("tool")
     if text is None:
         return address, ()
-    numbers = tuple(_number(part) for part in text.split(","))
+    numbers = tuple(map(number, text.split(",")))
     limits = (FARTHEST,) * 3 + (MOST,) * 3
     if len(numbers) != 6 or not all(abs(value) <= most for value, most in zip(numbers, limits, strict=True)):
         raise AddressError(
@@ -110,11 +120,3 @@ def with_tool(info: TransducerInfo, tool: Tool) -> TransducerInfo:
     words = "{:g} {:g} {:g} mm, {:g} {:g} {:g} degrees, as the address says".format(*tool)
     settings = {**info.settings, "user's tool transform": words}
     return replace(info, calibration=info.calibration.with_tool(tool), settings=settings)
-
-
-def _number(text: str) -> float:
-    """Return a number as people write it, or nan."""
-    try:
-        return float(text) if text.isascii() and "_" not in text else math.nan
-    except ValueError:
-        return math.nan

@@ -12,12 +12,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration, wrench_transform
+from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
 from drivers.transducer import SetupError
 
 Array = NDArray[np.float64]
@@ -26,25 +27,8 @@ LONGEST = 64 * 1024  # a longer file is refused [bytes]; the maker's have about 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 
 _ROUNDING = 0.5e-5  # the file's numbers have five decimals
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
-_POUND = 4.4482216152605  # [N]
-_FORCE = {"N": 1.0, "kN": 1e3, "lb": _POUND, "lbf": _POUND, "klb": 1e3 * _POUND, "kg": 9.80665, "g": 9.80665e-3}
-_TORQUE = {  # newton millimetres in one
-    "N-mm": 1.0,
-    "N-m": 1e3,
-    "kN-m": 1e6,
-    "in-lb": 25.4 * _POUND,
-    "lb-in": 25.4 * _POUND,
-    "ft-lb": 304.8 * _POUND,
-    "lb-ft": 304.8 * _POUND,
-    "kg-cm": 98.0665,
-}
 _DISTANCE = {"mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # millimetres in one
 _ANGLE = {"degrees": math.pi / 180.0, "deg": math.pi / 180.0, "radians": 1.0, "rad": 1.0}
-
-_ROOT = ("FTSensor",)
-_BODY = ("FTSensor", "Calibration")
-_Attributes = Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,22 +71,20 @@ class _Unusable(Exception):
 
 
 def _parsed(data: bytes, name: str) -> CalibrationFile:
-    elements = _elements(data)
-    sensor, body = _only(elements, _ROOT), _only(elements, _BODY)
-    _refuse_what_is_not_known(sensor, body, elements)
-    force = _unit(body, "ForceUnits", _FORCE)
-    torque = _unit(body, "TorqueUnits", _TORQUE)
+    sensor, body = _sensor_and_body(data)
+    force = _unit(body, "ForceUnits", FORCE)
+    torque = _unit(body, "TorqueUnits", TORQUE)
     units = np.repeat([force, torque], 3)  # N, N mm in one of the file's units
-    axes = _by_name(elements, "Axis")
+    axes = _by_name(body, "Axis")
     if len(axes) != 6:
         raise _Unusable(f"it has {len(axes)} of the six Axis elements {', '.join(AXES)}")
     scale = np.array([_above_zero(f"scale of {axis}", axes[axis].get("scale", "1")) for axis in AXES])
     rated = np.array([_above_zero(f"max of {axis}", axes[axis].get("max", "")) for axis in AXES]) * units
-    transform = _transform(elements, body)
+    transform = _transform(body)
     matrix = transform @ (_rows(axes) * (units / scale)[:, None])
     if not np.all(np.isfinite(matrix)) or np.linalg.matrix_rank(matrix) < 6:
         raise _Unusable("its six Axis rows do not make a matrix that tells forces and torques apart")
-    user = _by_name(elements, "UserAxis")
+    user = _by_name(body, "UserAxis")
     if len(user) == 6:
         rounding = _ROUNDING * (units[:, None] + np.abs(transform) @ (units / scale)[:, None])
         _check(matrix, _rows(user) * units[:, None], rounding)
@@ -114,104 +96,68 @@ def _parsed(data: bytes, name: str) -> CalibrationFile:
     day = _day(_word(body, "CalDate"))
     origin = " ".join(filter(None, (f"{name}:", model, part)))
     source = f"{origin}, calibrated {day}" if day else f"{origin}, day of calibration not stated"
-    calibration = Calibration(serial, "V", _read_only(matrix), _read_only(rated), source)
+    calibration = Calibration(serial, "V", matrix, rated, source)
     return CalibrationFile(calibration, hashlib.sha256(data).hexdigest(), model, part, day, len(user) == 6)
 
 
-def _elements(data: bytes) -> list[tuple[tuple[str, ...], _Attributes]]:
-    """Return path and attributes of every element, in order. Declarations and entities are refused."""
+def _sensor_and_body(data: bytes) -> tuple[Element, Element]:
+    """Return the two elements that say what is calibrated; one whose computation is not done here is refused."""
     if len(data) > LONGEST:
         raise _Unusable(f"it is longer than {LONGEST} bytes, which no calibration file is")
-    elements: list[tuple[tuple[str, ...], _Attributes]] = []
-    path: list[str] = []
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        path.append(tag)
-        if len(path) > 8:
-            raise _Unusable("its elements lie deeper in each other than in any calibration file")
-        elements.append((tuple(path), attributes))
-
-    def end(_: str) -> None:
-        path.pop()
-
-    def refuse(*_: object) -> None:
-        raise _Unusable("it declares a document type, which no calibration file does")
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
     try:
-        parser.Parse(data, True)
-    except expat.ExpatError as error:
-        raise _Unusable(f"it is not sound XML ({expat.ErrorString(error.code)}, line {error.lineno})") from None
-    except (LookupError, ValueError):  # what expat raises for an encoding it does not know
-        raise _Unusable("it is in an unknown encoding") from None
-    return elements
-
-
-def _refuse_what_is_not_known(
-    sensor: _Attributes, body: _Attributes, elements: list[tuple[tuple[str, ...], _Attributes]]
-) -> None:
-    """Raise where the file asks for a computation that is not done here: its wrench would not be true."""
-    for attributes, key, known in (
+        sensor = parse_xml(data)
+    except ValueError as error:
+        raise _Unusable(f"it {error}") from None
+    bodies = sensor.findall("Calibration")
+    if sensor.tag != "FTSensor" or len(bodies) != 1:
+        raise _Unusable(f"its {sensor.tag[:20]} holds {len(bodies)} Calibration elements, not an FTSensor one")
+    for element, key, readable in (
         (sensor, "Family", ("DAQ",)),
         (sensor, "NumGages", ("6",)),
         (sensor, "CalFileVersion", ("1.0", "1.1")),
-        (body, "GainMultiplier", ("1",)),
+        (bodies[0], "GainMultiplier", ("1",)),
     ):
-        value = attributes.get(key, known[0]).strip()
-        if value not in known:
-            raise _Unusable(f"its {key} is {value[:20]!r}, and only {' or '.join(known)} can be read")
-    for path, _ in elements:
-        if path[-1] in ("BiasSlope", "GainSlope", "Thermistor"):
-            raise _Unusable(f"its {path[-1]} asks for temperature compensation in software, which is not done here")
+        value = element.get(key, readable[0]).strip()
+        if value not in readable:
+            raise _Unusable(f"its {key} is {value[:20]!r}, and only {' or '.join(readable)} can be read")
+    for element in sensor.iter():
+        if element.tag in ("BiasSlope", "GainSlope", "Thermistor"):
+            raise _Unusable(f"its {element.tag} asks for temperature compensation in software, which is not done here")
+    return sensor, bodies[0]
 
 
-def _only(elements: list[tuple[tuple[str, ...], _Attributes]], path: tuple[str, ...]) -> _Attributes:
-    matching = [attributes for at, attributes in elements if at == path]
-    if len(matching) != 1:
-        raise _Unusable(f"it has {len(matching)} {path[-1]} elements where a calibration file has one")
-    return matching[0]
-
-
-def _by_name(elements: list[tuple[tuple[str, ...], _Attributes]], tag: str) -> dict[str, _Attributes]:
-    axes: dict[str, _Attributes] = {}
-    for path, attributes in elements:
-        if path == (*_BODY, tag):
-            axis = attributes.get("Name", "").strip()
-            if axis not in AXES or axis in axes:
-                raise _Unusable(f"its {tag} {axis[:20]!r} is double or no axis")
-            axes[axis] = attributes
+def _by_name(body: Element, tag: str) -> dict[str, Element]:
+    axes: dict[str, Element] = {}
+    for element in body.findall(tag):
+        axis = element.get("Name", "").strip()
+        if axis not in AXES or axis in axes:
+            raise _Unusable(f"its {tag} {axis[:20]!r} is double or no axis")
+        axes[axis] = element
     return axes
 
 
-def _rows(axes: Mapping[str, _Attributes]) -> Array:
+def _rows(axes: Mapping[str, Element]) -> Array:
     """Return the six rows of numbers, shape (6, 6), in the order of AXES."""
-    rows = [[_number(text) for text in axes[axis].get("values", "").split()] for axis in AXES]
+    rows = [[number(text) for text in axes[axis].get("values", "").split()] for axis in AXES]
     for axis, row in zip(AXES, rows, strict=True):
         if len(row) != 6 or not all(math.isfinite(value) for value in row):
             raise _Unusable(f"axis {axis} has not six numbers as its values")
     return np.array(rows)
 
 
-def _transform(elements: list[tuple[tuple[str, ...], _Attributes]], body: _Attributes) -> Array:
+def _transform(body: Element) -> Array:
     """Return the matrix (6, 6) that moves a wrench [N, N mm] to the origin and axes that BasicTransform names."""
-    placed = [attributes for path, attributes in elements if path == (*_BODY, "BasicTransform")]
-    if not placed:
+    transforms = body.findall("BasicTransform")
+    if not transforms:
         return np.eye(6)
-    if len(placed) > 1:
+    if len(transforms) > 1:
         raise _Unusable("it has more than one BasicTransform")
-    values = {key: _number(placed[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")}
-    for key, value in values.items():
-        if not math.isfinite(value):
-            raise _Unusable(f"{key} of its BasicTransform is no number")
+    values = [number(transforms[0].get(key, "0")) for key in ("Dx", "Dy", "Dz", "Rx", "Ry", "Rz")]
+    if not np.all(np.isfinite(values)):
+        raise _Unusable("its BasicTransform is not six numbers")
     distance = _unit(body, "DistUnits", _DISTANCE)
     angle = _unit(body, "AngleUnits", _ANGLE, "degrees")
-    d = np.array([values["Dx"], values["Dy"], values["Dz"]]) * distance
-    r = np.array([values["Rx"], values["Ry"], values["Rz"]]) * angle
-    return wrench_transform(d, r)
+    return wrench_transform(np.array(values[:3]) * distance, np.array(values[3:]) * angle)
 
 
 def _check(matrix: Array, printed: Array, rounding: Array) -> None:
@@ -225,28 +171,24 @@ def _check(matrix: Array, printed: Array, rounding: Array) -> None:
         )
 
 
-def _unit(attributes: _Attributes, key: str, known: Mapping[str, float], default: str = "") -> float:
-    text = attributes.get(key, default).strip()
-    if text not in known:
-        raise _Unusable(f"its {key} is {text[:20]!r}, and only {', '.join(known)} can be read")
-    return known[text]
+def _unit(element: Element, key: str, units: Mapping[str, float], default: str = "") -> float:
+    text = element.get(key, default)
+    size = unit(text, units)
+    if size is None:
+        raise _Unusable(f"its {key} is {text[:20]!r}, and only {', '.join(units)} can be read")
+    return size
 
 
 def _above_zero(what: str, text: str) -> float:
-    value = _number(text.strip())
+    value = number(text.strip())
     if not (math.isfinite(value) and value > 0.0):
         raise _Unusable(f"the {what} is {text[:40]!r}, which must be a number above 0")
     return value
 
 
-def _number(text: str) -> float:
-    """Return a number written with a point, or nan: no other spelling, whatever the language of the computer."""
-    return float(text) if len(text) <= 40 and _NUMBER.fullmatch(text) else math.nan
-
-
-def _word(attributes: _Attributes, key: str) -> str:
+def _word(element: Element, key: str) -> str:
     """Return a short printable attribute, without blanks around it."""
-    text = attributes.get(key, "").strip()
+    text = element.get(key, "").strip()
     if len(text) > 60 or not text.isprintable():
         raise _Unusable(f"its {key} is no name")
     return text
@@ -266,8 +208,3 @@ def _day(text: str) -> str:
         return date(year, month, day).isoformat()
     except ValueError:
         return text
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array

@@ -82,7 +82,6 @@ class SimulatedClock:
     factor = 0.0
 
     def __init__(self) -> None:
-        """Start at one second."""
         self._now_ns = 1_000_000_000
 
     def now_ns(self) -> int:
@@ -101,7 +100,6 @@ class StillClock:
     factor = 1.0
 
     def __init__(self, at_ns: int) -> None:
-        """Stand at `at_ns` [ns]."""
         self._at_ns = at_ns
 
     def now_ns(self) -> int:

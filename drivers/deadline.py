@@ -78,7 +78,6 @@ class BoundLink:
     """A link that raises LinkLost once a deadline is over, and Stopped at a stop."""
 
     def __init__(self, link: Link, deadline: Deadline) -> None:
-        """Limit the use of `link`."""
         self._link = link
         self._deadline = deadline
 

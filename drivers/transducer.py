@@ -200,7 +200,6 @@ class WrappedTransducer:
     """A transducer that is another one throughout, or another one with its own `info`."""
 
     def __init__(self, inner: Transducer, info: TransducerInfo | None = None) -> None:
-        """Take an opened transducer."""
         self._inner = inner
         self.info = info or inner.info
 

@@ -83,7 +83,6 @@ class Bench:
     """
 
     def __init__(self, seed: int = 0, settings: BenchSettings | None = None) -> None:
-        """Start unloaded, with nothing mounted."""
         self.settings = settings or BenchSettings()
         self.seed = seed
         self._lock = threading.Lock()
@@ -286,11 +285,10 @@ class DirectTransducer:
             self._clock.sleep(timeout)
         numbers = np.arange(self._sent, self._due, dtype=np.int64)
         self._sent += len(numbers)
-        kept = numbers[~self._within(numbers / RATE, self._hurt.lost)]
+        kept = numbers[~self._is_lost(numbers / RATE)]
         self._lost += len(numbers) - len(kept)
         time = kept / RATE
-        instants = np.where(self._within(time, self._hurt.frozen)[:, None], self._frozen_at(time), time[:, None])[:, 0]
-        counts = np.rint(self._bench.wrench(instants) / _SCALE)
+        counts = np.rint(self._bench.wrench(self._sampled_at(time)) / _SCALE)
         received = self._began_ns + np.rint(time * 1e9).astype(np.int64)
         return ReadingBlock(kept, kept, np.zeros_like(kept), time, received, counts)
 
@@ -299,16 +297,16 @@ class DirectTransducer:
         """Readings from 0 that have been taken by now."""
         return int(self.now() * RATE) + 1
 
-    def _within(self, time: NDArray[np.float64], strokes: frozenset[int]) -> NDArray[np.bool_]:
-        """Say which instants (n,) [s] lie in the middle of one of the strokes."""
-        inside = np.zeros(len(time), np.bool_)
-        for start, stop in self._middles(strokes):
-            inside |= (time >= start) & (time < stop)
-        return inside
+    def _is_lost(self, time: Array) -> NDArray[np.bool_]:
+        """Say of which instants (n,) [s] the reading never arrives."""
+        lost = np.zeros(len(time), np.bool_)
+        for start, stop in self._middles(self._hurt.lost):
+            lost |= (time >= start) & (time < stop)
+        return lost
 
-    def _frozen_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the instant (n, 1) [s] whose reading is repeated."""
-        at = time[:, None].copy()
+    def _sampled_at(self, time: Array) -> Array:
+        """Return the instants (n,) [s] whose readings are given at `time` (n,) [s]."""
+        at = time.copy()
         for start, stop in self._middles(self._hurt.frozen):
             at[(time >= start) & (time < stop)] = start
         return at

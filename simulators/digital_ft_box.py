@@ -113,10 +113,8 @@ class DigitalFtBox(LineBox):
 
     def _packets(self, times: Array) -> list[bytes]:
         """Return a packet for each of `times` (n,) [s]."""
-        wrench = self.faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
-        gauges = np.rint(wrench @ self._gauges.T)
-        forced = np.array([self.faults.active("saturate", time) for time in times.tolist()], bool)
-        gauges[forced] = 32767
+        gauges = np.rint(self.faults.sensed(self._bench, times) @ self._gauges.T)
+        gauges[self.faults.during("saturate", times)] = 32767
         over = np.any(np.abs(gauges) >= 32767, axis=1)
         gauges = np.clip(gauges, -32768, 32767)[:, [0, 2, 4, 1, 3, 5]].astype(">i2")
         packets: list[bytes] = []

@@ -2,39 +2,28 @@
 
 import heapq
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Annotated, Literal, get_args
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
+
+from simulators.bench import Bench
 
 Array = NDArray[np.float64]
 
 Kind = Literal[
-    "lose",
-    "repeat",
-    "reorder",
-    "corrupt",
-    "shorten",
-    "delay",
-    "stall",
-    "saturate",
-    "status",
-    "units",
-    "drift",
-    "miscalibrate",
-    "slow",
-    "steal",
-    "reboot",
-    "unplug",
-]
+    "lose", "repeat", "reorder", "corrupt", "shorten", "delay", "stall", "saturate", "status", "units", "drift",
+    "miscalibrate", "slow", "steal", "reboot", "unplug",
+]  # fmt: skip
 KINDS: tuple[Kind, ...] = get_args(Kind)
 FOREVER = 1e7  # [s]
-_ON_THE_WAY: tuple[Kind, ...] = ("lose", "repeat", "reorder", "corrupt", "shorten", "delay")
+_ON_THE_WAY = KINDS[:6]
+
+Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]  # in a timetable file [s]
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One kind of fault for a stretch of the box's time.
 
     On the way, for a share of the datagrams: `lose`, `repeat` (sent twice), `reorder` (swapped with the next),
@@ -48,8 +37,8 @@ class Fault:
     """
 
     kind: Kind
-    start: float  # [s]
-    stop: float  # [s]
+    start: Time = msgspec.field(name="from")
+    stop: Time = msgspec.field(name="to")
     share: float = 1.0  # of the datagrams in the stretch [-]
     delay: float = 0.05  # of a datagram that is delayed [s]
     status: int = 0  # bits that are set
@@ -110,13 +99,18 @@ class Faults:
         """Return when (n,) [s] the device's own clock has come as far as `ages` (n,) [s]."""
         return ages if self._clock is None else _through(ages, *reversed(self._clock))
 
-    def sensed(self, wrench: Array, times: Array, rated: Sequence[float]) -> Array:
-        """Return what a device that drifts or is wrongly calibrated feels of a wrench (n, 6) at `times` (n,) [s]."""
+    def during(self, kind: Kind, times: Array) -> NDArray[np.bool_]:
+        """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
+        return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
+
+    def sensed(self, bench: Bench, times: Array) -> Array:
+        """Return the wrench (n, 6) that a device which drifts or is wrongly calibrated feels at `times` (n,) [s]."""
+        wrench = bench.wrench(times)
         local = times % self._repeat if self._repeat > 0.0 else times
         for fault in self._timetable:
             if fault.kind == "drift":
                 part = np.clip((local - fault.start) / (fault.stop - fault.start), 0.0, 1.0)
-                wrench = wrench + fault.share * part[:, None] * np.array(rated)
+                wrench = wrench + fault.share * part[:, None] * np.array(bench.settings.rated)
             elif fault.kind == "miscalibrate":
                 on = (local >= fault.start) & (local < fault.stop)
                 wrench = wrench * np.where(on, 1.0 + fault.share, 1.0)[:, None]

@@ -37,7 +37,6 @@ class LabJackU6Box:
     """One converter. Its time, and the bench's, begins when it is made; it is switched by whoever plugs it in."""
 
     def __init__(self, bench: Bench, clock: Clock, *, serial: int = 360_000_001, faults: Faults | None = None) -> None:
-        """Set up a converter of that serial number."""
         self.bench = bench
         self.serial = serial
         self._clock = clock
@@ -195,11 +194,8 @@ class LabJackU6Box:
 
     def _codes(self, times: Array) -> NDArray[np.int64]:
         """Return what the converter makes of the six gauges at `times` (n,) [s], shape (n, 6)."""
-        volts = (
-            self._faults.sensed(self.bench.wrench(times), times, self.bench.settings.rated) @ self._gauges.T + _OFFSETS
-        )
-        forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
-        volts[forced, 2] = 11.0
+        volts = self._faults.sensed(self.bench, times) @ self._gauges.T + _OFFSETS
+        volts[self._faults.during("saturate", times), 2] = 11.0
         slope = np.where(volts < 0.0, -_VOLTS_PER_CODE_BELOW, _VOLTS_PER_CODE)
         return np.clip(np.rint(_ZERO_CODE + volts / slope), 0, 65535).astype(np.int64)
 
@@ -254,7 +250,6 @@ class SimulatedBus(_Backend):
     """What `usb.core.find(backend=...)` takes. One handle at a time may hold a converter."""
 
     def __init__(self, boxes: Sequence[LabJackU6Box]) -> None:
-        """Put the boxes on the bus."""
         self._boxes = tuple(boxes)
         self._claims: dict[int, object] = {}  # by the box's place: the handle that claimed it
 

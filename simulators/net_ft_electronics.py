@@ -59,7 +59,6 @@ class Pages:
     """The box's settings, kept over a reboot as the real one keeps them."""
 
     def __init__(self, serial: str, rated: Array, rate: int, product: Product = NET_FT) -> None:
-        """Begin with the maker's settings: N and N-m, no filter, no bias."""
         self.product = product
         self._serial = serial
         self._rated = rated  # (6,) [N, N mm]
@@ -272,8 +271,8 @@ class Electronics:
 
     def _status_and_counts(self, times: Array) -> tuple[list[int], NDArray[np.int64]]:
         """Return the status (n) and the six counts (n, 6) at `times` (n,)."""
-        wrench = self._faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
-        forced = np.array([self._faults.active("saturate", time) for time in times.tolist()], bool)
+        wrench = self._faults.sensed(self._bench, times)
+        forced = self._faults.during("saturate", times)
         wrench[forced] = self._rated  # what a clipped converter shows
         over = forced | np.any(np.abs(wrench) > self._rated, axis=1)
         counts = (np.clip(wrench, -self._rated, self._rated) - self._bias) * self.pages.counts_per_wrench

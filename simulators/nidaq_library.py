@@ -31,7 +31,6 @@ class SimulatedNidaqmx(ModuleType):
     DaqError = DaqError
 
     def __init__(self, bench: Bench, clock: Clock, faults: Faults | None = None) -> None:
-        """Put six gauges on Dev1."""
         super().__init__("nidaqmx")
         self.constants = SimpleNamespace(
             READ_ALL_AVAILABLE=-1,
@@ -116,7 +115,7 @@ class _Task:
         due = int((age - since) * self.timing.samp_clk_rate)
         times = faults.instants(since + np.arange(self._delivered, due) / self.timing.samp_clk_rate)
         self._delivered = due
-        volts = faults.sensed(library.bench.wrench(times), times, library.bench.settings.rated) @ library.gauges.T
+        volts = faults.sensed(library.bench, times) @ library.gauges.T
         for time, six in zip(times.tolist(), volts, strict=True):
             if faults.active("stall", time):
                 six[:] = self._last

@@ -24,7 +24,7 @@ _NAP = 0.01  # longest wait, and so for an end [real s]
 _SHORTEST_NAP = 0.0005
 _BURST = 400  # records at one go after the computer was busy
 _START_UP = 0.2  # from power to prompt [s]
-_TAKEN = (b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
+_TAKEN = (b"SA", b"CV", b"CL", b"CR", b"CP", b"SM", b"SP", b"SR", b"CF", b"SF", b"CS", b"CE", b"RS", b"RL", b"%")
 
 
 class SerialFtBox(LineBox):
@@ -61,7 +61,6 @@ class SerialFtBox(LineBox):
         """Forget what is not kept over power-off."""
         self.is_on = True
         self._binary = False
-        self._mask = 0x3F
         self._biases: list[Array] = []
         self._line = bytearray()
         self._streaming_since: float | None = None  # when the stream's first record leaves [s]
@@ -155,7 +154,7 @@ class SerialFtBox(LineBox):
             self._biases = []
         elif name == b"SA" and argument != b"0":
             return b"not simulated\r\n>"
-        elif name and name not in _TAKEN and name != b"SA":
+        elif name and name not in _TAKEN:
             return b"not a command\r\n>"
         return b"\r\n>"
 
@@ -166,7 +165,7 @@ class SerialFtBox(LineBox):
         """Return a record as bytes for each of `times` (n,) [s]."""
         if not len(times):
             return []
-        wrench = self.faults.sensed(self._bench.wrench(times), times, self._bench.settings.rated)
+        wrench = self.faults.sensed(self._bench, times)
         packed: list[bytes] = []
         over = np.any(np.abs(wrench) > self._rated, axis=1)
         bias = self._biases[-1] if self._biases else np.zeros(6)

@@ -21,7 +21,7 @@ from drivers.clock import clock_at
 from drivers.transducer import SetupError
 from simulators.bench import Bench, BenchSettings
 from simulators.digital_ft_box import DigitalFtBox
-from simulators.faults import Fault, Faults, Kind
+from simulators.faults import Fault, Faults, Time
 from simulators.net_ft_box import NetFtBox
 from simulators.serial_ft_box import SerialFtBox
 from simulators.simulator import Simulator
@@ -30,7 +30,6 @@ from simulators.subject import SimulatedSubject
 
 APART = 5.0  # least time from one stroke's beginning to the next; none lasts longer [s]
 
-_Time = Annotated[float, msgspec.Meta(ge=0.0, le=1e6)]
 _Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e6)]
 
 
@@ -102,8 +101,7 @@ def load_timetable(path: Path) -> Timetable:
     try:
         script = msgspec.convert(table, _Script)
         strokes = sorted(((entry.at, _surface(entry)) for entry in script.stroke), key=lambda stroke: stroke[0])
-        faults = tuple(Fault(f.kind, f.start, f.stop, f.share, f.delay, f.status) for f in script.fault)
-        return Timetable(tuple(strokes), faults, script.repeat)
+        return Timetable(tuple(strokes), tuple(script.fault), script.repeat)
     except (msgspec.ValidationError, ValueError) as error:
         raise TimetableError(f"{path}: {error}") from None
 
@@ -111,7 +109,7 @@ def load_timetable(path: Path) -> Timetable:
 class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     """One [[stroke]]: a surface of the paper by descriptor and index, or any other by mu and the rest."""
 
-    at: _Time
+    at: Time
     descriptor: str | None = None
     index: int | None = None
     mu: _Positive | None = None
@@ -121,23 +119,12 @@ class _StrokeEntry(msgspec.Struct, forbid_unknown_fields=True):
     holds: bool = True
 
 
-class _FaultEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """One [[fault]]."""
-
-    kind: Kind
-    start: _Time = msgspec.field(name="from")
-    stop: _Time = msgspec.field(name="to")
-    share: float = 1.0
-    delay: float = 0.05
-    status: int = 0
-
-
 class _Script(msgspec.Struct, forbid_unknown_fields=True):
     """The whole file."""
 
     stroke: list[_StrokeEntry] = []  # msgspec copies an empty default for each instance
-    fault: list[_FaultEntry] = []
-    repeat: _Time = 0.0
+    fault: list[Fault] = []
+    repeat: Time = 0.0
 
 
 def _surface(entry: _StrokeEntry) -> Surface:

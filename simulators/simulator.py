@@ -99,7 +99,6 @@ class ServedBox:
     """One box. Its time, and the bench's, begins when it is started."""
 
     def __init__(self, clock: Clock, faults: Faults | None) -> None:
-        """Set up a box without any fault by default."""
         self.clock = clock
         self.faults = faults or Faults()
         self.closing = threading.Event()

@@ -31,7 +31,6 @@ class SimulatedSubject:
     """One subject. The same seed strokes and scores in the same way, whatever the order of the surfaces."""
 
     def __init__(self, seed: int, settings: SubjectSettings | None = None) -> None:
-        """Draw the habits that this subject keeps."""
         self.seed = seed
         self.settings = settings or SubjectSettings()
         draw = np.random.default_rng([seed, 2])

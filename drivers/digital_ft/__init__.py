@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from functools import partial
 
-from drivers.address import Address, Driver, check_options
+from drivers.address import Address, Driver, at, check_options
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline, Link
@@ -46,17 +46,12 @@ def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> Strea
     Raises SetupError, LinkLost or DeviceFault with the reason.
     """
     place = _where(address)
-    link = _line(place, deadline)
-    try:
+    with at(address), contextlib.closing(_line(place, deadline)) as link:
         bound = deadline.bound(link)
         word = hold(bound)
         stored = _stored(place, bound)
         conversation = DigitalConversation(place.number, stored)
         rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
-    except (LinkLost, DeviceFault) as error:
-        raise type(error)(f"{address.uri}: {error}") from None
-    finally:
-        link.close()
     info = _info(place, stored, word, rate)
     return StreamingTransducer(info, partial(_line, place), conversation, clock, opening=deadline)
 
@@ -64,17 +59,12 @@ def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> Strea
 def identify_digital_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing: a stream left over from before goes on. An answer takes 0.2 s at most."""
     place = _where(address)
-    link = deadline.bound(_line(place, deadline))
-    try:
+    with at(address), contextlib.closing(deadline.bound(_line(place, deadline))) as link:
         word = status_word(link)
         if word is None:
             streams = link.receive(0.05) is not None
             raise LinkLost("it streams, and nobody reads; open it to end that" if streams else "no transducer answers")
         return _info(place, _stored(place, link), word, math.nan)
-    except (LinkLost, DeviceFault) as error:
-        raise type(error)(f"{address.uri}: {error}") from None
-    finally:
-        link.close()
 
 
 def _line(place: _Where, _deadline: Deadline) -> SerialLink:

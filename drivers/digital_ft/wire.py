@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
+from drivers.notation import FORCE, TORQUE
 from drivers.readings import Records
 from drivers.transducer import SetupError, StatusTable, bit
 
@@ -58,8 +59,8 @@ STATUS_BITS = StatusTable(
         bit(7, "error flag: the status word is not 0", "doubtful"),
     )
 )
-_FORCE = {1: 4.4482216152605, 2: 1.0, 3: 4448.2216152605, 4: 1000.0, 5: 9.80665, 6: 0.00980665}  # newtons in one
-_TORQUE = {1: 112.9848290276, 2: 1355.8179483314, 3: 1000.0, 4: 1.0, 5: 98.0665, 6: 1e6}  # newton millimetres in one
+_FORCE = dict(enumerate(map(FORCE.get, ("lb", "N", "klb", "kN", "kg", "g")), 1))  # by code
+_TORQUE = dict(enumerate(map(TORQUE.get, ("lbin", "lbft", "Nm", "Nmm", "kgcm", "kNm")), 1))
 _ORDER = (0, 3, 1, 4, 2, 5)  # of the gauges: where G0 to G5 stand in a packet
 _CALIBRATION = struct.Struct(">8s32s4s20s36fBB6fii6H6H")
 _PROOF = 6  # packets in a row that must be sound before a new place is believed

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from drivers.address import Address, AddressError, Driver, check_options
+from drivers.address import Address, AddressError, Driver, at, check_options
 from drivers.calibration_file import CalibrationFile, read_calibration_file
 from drivers.clock import Clock
 from drivers.clock_recovery import ScanCount
@@ -40,12 +40,8 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     if place.calibration is None:
         raise AddressError(f"{place.uri} names no calibration; add cal=FILE, the transducer's own .cal file")
     link, identity = _linked(place, deadline)
-    try:
+    with at(address), contextlib.closing(link):
         constants = _constants(deadline.bound(link))
-    except (LinkLost, DeviceFault) as error:
-        raise type(error)(f"{place.uri}: {error}") from None
-    finally:
-        link.close()
     scans = wire.scan_clock(place.rate)
     conversation = GaugeConversation(identity.serial, constants, scans)
     info = _info(place, place.calibration, identity, constants, scans)
@@ -56,16 +52,12 @@ def identify_labjack_u6(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError where another program has it or nothing is plugged in."""
     place = _where(address)
     link, identity = _linked(place, deadline)
-    try:
+    with at(address), contextlib.closing(link):
         if place.calibration is None:
             raise SetupError(
                 f"{place.uri}: LabJack U6 {identity.serial} is there; add cal=FILE, the transducer's own .cal file"
             )
         constants = _constants(deadline.bound(link))
-    except (LinkLost, DeviceFault) as error:
-        raise type(error)(f"{place.uri}: {error}") from None
-    finally:
-        link.close()
     return _info(place, place.calibration, identity, constants, wire.scan_clock(place.rate))
 
 
@@ -153,7 +145,6 @@ class GaugeConversation:
     """Requests and streams of one converter. Each request is answered before anything else comes."""
 
     def __init__(self, serial: int, constants: wire.Constants, clock: wire.ScanClock) -> None:
-        """Take the converter of that serial number, whose constants were read, to scan by `clock`."""
         self._serial = serial
         self._constants = constants
         self._scan_clock = clock

@@ -167,7 +167,6 @@ class StreamDecoder:
     """
 
     def __init__(self, constants: Constants) -> None:
-        """Turn codes into volts with `constants`."""
         self.malformed = 0  # scans in packets that came broken
         self._constants = constants
         self._bytes = bytearray()

@@ -23,7 +23,7 @@ _WORDS = {"mode": ("single", "buffered"), "bias": ("keep", "set"), "latch": ("ke
 
 
 @dataclass(frozen=True, slots=True)
-class Where:
+class _Where:
     """The address of a box and the settings that the address requests."""
 
     address: Address
@@ -38,23 +38,24 @@ class Where:
 
 def open_net_ft(address: Address, clock: Clock, deadline: Deadline) -> NetFtTransducer:
     """Return the box at `address`, set as it asks, not streaming. Raises SetupError or LinkLost with the reason."""
-    place = where(address)
+    place = _where(address)
     return NetFtTransducer(
-        prepare(place, deadline),
+        _prepared(place, deadline),
         connect=lambda limit: UdpLink(address.host, place.rdt_port, limit),
-        who=lambda: who(place),
+        who=lambda: _who(place),
         clock=clock,
         opening=deadline,
-        request=start_request(place),
+        request=wire.START_BUFFERED if place.buffered else wire.START,
     )
 
 
 def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    return identify(where(address), deadline)
+    place = _where(address)
+    return _info(place, _configuration(place, deadline))
 
 
-def where(address: Address) -> Where:
+def _where(address: Address) -> _Where:
     """Return what a net-ft address says. Raises SetupError when it is not one."""
     check_options(address, _OPTIONS)
     if not address.host:
@@ -63,7 +64,7 @@ def where(address: Address) -> Where:
     for name, word in chosen.items():
         if word not in _WORDS[name]:
             raise AddressError(f"{address.uri}: {name}={word} must be {' or '.join(_WORDS[name])}")
-    return Where(
+    return _Where(
         address,
         http_port=address.number("http", 80, 1, 65535),
         rdt_port=address.number("rdt", 49152, 1, 65535),
@@ -75,12 +76,7 @@ def where(address: Address) -> Where:
     )
 
 
-def identify(place: Where, deadline: Deadline) -> TransducerInfo:
-    """Return who answers, changing nothing. Raises SetupError or LinkLost with the reason."""
-    return _info(place, _configuration(place, deadline))
-
-
-def prepare(place: Where, deadline: Deadline) -> TransducerInfo:
+def _prepared(place: _Where, deadline: Deadline) -> TransducerInfo:
     """Set what the address asks for, and return who answers, as read back afterwards."""
     configuration = _configuration(place, deadline)
     if not configuration.streams:
@@ -103,12 +99,7 @@ def prepare(place: Where, deadline: Deadline) -> TransducerInfo:
     return replace(info, settings={**info.settings, **done})
 
 
-def start_request(place: Where) -> bytes:
-    """Return what asks for the stream that the address wants."""
-    return wire.START_BUFFERED if place.buffered else wire.START
-
-
-def _commanded(place: Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
+def _commanded(place: _Where, configuration: Configuration, deadline: Deadline) -> dict[str, str]:
     """Carry out over the command port what the address asks for; return what came of it, for the record."""
     units = wire.parse_units(_tcp(place, wire.READ_UNITS, 24, deadline))
     if units is None or (units.counts_per_force, units.counts_per_torque) != (
@@ -135,26 +126,26 @@ def _commanded(place: Where, configuration: Configuration, deadline: Deadline) -
     return done
 
 
-def _wrench(place: Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:
+def _wrench(place: _Where, command: bytes, deadline: Deadline) -> tuple[int, ...]:
     counts = wire.parse_wrench(_tcp(place, command, 16, deadline))
     if counts is None:
         raise SetupError(f"{place.address.uri}: its command port gives no answer that can be read; check the tcp port")
     return counts
 
 
-def _tcp(place: Where, command: bytes, size: int, deadline: Deadline) -> bytes:
+def _tcp(place: _Where, command: bytes, size: int, deadline: Deadline) -> bytes:
     return tcp_answer(place.address.host, place.tcp_port, command, size, deadline)
 
 
-def who(place: Where) -> TransducerInfo | None:
+def _who(place: _Where) -> TransducerInfo | None:
     """Return who answers at once, None when nobody does. Raises SetupError when its page makes no sense."""
     try:
-        return identify(place, Deadline(_AT_ONCE))
+        return _info(place, _configuration(place, Deadline(_AT_ONCE)))
     except LinkLost:
         return None
 
 
-def _info(place: Where, configuration: Configuration) -> TransducerInfo:
+def _info(place: _Where, configuration: Configuration) -> TransducerInfo:
     return TransducerInfo(
         uri=place.address.uri,
         driver="net-ft",
@@ -173,7 +164,7 @@ def _is_rate(configuration: Configuration, rate: int) -> bool:
     return math.isclose(configuration.rate, true_rate(rate, configuration.ticks))
 
 
-def _configuration(place: Where, deadline: Deadline) -> Configuration:
+def _configuration(place: _Where, deadline: Deadline) -> Configuration:
     answer = http_get(place.address.host, place.http_port, "/netftapi2.xml", deadline)
     if answer.status != 200:
         raise SetupError(
@@ -181,10 +172,9 @@ def _configuration(place: Where, deadline: Deadline) -> Configuration:
             "check that the address is that of a Net F/T box or an Ethernet Axia"
         )
     try:
-        configuration = parse_configuration(answer.body)
+        return parse_configuration(answer.body)
     except SetupError as error:
         raise SetupError(f"{place.address.uri}: {error}") from None
-    return configuration
 
 
 DRIVER = Driver("net-ft", open_net_ft, identify_net_ft, ("net-ft://192.168.1.1",))

@@ -4,44 +4,15 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from xml.parsers import expat
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
 from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT, Family
+from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
 from drivers.transducer import SetupError
 
-_POUND = 4.4482216152605  # [N]
-_FORCE = {  # unit as boxes spell it, in lower case and without "-", "." and blanks: newtons in one
-    "n": 1.0,
-    "kn": 1000.0,
-    "lb": _POUND,
-    "lbf": _POUND,
-    "klb": 1000.0 * _POUND,
-    "klbf": 1000.0 * _POUND,
-    "kg": 9.80665,
-    "kgf": 9.80665,
-    "g": 0.00980665,
-    "gf": 0.00980665,
-}
-_TORQUE = {  # newton millimetres in one
-    "nm": 1000.0,
-    "nmm": 1.0,
-    "knm": 1e6,
-    "lbin": 25.4 * _POUND,
-    "lbfin": 25.4 * _POUND,
-    "inlb": 25.4 * _POUND,
-    "inlbf": 25.4 * _POUND,
-    "lbft": 304.8 * _POUND,
-    "lbfft": 304.8 * _POUND,
-    "ftlb": 304.8 * _POUND,
-    "ftlbf": 304.8 * _POUND,
-    "kgcm": 98.0665,
-    "kgfcm": 98.0665,
-}
-_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?", re.ASCII)
 _FILTERS = ("off", "838", "326", "152", "73", "35", "18", "8", "5", "1500", "2000", "2500", "3000")  # by code [Hz]
 
 
@@ -101,8 +72,8 @@ def parse_configuration(page: bytes) -> Configuration:
         model=_optional(elements, "mfgtxdmdl"),
         counts_per_force=_positive("cfgcpf", _one(elements, "cfgcpf")),
         counts_per_torque=_positive("cfgcpt", _one(elements, "cfgcpt")),
-        newtons=_unit("force", force, _FORCE),
-        newton_millimetres=_unit("torque", torque, _TORQUE),
+        newtons=_unit("force", force, FORCE),
+        newton_millimetres=_unit("torque", torque, TORQUE),
         rated=rated,
         rate=_rate(_optional(elements, "comrdtrate"), ticks),
         streams=_optional(elements, "comrdte").lower() != "disabled",
@@ -123,44 +94,17 @@ def true_rate(stated: float, ticks: float = COUNTER_RATE) -> float:
 
 
 def _elements(page: bytes) -> dict[str, list[str]]:
-    """Return the texts of all elements that hold text alone, by name. Declarations and entities are refused."""
-    elements: dict[str, list[str]] = {}
-    path: list[str] = []
-    text: list[str] = []
-    bare = True
-
-    def start(name: str, _: dict[str, str]) -> None:
-        nonlocal bare
-        path.append(name)
-        text.clear()
-        bare = True
-
-    def end(name: str) -> None:
-        nonlocal bare
-        path.pop()
-        if not path and name != "netft":
-            raise SetupError(f"the box's configuration page is <{name}> and not <netft>; check the address")
-        if bare:
-            elements.setdefault(name, []).append("".join(text).strip())
-        bare = False
-
-    def refuse(*_: object) -> None:
-        raise SetupError("the box's configuration page declares a document type, which no box does; check the address")
-
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = start
-    parser.EndElementHandler = end
-    parser.CharacterDataHandler = text.append
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
+    """Return the texts of all elements that hold text alone, by name."""
     try:
-        parser.Parse(page, True)
-    except expat.ExpatError as error:
-        raise SetupError(
-            f"the box's configuration page is broken ({expat.ErrorString(error.code)}, line {error.lineno}); try again"
-        ) from None
-    except (LookupError, ValueError):  # what expat raises for an encoding it does not know
-        raise SetupError("the box's configuration page is in an unknown encoding; check the address") from None
+        root = parse_xml(page)
+    except ValueError as error:
+        raise SetupError(f"the box's configuration page {error}; check the address and try again") from None
+    if root.tag != "netft":
+        raise SetupError(f"the box's configuration page is <{root.tag[:20]}> and not <netft>; check the address")
+    elements: dict[str, list[str]] = {}
+    for element in root.iter():
+        if not len(element):
+            elements.setdefault(element.tag, []).append((element.text or "").strip())
     return elements
 
 
@@ -179,13 +123,8 @@ def _optional(elements: Mapping[str, list[str]], name: str) -> str:
     return texts[0] if len(texts) == 1 else ""
 
 
-def _number(text: str) -> float:
-    """Return a number written with a point, or nan: no other spelling, whatever the language of the computer."""
-    return float(text) if len(text) <= 40 and _NUMBER.fullmatch(text) else math.nan
-
-
 def _positive(name: str, text: str) -> float:
-    value = _number(text)
+    value = number(text)
     if not (math.isfinite(value) and value > 0.0):
         raise SetupError(
             f"the box says {name} is {text[:40]!r}, which must be a number above 0; check its configuration"
@@ -194,7 +133,7 @@ def _positive(name: str, text: str) -> float:
 
 
 def _unit(kind: str, text: str, units: Mapping[str, float]) -> float:
-    size = units.get(re.sub(r"[\s.·-]", "", text).lower())
+    size = unit(text, units)
     if size is None:
         raise SetupError(
             f"the box gives {kind} in {text[:20]!r}, a unit unknown here; choose N and N-m on its own page"
@@ -203,12 +142,12 @@ def _unit(kind: str, text: str, units: Mapping[str, float]) -> float:
 
 
 def _ratings(elements: Mapping[str, list[str]]) -> tuple[float, ...]:
-    values = tuple(_number(part) for part in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if part)
+    values = tuple(number(part) for part in re.split(r"[;,\s]+", _optional(elements, "cfgmr")) if part)
     return values if len(values) == 6 and all(math.isfinite(v) and v > 0.0 for v in values) else ()
 
 
 def _rate(text: str, ticks: float) -> float:
-    value = _number(text)
+    value = number(text)
     return true_rate(value, ticks) if 1.0 <= value <= max(ticks, COUNTER_RATE) else math.nan
 
 
@@ -230,7 +169,7 @@ def _filter(code: str) -> str:
 def _transform(elements: Mapping[str, list[str]]) -> str:
     """Return the tool transform in force with its units, or nothing where there is none."""
     values = [part for part in re.split(r"[;,\s]+", _optional(elements, "cfgtfx")) if part]
-    if not any(_number(value) != 0.0 for value in values):
+    if not any(number(value) != 0.0 for value in values):
         return ""
     units = f"{_optional(elements, 'scfgtdu')}, {_optional(elements, 'scfgtau')}".strip(", ")
     return f"{' '.join(values)} [{units}]"

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.address import Address, Driver, check_options
+from drivers.address import Address, Driver, at, check_options
 from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.clock_recovery import GAP, ClockRecovery
 from drivers.deadline import Deadline, Link
+from drivers.notation import number
 from drivers.readings import RecordDecoder
 from drivers.serial_ft import wire
 from drivers.serial_link import SerialLink, port_of
@@ -49,15 +50,11 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
     """
     place = _where(address)
     conversation = ControllerConversation(binary=place.binary)
-    try:
+    with at(address):
         link, baud = _answering(place, deadline)
-        try:
+        with contextlib.closing(link):
             said = banner(deadline.bound(link))
             rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
-        finally:
-            link.close()
-    except (LinkLost, DeviceFault) as error:
-        raise type(error)(f"{address.uri}: {error}") from None
     info = _info(place, baud, said, rate)
     return StreamingTransducer(info, lambda _: SerialLink(place.port, baud), conversation, clock, opening=deadline)
 
@@ -65,11 +62,9 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
 def identify_serial_ft(address: Address, deadline: Deadline) -> TransducerInfo:
     """Return who answers, changing no setting (a stream nobody reads is ended)."""
     place = _where(address)
-    try:
+    with at(address):
         link, baud = _answering(place, deadline)
-        link.close()
-    except LinkLost as error:
-        raise LinkLost(f"{address.uri}: {error}") from None
+    link.close()
     return _info(place, baud, "", math.nan)
 
 
@@ -136,7 +131,7 @@ def _where(address: Address) -> _Where:
         raise SetupError(f"{address.uri}: format={form} must be binary or ascii")
     baud = address.number("baud", 0, 300, 921600)
     counts = [_above_zero(address, option) for option in ("counts_per_N", "counts_per_Nm")]
-    if not all(math.isfinite(value) for value in counts):
+    if not np.all(np.isfinite(counts)):
         raise SetupError(
             f"{address.uri}: the controller cannot tell its units; add ?counts_per_N=...&counts_per_Nm=... "
             "as they stand in the calibration sheet"
@@ -157,11 +152,8 @@ def _above_zero(address: Address, option: str) -> float:
     text = address.options.get(option)
     if text is None:
         return math.nan
-    try:
-        value = float(text) if text.isascii() and "_" not in text else math.nan
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and 1e-9 < value < 1e9):
+    value = number(text)
+    if not 1e-9 < value < 1e9:
         raise SetupError(f"{address.uri}: {option}={text[:40]} must be a number above 0")
     return value
 
@@ -170,7 +162,6 @@ class ControllerConversation:
     """Prompts, settings and streams of one controller."""
 
     def __init__(self, *, binary: bool) -> None:
-        """Take records as bytes, or as text."""
         self._binary = binary
 
     def decoder(self) -> RecordDecoder:

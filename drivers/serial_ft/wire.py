@@ -51,7 +51,6 @@ class AsciiDecoder:
     """Records as lines of text. A line of any other form is a broken record."""
 
     def __init__(self) -> None:
-        """Start with nothing received."""
         self.malformed = 0
         self._buffer = bytearray()
         self._damaged = 0  # records broken since the last good one

@@ -5,7 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simulators.bench import Bench, BenchSettings
 from simulators.faults import KINDS, Fault, Faults
+
+ONES = BenchSettings(noise_force=0.0, noise_torque=0.0, drift_force=0.0, drift_torque=0.0, offset=(1.0,) * 6)
 
 
 def sent(*timetable, count=100, seed=1, repeat=0.0):
@@ -103,11 +106,11 @@ def test_a_fault_that_cannot_be_carried_out_is_refused(wrong):
 
 def test_a_drift_walks_to_its_share_of_each_range_and_stays():
     faults, times = Faults([Fault("drift", 1.0, 3.0, share=0.1)]), np.array([0.5, 2.0, 3.0, 9.0])
-    felt = faults.sensed(np.zeros((4, 6)), times, (36.0, 36.0, 36.0, 500.0, 500.0, 500.0))
-    np.testing.assert_allclose(felt[:, 2], [0.0, 1.8, 3.6, 3.6])
-    np.testing.assert_allclose(felt[:, 5], [0.0, 25.0, 50.0, 50.0])
+    drift = faults.sensed(Bench(1, ONES), times) - 1.0  # of ranges of 36 N and 500 N mm
+    np.testing.assert_allclose(drift[:, 2], [0.0, 1.8, 3.6, 3.6])
+    np.testing.assert_allclose(drift[:, 5], [0.0, 25.0, 50.0, 50.0])
 
 
 def test_a_wrong_calibration_feels_more_than_there_is_while_it_lasts():
     faults, times = Faults([Fault("miscalibrate", 1.0, 2.0, share=0.25)]), np.array([0.0, 1.0, 2.0])
-    np.testing.assert_allclose(faults.sensed(np.ones((3, 6)), times, (1.0,) * 6)[:, 0], [1.0, 1.25, 1.0])
+    np.testing.assert_allclose(faults.sensed(Bench(1, ONES), times)[:, 0], [1.0, 1.25, 1.0])
