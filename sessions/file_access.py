@@ -107,6 +107,17 @@ def remedy(error: Exception) -> str:
     return _BY_ERRNO.get(number or 0, _OTHER)
 
 
+@contextmanager
+def name_failure(
+    kind: type[Exception], what: str, more: str = "", failures: tuple[type[Exception], ...] = (OSError,)
+) -> Generator[None]:
+    """Raise `kind` for a file that cannot be reached inside: what failed, why, what mends it, and what else may."""
+    try:
+        yield
+    except failures as error:
+        raise kind(f"{what} ({getattr(error, 'strerror', None) or error}); {remedy(error)}{more}") from error
+
+
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
     """Write a JSON text of people's size: indented, UTF-8. Raises ValueError for nan and infinities: JSON has none."""
     path.write_text(json_text(document), encoding="utf-8")

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, cast
 import msgspec
 from msgspec import inspect
 
-from sessions.file_access import LARGEST_TEXT, read_limited, remedy
+from sessions.file_access import LARGEST_TEXT, name_failure, read_limited
 
 T = TypeVar("T")
 
@@ -33,6 +33,24 @@ class NotAllowed(ValueError):
         self.allowed = allowed
 
 
+def check_range(key: str, value: float | None, low: float, high: float, unit: str = "") -> None:
+    """Raise NotAllowed for a value outside of [low, high]; None was left out."""
+    if value is not None and not low <= value <= high:
+        raise NotAllowed(key, value, f"it must lie between {low} and {high} {unit}".rstrip())
+
+
+def check_text(key: str, text: str) -> None:
+    """Raise NotAllowed for a text that says nothing."""
+    if not text.strip():
+        raise NotAllowed(key, text, "it must not be empty")
+
+
+def check_scale_ends(ends: tuple[str, str] | None) -> None:
+    """Raise NotAllowed where an end of a line has no name; None where there is no line."""
+    if ends is not None and not all(end.strip() for end in ends):
+        raise NotAllowed("scale_ends", list(ends), "both ends of the scale must be named")
+
+
 def load_toml(path: Path, cls: type[T]) -> T:
     """Return the dataclass that a TOML file describes.
 
@@ -46,12 +64,12 @@ def text_of(path: Path) -> str:
     if path.is_dir() or not path.exists():
         what = "this is a folder" if path.is_dir() else "there is no such file"
         raise FileNotFoundError(f"{path}: {what}; give the path of a TOML file")
+    with name_failure(SettingsError, f"{path} cannot be read"):
+        content = read_limited(path, LARGEST_TEXT)
     try:
-        return read_limited(path, LARGEST_TEXT).decode("utf-8-sig")  # some editors begin a file with a mark
+        return content.decode("utf-8-sig")  # some editors begin a file with a mark
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: byte {error.start} is no UTF-8 text; save the file as UTF-8") from error
-    except OSError as error:
-        raise SettingsError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def from_toml(text: str, cls: type[T], where: str, instead: Mapping[str, Any] | None = None) -> T:

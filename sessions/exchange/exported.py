@@ -14,14 +14,15 @@ from drivers.clock import StillClock
 from drivers.readings import ReadingBlock
 from sessions.exchange import FORMATS
 from sessions.exchange.csv_text import ImportRefused
-from sessions.file_access import holds_something, remedy, whole_folder, write_whole
+from sessions.file_access import converted, holds_something, remedy, whole_folder, write_whole
+from sessions.plan.plan import SessionPlan
 from sessions.recording.derived import GAIN_ERROR, bytes_of
-from sessions.recording.head import info_from_dict, plan_from_dict, software_versions
+from sessions.recording.head import info_from_dict, software_versions
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import Digest, different, digest_of
 from sessions.recording.reader import Recording
 from sessions.recording.replay import RecordedReadings
-from sessions.recording.schema import FORMAT, FORMAT_VERSION, LIVE_FILE, RecordingError
+from sessions.recording.schema import LIVE_FILE, RecordingError, check_format
 from sessions.recording.writer import SessionWriter
 from sessions.strokes.decisions import DECISIONS
 
@@ -58,9 +59,7 @@ def side_files(folder: Path) -> dict[str, bytes]:
 
 def head_of(description: Mapping[str, Any]) -> Head:
     """Return the head that a `session.json` tells. Raises ValueError where it is none of ours, or a later one."""
-    form: Mapping[str, Any] = description.get("format") or {}
-    if form.get("name") != FORMAT or int(form.get("version", 0)) > FORMAT_VERSION:
-        raise ValueError(f"it holds {form or 'no format'}; this program reads '{FORMAT}' up to {FORMAT_VERSION}")
+    check_format(description.get("format"))
     digests = description["sha256"]
     return Head(
         description.get("SIMULATED"),
@@ -79,7 +78,7 @@ def restore(exported: ExportedSession, folder: Path) -> tuple[str, ...]:
     after. Raises RecordingError where the folder cannot be written, ValueError where the export is damaged.
     """
     head = exported.head
-    plan = plan_from_dict(head.plan)
+    plan = converted(head.plan, SessionPlan)
     info = info_from_dict(head.transducer) if head.transducer else None
     earlier = cast("list[Any]", head.provenance.get("restored_from", []))
     source = {

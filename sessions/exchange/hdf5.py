@@ -21,7 +21,7 @@ from sessions.file_access import LARGEST_DOCUMENT, json_value
 from sessions.recording import LoggedEvent
 from sessions.recording.derived import GAIN_ERROR
 from sessions.recording.log import event_data
-from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
+from sessions.recording.schema import COLUMNS, SEALED_FILE, check_format
 from sessions.recording.sealed_copy import DataSet, read_texts, texts, write_copy
 from sessions.strokes.decisions import DECISIONS
 
@@ -56,9 +56,8 @@ def find(path: Path) -> Path | None:
 def read(path: Path) -> ExportedSession:
     """Return the session that a file written by `write`, or a sealed copy, holds. Raises OSError, ValueError."""
     with h5py.File(path, "r") as file:
-        form, version = _text(file.attrs.get("format", b"")), int(file.attrs.get("format_version", 0))
-        if form != FORMAT or version > FORMAT_VERSION:
-            raise ValueError(f"it holds {form or 'no format'} {version}; this reads '{FORMAT}' to {FORMAT_VERSION}")
+        form = _text(file.attrs.get("format", b""))
+        check_format({"name": form, "version": int(file.attrs.get("format_version", 0))} if form else None)
         head = Head(
             _text(file.attrs["SIMULATED"]) if "SIMULATED" in file.attrs else None,
             *(json_value(_text(_array(file, f"head/{name}")[0])) for name in ("plan", "transducer", "provenance")),

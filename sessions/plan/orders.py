@@ -17,7 +17,7 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.plan.plan import Block, SessionPlan, Stimulus
+from sessions.plan.plan import SessionPlan, Stimulus, Trial
 
 LETTERS = "BCDFGHJKLMNPQRSTVWXZ"  # no vowels: no label spells a word
 DRAWS = 10_000  # of an order that is to meet constraints
@@ -151,27 +151,22 @@ def with_comparison(plan: SessionPlan, number: int, answers: Sequence[tuple[Stim
     if not block.candidates or number not in {trial.compared_with for trial in block.trials}:
         return plan
     stimulus = next_comparison(block.candidates, answers)
-    pair = {number, number + 1}
-    trials = tuple(
-        replace(trial, stimulus=stimulus) if trial.number in pair and not trial.standard else trial
-        for trial in block.trials
-    )
-    return _with_block(plan, replace(block, trials=trials))
+
+    def chosen(trial: Trial) -> Trial:
+        compared = trial.number in (number, number + 1) and not trial.standard
+        return replace(trial, stimulus=stimulus) if compared else trial
+
+    return plan.with_trials(chosen)
 
 
 def with_mounted(plan: SessionPlan, codes: Mapping[int, str]) -> SessionPlan:
     """Return the plan with the stimuli that were mounted in trials of adaptive blocks; `codes` go by trial number."""
-    for block in plan.blocks:
-        by_code = {one.code: one for one in block.candidates}
-        trials = tuple(
-            replace(trial, stimulus=by_code.get(codes.get(trial.number, ""), trial.stimulus)) for trial in block.trials
-        )
-        plan = _with_block(plan, replace(block, trials=trials)) if by_code else plan
-    return plan
+    stimuli = {(block.name, one.code): one for block in plan.blocks for one in block.candidates}
 
+    def mounted(trial: Trial) -> Trial:
+        return replace(trial, stimulus=stimuli.get((trial.block, codes.get(trial.number, "")), trial.stimulus))
 
-def _with_block(plan: SessionPlan, block: Block) -> SessionPlan:
-    return replace(plan, blocks=tuple(block if one.name == block.name else one for one in plan.blocks))
+    return plan.with_trials(mounted) if stimuli else plan
 
 
 @cache

@@ -1,7 +1,10 @@
 """What a session will do: stimuli, trials, blocks, and the whole plan. All of it is data."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Literal
+
+from sessions.toml_file import check_range
 
 Origin = Literal["measured", "set", "default"]  # where a value came from; a default was chosen by nobody
 Hand = Literal["left", "right"]
@@ -50,9 +53,7 @@ class Trial:
     repetition: int  # from 1
     phase: Phase = "main"
     answer: Answer = "line"  # what the subject gives when the stroke is done
-    compared_with: int | None = (
-        None  # where one of two is chosen: number of the trial just before, whose answer is none
-    )
+    compared_with: int | None = None  # the first of two: number of the trial just before, whose answer is none
     standard: bool = False  # the surface that all others of its block are compared with
 
 
@@ -96,6 +97,11 @@ class Rests:
     after_trials: int | None = None  # of a block; None: not within a block
     between_blocks: bool = False  # practice and its block are not parted
     duration: float | None = None  # [s]; None: until the experimenter goes on
+
+    def __post_init__(self) -> None:
+        """Check ranges."""
+        check_range("after_trials", self.after_trials, 1, 1000)
+        check_range("duration", self.duration, 1, 3600, "s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,3 +160,8 @@ class SessionPlan:
     def trials(self) -> tuple[Trial, ...]:
         """All trials in their order."""
         return tuple(trial for block in self.blocks for trial in block.trials)
+
+    def with_trials(self, change: Callable[[Trial], Trial]) -> "SessionPlan":
+        """Return the plan with each trial as `change` returns it."""
+        blocks = (replace(block, trials=tuple(map(change, block.trials))) for block in self.blocks)
+        return replace(self, blocks=tuple(blocks))

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from sessions.file_access import DATABASE_FAILURES, bounded, json_object, read_limited, remedy, write_whole
+from sessions.file_access import DATABASE_FAILURES, bounded, json_object, name_failure, read_limited, write_whole
 from sessions.plan.orders import opaque_codes, shuffled
 from sessions.plan.plan import SessionPlan, Trial
 from sessions.plan.protocols import Body, Labels, Protocol, StudyPlace, design_rows, is_code
@@ -43,6 +43,11 @@ class Key:
     def sealed(self) -> str:
         """Return the key as a text that reveals nothing to whoever opens its file by chance (Base64 of JSON)."""
         return base64.b64encode(json.dumps(self.to_dict()).encode()).decode()
+
+    @property
+    def labels(self) -> Labels:
+        """Return the code of each stimulus."""
+        return {stimulus: code for code, stimulus in self.stimuli.items()}
 
     @staticmethod
     def opened(sealed: str) -> "Key":
@@ -72,7 +77,7 @@ class Key:
 
     def plan(self, plan: SessionPlan) -> SessionPlan:
         """Return a blinded plan with the index of every stimulus."""
-        return replace(plan, blocks=tuple(replace(b, trials=tuple(map(self.of, b.trials))) for b in plan.blocks))
+        return plan.with_trials(self.of)
 
 
 class StudyError(Exception):
@@ -160,7 +165,7 @@ class Study:
 
     def place(self, member: Member, key: Key | None) -> StudyPlace:
         """Return the place of a subject, from which its plan is made; `key` is needed where the study is blinded."""
-        labels = self.protocol.labels if key is None else labels_of(key)
+        labels = self.protocol.labels if key is None else key.labels
         sealed = None if self.unblinded else self.key_sha256
         return StudyPlace(self.name, member.slot, self.row(member.slot), self.seed, labels, sealed)
 
@@ -169,11 +174,6 @@ def free_slot(members: Sequence[Member]) -> int:
     """Return the first slot that nobody holds: one that was given back comes first."""
     slots = {member.slot for member in members if member.withdrawn is None}
     return next(slot for slot in count() if slot not in slots)
-
-
-def labels_of(key: Key) -> Labels:
-    """Return the code of each stimulus."""
-    return {stimulus: code for code, stimulus in key.stimuli.items()}
 
 
 def check_code(what: str, code: str) -> None:
@@ -278,10 +278,10 @@ def study_key(folder: Path) -> Key | None:
     if expected is None:
         return None
     path = folder / KEY_FILE
+    with name_failure(StudyError, f"{path} cannot be read"):
+        content = read_limited(path)
     try:
-        key = Key.opened(json_object(read_limited(path))["sealed"])
-    except OSError as error:
-        raise StudyError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
+        key = Key.opened(json_object(content)["sealed"])
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise StudyError(f"{path} cannot be read ({error}); restore it from a copy") from error
     if key.sha256 != expected:
@@ -339,28 +339,26 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
 def _reading(folder: Path) -> Generator[sqlite3.Connection]:
     """Lend a connection that changes nothing."""
     path = folder / STUDY_FILE
-    try:
+    with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
         path.open("rb").close()  # says why it cannot be read, which SQLite does not
         address = f"{path.resolve().as_uri()}?mode=ro"
         with closing(bounded(sqlite3.connect(address, uri=True, timeout=PATIENCE))) as connection:
             yield connection
-    except DATABASE_FAILURES as error:
-        raise StudyError(f"{path} cannot be read ({error}); {remedy(error)}") from error
 
 
 @contextmanager
 def _changing(folder: Path) -> Generator[sqlite3.Connection]:
     """Lend a connection in a transaction of its own, which is kept as a whole or not at all."""
     path = folder / STUDY_FILE
-    try:
-        with closing(bounded(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection:
-            connection.execute("PRAGMA synchronous=FULL")
-            connection.execute("BEGIN IMMEDIATE")
-            try:
-                yield connection
-            except BaseException:
-                connection.execute("ROLLBACK")
-                raise
-            connection.execute("COMMIT")
-    except sqlite3.Error as error:
-        raise StudyError(f"{path} cannot be changed ({error}); {remedy(error)}, and repeat") from error
+    with (
+        name_failure(StudyError, f"{path} cannot be changed", ", and repeat", (sqlite3.Error,)),
+        closing(bounded(sqlite3.connect(path, timeout=PATIENCE, isolation_level=None))) as connection,
+    ):
+        connection.execute("PRAGMA synchronous=FULL")
+        connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield connection
+        except BaseException:
+            connection.execute("ROLLBACK")
+            raise
+        connection.execute("COMMIT")

@@ -3,10 +3,10 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
 
 from sessions.file_access import json_value, put_in_place, read_limited, remedy, write_whole
-from sessions.recording.manifest import changed_files, description, is_sealed, list_in_manifest
+from sessions.recording.derived import ABSENT, unlike
+from sessions.recording.manifest import changed_files, description, head_of_manifest, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import fold_log
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
@@ -42,7 +42,7 @@ def seal(folder: Path) -> None:
         write_whole(folder / DESCRIPTION_FILE, json.dumps(description(recording), indent=1).encode() + b"\n")
         for name in SEALED:
             (folder / name).chmod(0o444)
-        list_in_manifest(folder, SEALED, recording.simulated_sentence, recording.head["format"])
+        list_in_manifest(folder, SEALED, head_of_manifest(recording))
     except (OSError, RuntimeError) as error:  # h5py raises either when the disk is full
         new.unlink(missing_ok=True)
         raise RecordingError(
@@ -60,9 +60,8 @@ def problems(folder: Path) -> tuple[str, ...]:
     recording = Recording.open(folder)
     if not is_sealed(folder):
         return (*recording.losses, f"the session was never sealed: there is no {MANIFEST_FILE}")
-    form: dict[str, Any] = recording.head["format"]
     return (
-        *changed_files(folder, recording.simulated_sentence, form),
+        *changed_files(recording),
         *recording.losses,
         *differences(recording),
         *_otherwise_described(recording),
@@ -79,29 +78,10 @@ def _otherwise_described(recording: Recording) -> Iterator[str]:
     except (OSError, ValueError) as error:
         yield f"{DESCRIPTION_FILE} cannot be read ({error})"
         return
-    expected: dict[str, Any] = json.loads(json.dumps(description(recording)))
-    yield from (f"{where} of {DESCRIPTION_FILE} differs from the live file" for where in _unlike(stored, expected, ""))
-
-
-def _unlike(stored: object, expected: object, where: str) -> Iterator[str]:
-    """Yield the places where `stored` is not as expected; names that an older version did not tell are left out."""
-    if isinstance(stored, dict) and isinstance(expected, dict):
-        stored_table, fresh = cast("dict[str, Any]", stored), cast("dict[str, Any]", expected)
-        for name, value in stored_table.items():
-            place = f"{where}.{name}" if where else name
-            if name in fresh:
-                yield from _unlike(value, fresh[name], place)
-            else:
-                yield place
-    elif isinstance(stored, list) and isinstance(expected, list):
-        entries, expected_entries = cast("list[Any]", stored), cast("list[Any]", expected)
-        if len(entries) != len(expected_entries):
-            yield where
-        else:
-            for i, (value, other) in enumerate(zip(entries, expected_entries, strict=True)):
-                yield from _unlike(value, other, f"{where}[{i}]")
-    elif stored != expected:
-        yield where or "all"
+    expected = json.loads(json.dumps(description(recording)))
+    for place, then, _ in unlike(stored, expected, ""):
+        if then is not ABSENT:  # else an older version did not tell it
+            yield f"{place.removeprefix('.') or 'all'} of {DESCRIPTION_FILE} differs from the live file"
 
 
 def _clear_unfinished(folder: Path) -> None:

@@ -1,13 +1,12 @@
 """What is kept beside a recording: numbers made from it, whether they come out again, and the opened key."""
 
-import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
-from sessions.file_access import json_object, read_limited, remedy, write_whole
+from sessions.file_access import json_object, json_text, name_failure, read_limited, write_whole
 from sessions.plan.study import Key, StudyError
 from sessions.recording.head import software_versions
 from sessions.recording.log import trial_records
@@ -24,16 +23,13 @@ def store_derived(folder: Path, name: str, data: Mapping[str, Any]) -> Path:
 
     Raises ValueError where `data` holds nan or an infinity: what is not known is None.
     """
-    simulated = Recording.open(folder).simulated_sentence
-    head: dict[str, Any] = {"SIMULATED": simulated} if simulated else {}
-    document = {**head, "made_by": software_versions(), **data}
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    return _store(folder, name, text.encode() + b"\n", simulated)
+    document = {**Recording.open(folder).mark, "made_by": software_versions(), **data}
+    return _store(folder, name, json_text(document).encode())
 
 
 def store_page(folder: Path, name: str, page: str) -> Path:
     """Store a page such as "report.html", which itself says where it was simulated; return its path."""
-    return _store(folder, name, page.encode(), Recording.open(folder).simulated_sentence)
+    return _store(folder, name, page.encode())
 
 
 def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
@@ -42,31 +38,25 @@ def load_derived(folder: Path, name: str) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        return json_object(read_limited(path))
+        return json_object(bytes_of(path))
     except ValueError as error:
         raise RecordingError(f"{path} is damaged ({error}); make it anew from the recording") from error
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
 def bytes_of(path: Path) -> bytes:
     """Return the bytes of a file, none where there is no file. Raises RecordingError where it cannot be read."""
-    try:
+    with name_failure(RecordingError, f"{path} cannot be read"):
         return read_limited(path) if path.is_file() else b""
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
 
 
-def _store(folder: Path, name: str, content: bytes, simulated: str | None) -> Path:
+def _store(folder: Path, name: str, content: bytes) -> Path:
     if name in RECORDED or not re.fullmatch(r"[a-z0-9][a-z0-9_-]*\.[a-z0-9]+", name):
         raise ValueError(f"{name} is no name for a file made from a recording")
     path = folder / name
-    try:
+    with name_failure(RecordingError, f"{path} cannot be written"):
         write_whole(path, content)
         if is_sealed(folder):
-            list_in_manifest(folder, (name,), simulated)
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be written ({error.strerror}); {remedy(error)}") from error
+            list_in_manifest(folder, (name,))
     return path
 
 
@@ -108,28 +98,40 @@ TIMINGS = frozenset({"wall_s", "setup_s", "estimate_s", "evidence_s", MADE_BY, "
 _MOST = 20  # differences named one by one
 
 
+ABSENT = object()  # in place of a value under a name that a document lacks
+
+
+def unlike(stored: Any, fresh: Any, where: str, but: frozenset[str] = frozenset()) -> Iterator[tuple[str, Any, Any]]:  # noqa: ANN401  JSON values
+    """Yield the place of each value that is stored otherwise, what is stored and what is now; names in `but` aside."""
+    if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
+        then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
+        for key in sorted({*then, *now} - but, key=_rank):
+            yield from unlike(then.get(key, ABSENT), now.get(key, ABSENT), f"{where}.{key}", but)
+        return
+    if isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
+        before, after = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
+        if len(before) == len(after):
+            for i, (a, b) in enumerate(zip(before, after, strict=True)):
+                yield from unlike(a, b, f"{where}[{i}]", but)
+            return
+    if stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
+        yield where, stored, fresh
+
+
 def differences(stored: object, fresh: object, where: str) -> Iterator[str]:
     """Yield a sentence for each value that was stored otherwise than it comes out now; timings are left out.
 
     >>> list(differences({"a": [1.0, 2.0], "wall_s": 3}, {"a": [1.0, 2.5], "wall_s": 4}, "x"))
     ['x.a[1] was stored as 2.0 and comes out as 2.5 (+25 %)']
     """
-    if isinstance(stored, Mapping) and isinstance(fresh, Mapping):
-        then, now = cast("Mapping[str, Any]", stored), cast("Mapping[str, Any]", fresh)
-        for key in sorted({*then, *now} - TIMINGS, key=_rank):
-            if key not in then or key not in now:
-                yield f"{where}.{key} is {'new' if key in now else 'no longer made'}"
-            else:
-                yield from differences(then[key], now[key], f"{where}.{key}")
-    elif isinstance(stored, list | tuple) and isinstance(fresh, list | tuple):
-        before, after = cast("Sequence[Any]", stored), cast("Sequence[Any]", fresh)
-        if len(before) != len(after):
-            yield f"{where} was stored with {len(before)} entries and comes out with {len(after)}"
+    for place, then, now in unlike(stored, fresh, where, TIMINGS):
+        if then is ABSENT or now is ABSENT:
+            yield f"{place} is {'new' if then is ABSENT else 'no longer made'}"
+        elif isinstance(then, list | tuple) and isinstance(now, list | tuple):
+            entries = len(cast("Sequence[Any]", then)), len(cast("Sequence[Any]", now))
+            yield f"{place} was stored with {entries[0]} entries and comes out with {entries[1]}"
         else:
-            for i, (a, b) in enumerate(zip(before, after, strict=True)):
-                yield from differences(a, b, f"{where}[{i}]")
-    elif stored != fresh or isinstance(stored, bool) != isinstance(fresh, bool):
-        yield f"{where} was stored as {stored!r} and comes out as {fresh!r}{_by(cast('object', stored), fresh)}"
+            yield f"{place} was stored as {then!r} and comes out as {now!r}{_by(cast('object', then), now)}"
 
 
 def _rank(key: str) -> tuple[int, str]:

@@ -21,7 +21,7 @@ from drivers.calibration import Calibration
 from drivers.clock import Clock
 from drivers.transducer import StatusBit, StatusTable, TransducerInfo, bit
 from sessions.file_access import converted, json_object, read_limited, write_whole
-from sessions.plan.plan import Origin, SessionPlan
+from sessions.plan.plan import Origin
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
 OPTIONAL = ("nidaqmx", "distributed")  # named where they are installed
@@ -182,7 +182,7 @@ class _Setting(msgspec.Struct):
     value: Any
 
 
-class _Provenance(msgspec.Struct):
+class Provenance(msgspec.Struct):
     """The parts of a provenance that the program itself uses."""
 
     created_utc: datetime
@@ -191,11 +191,6 @@ class _Provenance(msgspec.Struct):
     machine: dict[str, Any] = {}
     settings: dict[str, _Setting] = {}
     restored_from: list[Any] = []
-
-
-def check_provenance(data: object) -> None:
-    """Raise ValueError where a provenance is of another shape than this program writes."""
-    converted(data, _Provenance)
 
 
 def simulated_sentence(info: TransducerInfo | None, subject_simulated: bool) -> str | None:
@@ -216,16 +211,6 @@ def json_text(value: object) -> str:
 
 
 _IDENTITY = ("uri", "driver", "model", "serial", "simulated")
-
-
-def plan_to_dict(plan: SessionPlan) -> dict[str, Any]:
-    """Return the plan as plain data."""
-    return msgspec.to_builtins(plan)
-
-
-def plan_from_dict(data: Mapping[str, Any]) -> SessionPlan:
-    """Return the plan that `plan_to_dict` gave `data` for. Raises ValueError for another shape."""
-    return converted(data, SessionPlan)
 
 
 def identity(info: TransducerInfo) -> dict[str, Any]:

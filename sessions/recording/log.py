@@ -1,12 +1,13 @@
 """The event log of a session: what each kind of event holds, and what the log says about each trial."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 
-from drivers.transducer import COUNTS
+from drivers.transducer import COUNTS, Health
 from sessions.file_access import converted, json_object
 from sessions.plan.plan import Answer, Choice, SessionPlan, Trial
 
@@ -203,3 +204,14 @@ def event_data(kind: str, text: str) -> dict[str, Any]:
     data = json_object(text)
     converted(data, SHAPES.get(kind, dict[str, Any]))
     return data
+
+
+def health_of(log: Iterable[LoggedEvent]) -> Health:
+    """Return the totals of what "losses" events tell."""
+    events = list(log)
+    counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
+    words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
+    flagged: Counter[str] = Counter()
+    for event in events:
+        flagged.update(event.data.get("flagged", {}))
+    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(flagged))

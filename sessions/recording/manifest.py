@@ -2,14 +2,16 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from drivers.readings import ReadingBlock
-from sessions.file_access import json_object, read_limited, remedy, write_whole
+from sessions.file_access import converted, json_object, name_failure, read_limited, write_whole
 from sessions.recording.head import json_text
 from sessions.recording.log import LoggedEvent, TrialRecord
 from sessions.recording.reader import Recording
@@ -23,10 +25,6 @@ class Digest:
     readings: int
     columns: dict[str, str]  # hexadecimal SHA-256 by name of the column
     events: str  # hexadecimal SHA-256 of the log
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return it as `session.json` holds it."""
-        return {"readings": self.readings, "columns": self.columns, "events": self.events}
 
 
 def digest_of(blocks: Iterable[ReadingBlock], events: Iterable[LoggedEvent]) -> Digest:
@@ -62,8 +60,7 @@ def description(recording: Recording) -> dict[str, Any]:
     """Return what `session.json` says: all but the readings and the events, and the digest of those."""
     digest = digest_of(recording.blocks(), recording.events)
     return {
-        **({"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}),
-        "format": recording.head["format"],
+        **head_of_manifest(recording),
         "plan": recording.head["plan"],
         "transducer": recording.head["transducer"],
         "provenance": dict(recording.provenance),
@@ -105,66 +102,61 @@ def is_sealed(folder: Path) -> bool:
     return (folder / MANIFEST_FILE).exists()
 
 
-def list_in_manifest(
-    folder: Path, names: Iterable[str], simulated: str | None, form: Mapping[str, Any] | None = None
-) -> None:
+def head_of_manifest(recording: Recording) -> dict[str, Any]:
+    """Return what a manifest says of itself, as the live file does: what was simulated, and the format."""
+    return {**recording.mark, "format": recording.head["format"]}
+
+
+def list_in_manifest(folder: Path, names: Iterable[str], head: dict[str, Any] | None = None) -> None:
     """Take the files called `names` into the manifest as they are now; the others stay as listed.
 
-    A new manifest says of itself what the live file does: what was `simulated`, and its format.
+    With a `head` the manifest begins anew. Raises RecordingError for a damaged one, OSError.
     """
-    sealed = is_sealed(folder)
-    files: dict[str, Any] = _files(folder) if sealed else {}
-    head = _head_of(folder) if sealed else {**_simulated(simulated), "format": form}
+    document = _manifest(folder) if head is None else head
+    files: dict[str, Any] = document.get("files", {})
     for name in names:
         path = folder / name
         files[name] = {"sha256": file_sha256(path), "bytes": path.stat().st_size}
-    document = {**head, "files": dict(sorted(files.items()))}
+    document = {**document, "files": dict(sorted(files.items()))}
     write_whole(folder / MANIFEST_FILE, json.dumps(document, indent=1).encode() + b"\n")
 
 
-def changed_files(folder: Path, simulated: str | None, form: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest.
-
-    `simulated` and `form` are what the live file says at its head.
-    """
+def changed_files(recording: Recording) -> tuple[str, ...]:
+    """Return a sentence for each listed file that is gone or not what it was, and one for a damaged manifest."""
     problems: list[str] = []
     try:
-        files = _files(folder)
+        document = _manifest(recording.folder)
     except RecordingError as damaged:
         return (str(damaged),)
-    for name, digest in files.items():
-        path = folder / name
+    for name, digest in document.pop("files").items():
+        path = recording.folder / name
         if not path.is_file():
             problems.append(f"{name} is listed in {MANIFEST_FILE} and missing")
         elif file_sha256(path) != digest["sha256"] or path.stat().st_size != digest["bytes"]:
             problems.append(
                 f"{name} is not what it was when it was listed: its SHA-256 or size differs from {MANIFEST_FILE}"
             )
-    if _head_of(folder) != {**_simulated(simulated), "format": form}:
+    if document != head_of_manifest(recording):
         problems.append(f"the head of {MANIFEST_FILE} differs from the live file")
     return tuple(problems)
 
 
-def _simulated(sentence: str | None) -> dict[str, Any]:
-    return {"SIMULATED": sentence} if sentence else {}
+class _Listed(msgspec.Struct):
+    sha256: str
+    bytes: int
 
 
-def _head_of(folder: Path) -> dict[str, Any]:
-    """Return what stands before the files in a manifest that can be read."""
-    document = json_object(read_limited(folder / MANIFEST_FILE))
-    return {name: value for name, value in document.items() if name != "files"}
-
-
-def _files(folder: Path) -> dict[str, Any]:
-    """Return what the manifest lists. Raises RecordingError when it cannot be read."""
+def _manifest(folder: Path) -> dict[str, Any]:
+    """Return what the manifest holds. Raises RecordingError when it cannot be read."""
     path = folder / MANIFEST_FILE
+    with name_failure(RecordingError, f"{path} cannot be read"):
+        content = read_limited(path)
     try:
-        files = json_object(read_limited(path))["files"]
-        return {str(name): {"sha256": str(entry["sha256"]), "bytes": entry["bytes"]} for name, entry in files.items()}
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read ({error.strerror}); {remedy(error)}") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        document = json_object(content)
+        converted(document["files"], dict[str, _Listed])
+    except (ValueError, KeyError) as error:
         raise RecordingError(f"{path} cannot be read ({error}); restore the folder from a copy") from error
+    return document
 
 
 def file_sha256(path: Path) -> str:

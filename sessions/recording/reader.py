@@ -4,24 +4,23 @@ import errno
 import shutil
 import sqlite3
 import tempfile
-from collections import Counter
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo, flagged_words
-from sessions.file_access import DATABASE_FAILURES, bounded, converted, json_value, remedy
+from sessions.file_access import DATABASE_FAILURES, bounded, converted, json_value, name_failure
 from sessions.plan.orders import with_mounted
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.head import check_provenance, info_from_dict, plan_from_dict
-from sessions.recording.log import LoggedEvent, TrialRecord, event_data, trial_records
+from sessions.recording.head import Provenance, info_from_dict
+from sessions.recording.log import LoggedEvent, TrialRecord, event_data, health_of, trial_records
 from sessions.recording.schema import RecordingError
 from sessions.recording.wal_recovery import log_tail
 
@@ -65,20 +64,18 @@ class Recording:
         if not path.is_file():
             raise RecordingError(f"{folder} holds no recording: there is no {schema.LIVE_FILE}; give a session folder")
         losses: list[str] = []
-        try:
+        with name_failure(RecordingError, f"{path} cannot be read", failures=DATABASE_FAILURES):
             losses += torn_log(path)
             with _connected(path) as connection:
                 head = _head(path, connection)
                 events = _events(connection, losses)
-        except DATABASE_FAILURES as error:
-            raise RecordingError(f"{path} cannot be read ({error}); {remedy(error)}") from error
         losses += [event.data["sentence"] for event in events if event.kind in TELL_LOSSES]
         if _end(events) is None:
             losses.append("the session has no end: it was cut short, or is still running")
         try:
-            plan, transducer = with_mounted(plan_from_dict(head["plan"]), _mounted(events)), head["transducer"]
-            info = info_from_dict(transducer) if transducer else None
-            check_provenance(head["provenance"])
+            plan = with_mounted(converted(head["plan"], SessionPlan), _mounted(events))
+            info = info_from_dict(head["transducer"]) if head["transducer"] else None
+            converted(head["provenance"], Provenance)
         except (ValueError, KeyError, TypeError) as error:
             raise RecordingError(f"{path}: its head is damaged ({error}); restore it from a copy") from error
         simulated = None if head["simulated"] == "no" else head["simulated"]
@@ -89,6 +86,11 @@ class Recording:
     def simulated(self) -> bool:
         """Say whether transducer or subject were simulated."""
         return self.simulated_sentence is not None
+
+    @property
+    def mark(self) -> dict[str, Any]:
+        """Return what heads a document made from this recording; nothing where nothing was simulated."""
+        return {"SIMULATED": self.simulated_sentence} if self.simulated_sentence else {}
 
     @property
     def end(self) -> Mapping[str, Any] | None:
@@ -111,16 +113,12 @@ class Recording:
     @property
     def flaws(self) -> tuple[str, ...]:
         """Name what went wrong while recording, as the event log tells it, a sentence each."""
-        trouble: list[str] = []
-        losses = [event.data for event in self.events if event.kind == "losses"]
-        for name, sentence in LOSS_SENTENCES.items():
-            if count := sum(data.get(name, 0) for data in losses):
-                trouble.append(sentence.format(count))
-        flagged: Counter[str] = Counter()
-        for data in losses:
-            flagged.update(data.get("flagged", {}))
-        trouble += [f"what their status said: {flagged_words(flagged)}"] if flagged else []
-        rates = [event.data["rate_words"] for event in self.events if "rate_words" in event.data]
+        losses = [event for event in self.events if event.kind == "losses"]
+        health = health_of(losses)
+        counts = ((sentence, getattr(health, name)) for name, sentence in LOSS_SENTENCES.items())
+        trouble = [sentence.format(count) for sentence, count in counts if count]
+        trouble += [f"what their status said: {flagged_words(health.flagged)}"] if health.flagged else []
+        rates = [event.data["rate_words"] for event in losses if "rate_words" in event.data]
         trouble += [f"the rate that was found: {words}" for words in dict.fromkeys(rates)]
         for record in self.trials:
             allowed = self.plan.strokes_allowed(record.trial)
@@ -270,12 +268,10 @@ def _head(path: Path, connection: sqlite3.Connection) -> dict[str, Any]:
             sound = False
         if not sound:
             raise RecordingError(f"{path}: {name} in its head is damaged (CRC-32 differs); restore it from a copy")
-    form: Any = head.get("format")
-    if not _readable(form):
-        raise RecordingError(
-            f"{path} holds {form or 'no format'}; this program reads '{schema.FORMAT}' up to version "
-            f"{schema.FORMAT_VERSION}: use a later program"
-        )
+    try:
+        schema.check_format(head.get("format"))
+    except ValueError as error:
+        raise RecordingError(f"{path}: {error}: use a later program") from error
     return head
 
 
@@ -283,15 +279,6 @@ def _mounted(events: Sequence[LoggedEvent]) -> Mapping[int, str]:
     """Return the code of the stimulus that was mounted last in each trial."""
     kind = "stimulus_mounted"
     return {event.trial: event.data["code"] for event in events if event.kind == kind and event.trial is not None}
-
-
-def _readable(form: Any) -> bool:  # noqa: ANN401  any JSON value
-    """Say whether the head's `format` is one that this program reads."""
-    if not isinstance(form, dict):
-        return False
-    known = cast("dict[str, Any]", form)
-    version = known.get("version", 0)
-    return known.get("name") == schema.FORMAT and isinstance(version, int) and version <= schema.FORMAT_VERSION
 
 
 def _events(connection: sqlite3.Connection, losses: list[str]) -> tuple[LoggedEvent, ...]:

@@ -1,15 +1,14 @@
 """A transducer that speaks from a recording: sequence, device counter, status and raw numbers as they were recorded."""
 
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.transducer import COUNTS, Health, LinkLost, SetupError, TransducerInfo
-from sessions.recording.log import LoggedEvent
+from drivers.transducer import Health, LinkLost, SetupError, TransducerInfo
+from sessions.recording.log import health_of
 from sessions.recording.reader import Recording
 
 
@@ -17,7 +16,6 @@ class RecordedReadings:
     """Recorded readings in their order, handed over a part at a time and read as they go."""
 
     def __init__(self, blocks: Iterator[ReadingBlock]) -> None:
-        """Begin at the first reading."""
         self._blocks = blocks
         self._waiting: list[ReadingBlock] = []
         self.position = 0  # how many were handed over
@@ -132,14 +130,3 @@ class ReplayTransducer:
         block = replace(block, received_ns=block.received_ns + shift_ns)
         self._lag_ms = (self._clock.now_ns() - int(block.received_ns[-1])) * 1e-6
         return block
-
-
-def health_of(log: Iterable[LoggedEvent]) -> Health:
-    """Return the totals of what "losses" events tell."""
-    events = list(log)
-    counts = {name: sum(int(event.data.get(name, 0)) for event in events) for name in COUNTS}
-    words = [str(event.data["rate_words"]) for event in events if "rate_words" in event.data]
-    flagged: Counter[str] = Counter()
-    for event in events:
-        flagged.update(event.data.get("flagged", {}))
-    return Health(**counts, rate_words=words[-1] if words else "", flagged=dict(flagged))

@@ -4,6 +4,7 @@
 """
 
 import zlib
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,17 @@ LIVE_FILE = "session.sqlite"
 SEALED_FILE = "session.h5"
 DESCRIPTION_FILE = "session.json"
 MANIFEST_FILE = "MANIFEST.json"
+
+
+def check_format(form: Any) -> None:  # noqa: ANN401  any JSON value
+    """Raise ValueError unless a format, as heads and `session.json` tell it, is one that this program reads."""
+    match form:
+        case {"name": name, "version": int(version)} if name == FORMAT and version <= FORMAT_VERSION:
+            return
+        case _:
+            readable = f"'{FORMAT}' up to version {FORMAT_VERSION}"
+            raise ValueError(f"it holds {form or 'no format'}; this program reads {readable}")
+
 
 TABLES = (
     """CREATE TABLE head (

@@ -6,7 +6,6 @@
 # pyright: reportMissingTypeStubs=false, reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownArgumentType=false, reportAttributeAccessIssue=false, reportIndexIssue=false
 # h5py brings no types; every array is given its type where it leaves this file.
-# h5py brings no types; what leaves this file is bytes.
 
 import json
 import math
@@ -26,25 +25,15 @@ from sessions.recording.reader import Recording
 from sessions.recording.schema import COLUMNS, FORMAT, FORMAT_VERSION, SEALED_FILE
 
 CHUNK_BYTES = 32_768  # as a chunk of the readings' columns has
+EVENT_DATA = "events/data"  # a data set of texts, of which an answer's may be thousands of times another's
 END = "_end"  # of the name of the data set that holds where each text ends
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TextColumn:
-    """A column of ASCII texts, made when it is asked for: all of them at once may be more than memory holds."""
-
-    name: str
-    texts: Callable[[], Iterable[str]]
-    note: str
-
-
-def write_texts(file: h5py.File, column: TextColumn) -> tuple[h5py.Dataset, h5py.Dataset]:
-    """Write a column, and return its two data sets: uint8 bytes, int64 ends."""
-    data_set = file.create_dataset(
-        column.name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True
-    )
+def write_texts(file: h5py.File, name: str, column: Iterable[str]) -> tuple[h5py.Dataset, h5py.Dataset]:
+    """Write a column of ASCII texts, and return its two data sets: uint8 bytes, int64 ends."""
+    data_set = file.create_dataset(name, (0,), np.uint8, maxshape=(None,), chunks=(CHUNK_BYTES,), fletcher32=True)
     waiting, ends, end = bytearray(), list[int](), 0
-    for text in column.texts():
+    for text in column:
         waiting += text.encode("ascii")
         end += len(text)
         ends.append(end)
@@ -52,7 +41,7 @@ def write_texts(file: h5py.File, column: TextColumn) -> tuple[h5py.Dataset, h5py
             _append(data_set, waiting)
     _append(data_set, waiting)
     protected = {"chunks": (len(ends),), "fletcher32": True} if ends else {}
-    return data_set, file.create_dataset(column.name + END, data=np.array(ends, "<i8"), **protected)
+    return data_set, file.create_dataset(name + END, data=np.array(ends, "<i8"), **protected)
 
 
 def read_texts(file: h5py.File, name: str) -> Iterator[bytes]:
@@ -129,10 +118,9 @@ def write_copy(
             protected = {"chunks": one.values.shape, "fletcher32": True} if one.values.size else {}
             data_set = file.create_dataset(one.name, data=one.values.astype(kind), **protected)
             _describe(data_set, one.unit, one.note)
-        column = event_data(recording)
-        data_set, ends = write_texts(file, column)
-        _describe(data_set, "", column.note)
-        _describe(ends, "bytes", f"where each text of {column.name} ends; it begins where the one before ends")
+        data_set, ends = write_texts(file, EVENT_DATA, _event_texts(recording))
+        _describe(data_set, "", "what else is known, as JSON")
+        _describe(ends, "bytes", f"where each text of {EVENT_DATA} ends; it begins where the one before ends")
 
 
 def differences(recording: Recording) -> Iterator[str]:
@@ -146,7 +134,9 @@ def differences(recording: Recording) -> Iterator[str]:
                     continue  # a later version holds more
                 if not _same(np.asarray(file[one.name]), one.values):
                     yield f"{one.name} of {SEALED_FILE} differs from the live file"
-            yield from _different_texts(event_data(recording), file)
+            pairs = zip_longest(read_texts(file, EVENT_DATA), _event_texts(recording))
+            if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
+                yield f"{EVENT_DATA} of {SEALED_FILE} differs from the live file"
             if file.attrs.get("SIMULATED") != _attribute(recording.simulated_sentence):
                 yield f"{SEALED_FILE} does not say of itself what the live file says: {recording.simulated_sentence}"
     except (OSError, KeyError, RuntimeError) as error:
@@ -188,11 +178,9 @@ def _events(recording: Recording) -> Iterator[DataSet]:
     yield DataSet("events/readings", _int64([e.readings for e in events]), "", "readings recorded before it")
 
 
-def event_data(recording: Recording) -> TextColumn:
-    """Return what the events hold besides, one JSON text each; an answer's may be thousands of times another's."""
-    return TextColumn(
-        "events/data", lambda: (_plain_json(e.data) for e in recording.events), "what else is known, as JSON"
-    )
+def _event_texts(recording: Recording) -> Iterator[str]:
+    """Yield what each event holds besides, as JSON: all of them at once may be more than memory holds."""
+    return (_plain_json(event.data) for event in recording.events)
 
 
 def _trials(recording: Recording) -> Iterator[DataSet]:
@@ -249,12 +237,6 @@ def _different_readings(recording: Recording, file: h5py.File) -> Iterator[str]:
         length = int(file["readings"][name].shape[0])
         if length != start:
             yield f"{SEALED_FILE} holds {length} of {name}, the live file {start}"
-
-
-def _different_texts(column: TextColumn, file: h5py.File) -> Iterator[str]:
-    pairs = zip_longest(read_texts(file, column.name), column.texts())
-    if any(stored is None or text is None or stored != text.encode() for stored, text in pairs):
-        yield f"{column.name} of {SEALED_FILE} differs from the live file"
 
 
 def _describe(data_set: h5py.Dataset, unit: str, note: str) -> None:

@@ -65,26 +65,21 @@ def check_room(folder: Path, need: Need) -> None:
         )
 
 
-class Reserve:
-    """Room taken in advance, given back when the disk is full so that the end can be written."""
+def take_reserve(folder: Path, size: int) -> None:
+    """Take room in advance, to be given back when the disk is full so that the end can be written.
 
-    def __init__(self, folder: Path, size: int = RESERVE) -> None:
-        """Take it. Raises OSError where there is no such room, a quota's limit included."""
-        self._path = folder / RESERVE_FILE
-        with open_new(self._path) as file:
-            if hasattr(os, "posix_fallocate"):
-                os.posix_fallocate(file.fileno(), 0, size)
-            else:
-                file.write(bytes(size))
-            os.fsync(file.fileno())
-
-    def release(self) -> None:
-        """Give it back. Harmless when repeated."""
-        release_reserve(self._path.parent)
+    Raises OSError where there is no such room, a quota's limit included.
+    """
+    with open_new(folder / RESERVE_FILE) as file:
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file.fileno(), 0, size)
+        else:
+            file.write(bytes(size))
+        os.fsync(file.fileno())
 
 
 def release_reserve(folder: Path) -> None:
-    """Give back a reserve that was taken in `folder`, also by a process that was killed."""
+    """Give back a reserve that was taken in `folder`, also by a process that was killed. Harmless when repeated."""
     with suppress(OSError):
         (folder / RESERVE_FILE).unlink(missing_ok=True)
 

@@ -7,19 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Self
 
+from msgspec import to_builtins
+
 from drivers.clock import Clock, RealClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.file_access import remedy, sync_folder
+from sessions.file_access import name_failure, remedy, sync_folder
 from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
-from sessions.recording.head import info_to_dict, json_text, plan_to_dict, simulated_sentence, without_home
+from sessions.recording.head import info_to_dict, json_text, simulated_sentence, without_home
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
 from sessions.recording.rescue import fold_log, identities, rescued
 from sessions.recording.schema import RecordingError
-from sessions.recording.storage import Reserve, release_reserve
+from sessions.recording.storage import release_reserve, take_reserve
 
 COMMIT_EVERY_NS = 1_000_000_000
 LARGEST_BLOCK = 65_536  # readings: about 6 MB, far below what one SQLite row may hold
@@ -52,7 +54,7 @@ class SessionWriter:
         self._event_count = 0
         self._acknowledged = Acknowledged(time_ns=clock.now_ns())
         self._failure: str | None = None
-        self._reserve: Reserve | None = None
+        self._has_reserve = False
         self.safe: Callable[[Sequence[LoggedEvent]], None] = lambda _: None  # called with events once they are safe
         self.must_end: str | None = None  # why only the end should still be written
 
@@ -78,7 +80,7 @@ class SessionWriter:
         head = {
             "simulated": simulated or "no",
             "format": json_text({"name": schema.FORMAT, "version": schema.FORMAT_VERSION}),
-            "plan": json_text(plan_to_dict(plan)),
+            "plan": json_text(to_builtins(plan)),
             "transducer": json_text(info_to_dict(info) if info else None),
             "provenance": json_text(dict(provenance)),
         }
@@ -87,7 +89,8 @@ class SessionWriter:
             folder.mkdir(parents=True, exist_ok=True)
             if any(folder.iterdir()):
                 raise RecordingError(f"{folder} is not empty; give a new folder, for nothing is written over")
-            kept_back = Reserve(folder, reserve) if reserve else None
+            if reserve:
+                take_reserve(folder, reserve)
             path.touch(exist_ok=False)
         except OSError as error:
             release_reserve(folder)
@@ -105,7 +108,7 @@ class SessionWriter:
             ) from error
         sync_folder(folder)
         writer = cls(connection, path, clock or RealClock())
-        writer._reserve = kept_back
+        writer._has_reserve = bool(reserve)
         return writer
 
     @classmethod
@@ -118,10 +121,9 @@ class SessionWriter:
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
         fold_log(Recording.open(folder))
         path = folder / schema.LIVE_FILE
-        try:
-            kept_back = Reserve(folder, reserve) if reserve else None
-        except OSError as error:
-            raise RecordingError(f"{folder} cannot be gone on in ({error.strerror}); {remedy(error)}") from error
+        with name_failure(RecordingError, f"{folder} cannot be gone on in"):
+            if reserve:
+                take_reserve(folder, reserve)
         connection = sqlite3.connect(path, isolation_level=None, timeout=0.5)
         try:
             _make_durable(connection)
@@ -135,7 +137,7 @@ class SessionWriter:
             release_reserve(folder)
             raise RecordingError(f"{path} cannot be gone on with ({error}); {remedy(error)}") from error
         writer._acknowledged = Acknowledged(writer._readings, writer._event_count, clock.now_ns())
-        writer._reserve = kept_back
+        writer._has_reserve = bool(reserve)
         return writer
 
     @property
@@ -245,7 +247,7 @@ class SessionWriter:
             self._connection.execute("ROLLBACK")
         if self._lost_sight():
             self._rescue()
-        elif self._reserve is None or self.must_end is not None:
+        elif not self._has_reserve or self.must_end is not None:
             self._fail(error)
         else:
             self.must_end = (
@@ -268,7 +270,7 @@ class SessionWriter:
         lost, self._failure = self._path, "it was removed, renamed or replaced"
         self._path = rescued(self._connection, lost)
         self._connection.close()
-        self._reserve = None
+        self._has_reserve = False
         self._connection = sqlite3.connect(self._path, isolation_level=None)
         try:
             _make_durable(self._connection)

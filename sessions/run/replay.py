@@ -15,9 +15,10 @@ from drivers.transducer import Health, LinkLost, TransducerInfo
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, FleetingWriter, LoggedEvent, Recording, RecordingError
 from sessions.recording.derived import differences
-from sessions.recording.manifest import digest_of
+from sessions.recording.log import health_of
+from sessions.recording.manifest import different, digest_of
 from sessions.recording.reader import TELL_LOSSES
-from sessions.recording.replay import RecordedReadings, health_of
+from sessions.recording.replay import RecordedReadings
 from sessions.run.event_log import Step, parts, steps_of
 from sessions.run.resuming import Seam, resumption
 from sessions.run.runner import STOPPED, Ending, Resumed, RunnerSettings, run_session
@@ -72,14 +73,7 @@ def different_events(recorded: Recording, replayed: Recording) -> Iterator[str]:
 
 def different_readings(recorded: Recording, replayed: Recording) -> Iterator[str]:
     """Yield a sentence for each column of the readings that is not what it was."""
-    before, after = (digest_of(part.blocks(), ()) for part in (recorded, replayed))
-    if before.readings != after.readings:
-        yield f"the recording holds {before.readings} readings and the replay {after.readings}"
-    yield from (
-        f"{name} of the readings came out otherwise"
-        for name, digest in before.columns.items()
-        if digest != after.columns[name]
-    )
+    yield from different(digest_of(recorded.blocks(), ()), digest_of(replayed.blocks(), ()))
 
 
 class _Rewriter(FleetingWriter):

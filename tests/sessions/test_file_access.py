@@ -12,7 +12,7 @@ from sessions.file_access import read_limited, remedy, write_whole
 from sessions.recording import RecordingError, archive
 from sessions.recording.archive import seal
 from sessions.recording.derived import bytes_of, store_derived
-from sessions.recording.storage import Reserve
+from sessions.recording.storage import release_reserve, take_reserve
 
 HUGE = 20 * 2**30  # [bytes]
 
@@ -49,7 +49,8 @@ def test_a_link_at_the_place_of_the_unfinished_file_is_not_followed(tmp_path):
     for name in (".analysis.json.part", ".session.h5.part", ".MANIFEST.json.part", "session.reserve"):
         (folder / name).symlink_to(mine)
     store_derived(folder, "analysis.json", {"a": 1})
-    Reserve(folder, 4096).release()
+    take_reserve(folder, 4096)
+    release_reserve(folder)
     seal(folder)
     assert mine.read_text() == "years of work"
     assert not (folder / "analysis.json").is_symlink()

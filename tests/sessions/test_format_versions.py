@@ -5,6 +5,7 @@ import shutil
 from pathlib import Path
 
 import h5py
+import msgspec
 import pytest
 from recordings import begun, change, ended, rows
 
@@ -12,7 +13,6 @@ from daq_app.cli.main import run
 from sessions.exchange.exported import exported, import_session
 from sessions.recording import Recording, RecordingError, writer
 from sessions.recording.archive import problems, seal
-from sessions.recording.head import plan_to_dict
 from sessions.recording.manifest import digest_of
 from sessions.recording.schema import FORMAT_VERSION
 from sessions.strokes import analyse
@@ -73,9 +73,9 @@ def test_a_session_of_every_version_that_a_crash_left_opens_and_can_be_sealed(tm
 
 def test_what_later_programs_add_to_a_plan_leaves_sealed_sessions_whole(tmp_path, monkeypatch):
     def older(plan):
-        return {name: value for name, value in plan_to_dict(plan).items() if name not in {"answering_hand"}}
+        return {name: value for name, value in msgspec.to_builtins(plan).items() if name not in {"answering_hand"}}
 
-    monkeypatch.setattr(writer, "plan_to_dict", older)
+    monkeypatch.setattr(writer, "to_builtins", older)
     folder = ended(tmp_path / "s")
     seal(folder)
     monkeypatch.undo()
@@ -87,7 +87,7 @@ def test_what_later_programs_add_to_a_plan_leaves_sealed_sessions_whole(tmp_path
 
 
 def test_what_an_earlier_program_did_not_know_in_a_plan_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "plan_to_dict", lambda plan: {**plan_to_dict(plan), "gloves": "none"})
+    monkeypatch.setattr(writer, "to_builtins", lambda plan: {**msgspec.to_builtins(plan), "gloves": "none"})
     folder = ended(tmp_path / "s")
     seal(folder)
     assert Recording.open(folder).plan.subject == "S01"

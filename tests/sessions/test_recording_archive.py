@@ -16,7 +16,7 @@ from stand_ins import CALIBRATION, INFO
 from sessions.recording import Recording, RecordingError
 from sessions.recording.archive import problems, seal
 from sessions.recording.manifest import list_in_manifest
-from sessions.recording.sealed_copy import TextColumn, read_texts, write_texts
+from sessions.recording.sealed_copy import read_texts, write_texts
 
 REAL = replace(INFO, simulated=False)
 
@@ -184,7 +184,7 @@ def test_one_long_answer_takes_room_and_memory_once_not_once_for_each_event(tmp_
 @pytest.mark.parametrize("texts", [(), ("",), ("", "a" * 32_768, "", "b"), ("c" * 100_000, "{}"), ("12",) * 40_000])
 def test_texts_of_any_length_come_back_as_they_were(tmp_path, texts):
     with h5py.File(tmp_path / "texts.h5", "w") as file:
-        write_texts(file, TextColumn("any", lambda: texts, ""))
+        write_texts(file, "any", texts)
     with h5py.File(tmp_path / "texts.h5") as file:
         assert tuple(text.decode() for text in read_texts(file, "any")) == texts
 
@@ -288,14 +288,14 @@ def test_a_missing_file_is_named(sealed):
 def test_a_reading_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
     with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
         copy["readings/raw"][250, 3] = 0.0
-    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
+    list_in_manifest(sealed, ("session.h5",))
     assert problems(sealed) == ("raw of the readings 200 to 299 in session.h5 differs from the live file",)
 
 
 def test_a_score_changed_in_the_copy_is_named_even_when_the_manifest_was_changed_to_match(sealed):
     with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
         copy["trials/score"][0] = 99.0
-    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
+    list_in_manifest(sealed, ("session.h5",))
     assert problems(sealed) == ("trials/score of session.h5 differs from the live file",)
 
 
@@ -303,7 +303,7 @@ def test_an_event_changed_in_the_copy_is_named_even_when_the_manifest_was_change
     with h5py.File(writable(sealed / "session.h5"), "r+") as copy:
         text = copy["events/data"][...].tobytes()
         copy["events/data"][text.index(b"42.5")] = ord("9")
-    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
+    list_in_manifest(sealed, ("session.h5",))
     assert problems(sealed) == ("events/data of session.h5 differs from the live file",)
 
 
@@ -320,7 +320,7 @@ def test_a_copy_whose_bytes_rotted_is_named_by_its_own_check_sum(sealed):
     place = content.index(np.float64(6 * 321).tobytes())  # a torque of reading 321
     content[place + 6] ^= 1
     path.write_bytes(content)
-    list_in_manifest(sealed, ("session.h5",), Recording.open(sealed).simulated_sentence)
+    list_in_manifest(sealed, ("session.h5",))
     assert any(problem.startswith("session.h5 cannot be read") for problem in problems(sealed))
 
 

@@ -6,7 +6,7 @@ import pytest
 from recordings import PLAN, begun, readings
 
 from sessions.recording import RecordingError
-from sessions.recording.storage import MARGIN, Reserve, check_room, need
+from sessions.recording.storage import MARGIN, check_room, need, release_reserve, take_reserve
 
 Usage = namedtuple("Usage", "total used free")
 
@@ -38,8 +38,8 @@ def test_a_disk_with_too_little_room_is_refused_with_the_arithmetic(tmp_path, mo
 
 
 def test_a_reserve_takes_real_room_and_gives_it_back(tmp_path):
-    reserve = Reserve(tmp_path, 3 * 2**20)
+    take_reserve(tmp_path, 3 * 2**20)
     assert (tmp_path / "session.reserve").stat().st_blocks * 512 >= 3 * 2**20
-    reserve.release()
-    reserve.release()
+    release_reserve(tmp_path)
+    release_reserve(tmp_path)
     assert list(tmp_path.iterdir()) == []

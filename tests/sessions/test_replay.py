@@ -9,8 +9,8 @@ from told_session import once, resume
 
 from drivers.transducer import LinkLost, SetupError
 from sessions.exchange.import_csv import import_csv
+from sessions.plan.plan import Rests
 from sessions.plan.protocols import plan, protocol, protocol_names
-from sessions.plan.protocols.protocol import RestRules
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import seal
 from sessions.recording.replay import ReplayTransducer
@@ -150,7 +150,7 @@ def test_every_built_in_protocol_is_carried_to_its_end_with_its_rests_and_comes_
 
 
 def test_a_rest_that_ends_by_the_clock_comes_out_at_the_same_reading(tmp_path):
-    often = replace_fields(PAPER, rests=RestRules(after_trials=2, duration=1.5))
+    often = replace_fields(PAPER, rests=Rests(after_trials=2, duration=1.5))
     session = recorded(tmp_path / "session", protocol=often, most=99)
     assert [event.kind for event in session.events].count("rest_over") == 4
     identical(session, tmp_path)

@@ -3,7 +3,7 @@ import pytest
 from stand_ins import RATE, Hands
 from told_session import Session, once
 
-from sessions.recording.replay import health_of
+from sessions.recording.log import health_of
 from sessions.run.runner import RunnerSettings, run_session
 from sessions.run.steps import (
     AskMount,

@@ -10,14 +10,13 @@ from recordings import rows
 from told_session import Session
 
 from drivers.transducer import COUNTS
-from sessions.plan.plan import Shown
+from sessions.plan.plan import Rests, Shown
 from sessions.plan.protocols.protocol import (
     BlockOutline,
     Face,
     OrderRules,
     PreEvaluation,
     Protocol,
-    RestRules,
     Scale,
 )
 from sessions.recording.archive import seal
@@ -73,7 +72,7 @@ def test_every_key_of_a_protocol_is_told():
         "": Protocol,
         "order.": OrderRules,
         "scale.": Scale,
-        "rests.": RestRules,
+        "rests.": Rests,
         "shown.": Shown,
         "pre_evaluation.": PreEvaluation,
         "face.": Face,

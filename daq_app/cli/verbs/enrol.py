@@ -79,7 +79,7 @@ def _refuse_mixtures(options: argparse.Namespace) -> None:
 def _write_labels(folder: Path, path: Path) -> None:
     """Write the code of each stimulus to a file, and that it was written into the study."""
     key, study = study_key(folder), open_study(folder)
-    labels = study.protocol.labels if key is None else {of: code for code, of in key.stimuli.items()}
+    labels = study.protocol.labels if key is None else key.labels
     lines = [f"{descriptor} {index}: {code}" for (descriptor, index), code in labels.items()]
     if key is not None:
         note(folder, "labels_told", {})

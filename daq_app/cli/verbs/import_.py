@@ -60,7 +60,6 @@ def _restored(session: "ExportedSession", options: argparse.Namespace, console: 
 def _foreign(options: argparse.Namespace, console: Console) -> int:
     """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
-    from sessions.recording import Recording
     from sessions.recording.archive import seal
     from sessions.recording.manifest import list_in_manifest
 
@@ -79,7 +78,7 @@ def _foreign(options: argparse.Namespace, console: Console) -> int:
     folder = options.out or Path("recordings") / options.file.stem
     imported = import_csv(options.file, folder, stated)
     seal(imported.folder)
-    list_in_manifest(imported.folder, (ORIGINAL_FILE,), Recording.open(imported.folder).simulated_sentence)
+    list_in_manifest(imported.folder, (ORIGINAL_FILE,))
     console.result({"session": str(imported.folder), **{k: v for k, v in asdict(imported).items() if k != "folder"}})
     console.say(
         f"{imported.folder}: {imported.readings} readings at {number(imported.rate, 4)} a second",

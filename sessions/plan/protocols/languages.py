@@ -1,11 +1,10 @@
 """What subjects read in other languages than the protocol's own: a table for each block and language."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
-from sessions.toml_file import NotAllowed
+from sessions.toml_file import NotAllowed, check_scale_ends, check_text
 
 PRE_EVALUATION = "pre-evaluation"  # the name under which the instruction of that phase is translated
 ENGLISH = "en"
@@ -24,24 +23,8 @@ class Translation:
     def __post_init__(self) -> None:
         """Check the language, and that nothing is empty."""
         check_language("language", self.language)
-        if not self.instruction.strip():
-            raise NotAllowed("instruction", self.instruction, "it must not be empty")
-        if self.scale_ends is not None and not all(end.strip() for end in self.scale_ends):
-            raise NotAllowed("scale_ends", list(self.scale_ends), "both ends of the scale must be named")
-
-
-class Texts(Protocol):
-    """What of a block is translated."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-        ...
-
-    @property
-    def scale_ends(self) -> tuple[str, str] | None:
-        """The words at both ends of its line, where it has one."""
-        ...
+        check_text("instruction", self.instruction)
+        check_scale_ends(self.scale_ends)
 
 
 def check_language(key: str, language: str) -> None:
@@ -51,10 +34,17 @@ def check_language(key: str, language: str) -> None:
 
 
 def check_translations(
-    translations: Sequence[Translation], blocks: Sequence[Texts], own: str, *, pre_evaluation: bool
+    translations: Sequence[Translation],
+    blocks: Mapping[str, tuple[str, str] | None],
+    own: str,
+    *,
+    pre_evaluation: bool,
 ) -> None:
-    """Raise NotAllowed unless each language has every text of a protocol once, and none that it has not."""
-    names = [block.name for block in blocks] + ([PRE_EVALUATION] if pre_evaluation else [])
+    """Raise NotAllowed unless each language has every text of a protocol once, and none that it has not.
+
+    `blocks` holds by name what the ends of a block's line are called; None where it has no line.
+    """
+    names = [*blocks, *([PRE_EVALUATION] if pre_evaluation else [])]
     for number, one in enumerate(translations):
         key = f"translations[{number}]"
         if one.language == own:
@@ -63,11 +53,10 @@ def check_translations(
             raise NotAllowed(f"{key}.block", one.block, f"it must be one of {', '.join(names)}")
         if any((one.language, one.block) == (other.language, other.block) for other in translations[:number]):
             raise NotAllowed(f"{key}.block", one.block, f'"{one.language}" has its texts already')
-        block = next((block for block in blocks if block.name == one.block), None)
-        if (one.scale_ends is None) != (block is None or block.scale_ends is None):
+        if (one.scale_ends is None) != (blocks.get(one.block) is None):
             what = "name both ends of its line" if one.scale_ends is None else "it has no line: leave its ends out"
             raise NotAllowed(f"{key}.scale_ends", one.scale_ends and list(one.scale_ends), what)
-        if block is not None and not one.question.strip():
+        if one.block in blocks and not one.question.strip():
             raise NotAllowed(f"{key}.question", one.question, f"say what is asked of {one.block} in this language")
     for language, block in missing_texts(translations, names):
         raise NotAllowed("translations", language, f'the texts of {block} are missing in "{language}"')

@@ -15,13 +15,12 @@ from sessions.plan.plan import (
     Frame,
     Hand,
     Phase,
-    Rests,
     SessionPlan,
     Stimulus,
     Trial,
 )
-from sessions.plan.protocols.protocol import BlockOutline, Labels, Protocol, check_phases, check_seed
-from sessions.toml_file import NotAllowed, SettingsError
+from sessions.plan.protocols.protocol import LARGEST_SEED, BlockOutline, Labels, Protocol, check_phases
+from sessions.toml_file import NotAllowed, SettingsError, check_range
 
 DIRECTIONS = {"proximal to distal": PROXIMAL_TO_DISTAL, "distal to proximal": DISTAL_TO_PROXIMAL}
 
@@ -80,7 +79,7 @@ def plan(
         protocol = protocol if visit_setting.language is None else protocol.in_language(visit_setting.language)
         if not is_code(subject):
             raise NotAllowed("subject", subject, "a code of letters, digits, - and _, never a name")
-        check_seed("seed", seed)
+        check_range("seed", seed, 0, LARGEST_SEED)
         check_phases(protocol, planned_phases)
         check_body(own, protocol)
     except NotAllowed as error:
@@ -105,7 +104,7 @@ def plan(
         stroking_hand=visit_setting.stroking_hand,
         answering_hand=visit_setting.answering_hand,
         finger=own.finger,
-        rests=Rests(protocol.rests.after_trials, protocol.rests.between_blocks, protocol.rests.duration),
+        rests=protocol.rests,
         shown=protocol.shown,
         masking=protocol.masking,
         language=protocol.language,
@@ -148,23 +147,14 @@ def block_order(protocol: Protocol, number: int) -> tuple[BlockOutline, ...]:
 
 def blinded(plan: SessionPlan) -> SessionPlan:
     """Return the plan with codes alone: which stimulus bears which is hidden."""
-    return replace(plan, blocks=tuple(replace(b, trials=tuple(map(_hidden, b.trials))) for b in plan.blocks))
-
-
-def _hidden(trial: Trial) -> Trial:
-    return replace(trial, stimulus=replace(trial.stimulus, index=None))
+    return plan.with_trials(lambda trial: replace(trial, stimulus=replace(trial.stimulus, index=None)))
 
 
 def check_body(body: Body, protocol: Protocol) -> None:
     """Raise NotAllowed where a subject's own value is out of range."""
-    ranges = (
-        ("contact_angle", body.contact_angle, 10, 90, "degrees"),
-        ("tip_radius", body.finger.tip_radius, 3, 15, "mm"),
-        ("width", body.finger.width, 5, 40, "mm"),
-    )
-    for key, value, low, high, unit in ranges:
-        if value is not None and not low <= value <= high:
-            raise NotAllowed(key, value, f"it must lie between {low} and {high} {unit}")
+    check_range("contact_angle", body.contact_angle, 10, 90, "degrees")
+    check_range("tip_radius", body.finger.tip_radius, 3, 15, "mm")
+    check_range("width", body.finger.width, 5, 40, "mm")
     names = [block.name for block in protocol.blocks]
     for name, depth in body.indentations.items():
         if name not in names:

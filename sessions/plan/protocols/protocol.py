@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from sessions.plan.orders import Item, draw, opaque_codes
-from sessions.plan.plan import Frame, Phase, Shown
+from sessions.plan.plan import Frame, Phase, Rests, Shown
 from sessions.plan.protocols.languages import (
     ENGLISH,
     PRE_EVALUATION,
@@ -17,10 +17,10 @@ from sessions.plan.protocols.languages import (
     check_translations,
     languages_of,
 )
-from sessions.toml_file import NotAllowed, SettingsError, load_toml
+from sessions.toml_file import NotAllowed, SettingsError, check_range, check_scale_ends, check_text, load_toml
 
 FOLDER = Path(__file__).parent
-LARGEST_SEED = 2**31 - 1
+LARGEST_SEED = 2**31 - 1  # a whole number that every language can hold
 LEAST_COMPARISONS = 3  # with a standard: two fit any point of subjective equality and any just noticeable difference
 Labels = dict[tuple[str, int], str]  # descriptor and index of a stimulus -> the code on its back
 
@@ -47,20 +47,16 @@ class BlockOutline:
     def __post_init__(self) -> None:
         """Check ranges."""
         for name in ("name", "descriptor", "instruction"):
-            if not getattr(self, name).strip():
-                raise NotAllowed(name, getattr(self, name), "it must not be empty")
+            check_text(name, getattr(self, name))
         if not 0 < self.indentation <= 10:
             raise NotAllowed("indentation", self.indentation, "it must lie above 0 and up to 10 mm")
         if not self.indices or len(set(self.indices)) < len(self.indices):
             raise NotAllowed("indices", list(self.indices), "there must be at least one, and none may come twice")
         if not all(0 <= index <= 100 for index in self.indices):
             raise NotAllowed("indices", list(self.indices), "each must lie between 0 and 100")
-        if self.scale_ends is not None and not all(end.strip() for end in self.scale_ends):
-            raise NotAllowed("scale_ends", list(self.scale_ends), "both ends of the scale must be named")
-        if not 1 <= self.strokes_allowed <= 20:
-            raise NotAllowed("strokes_allowed", self.strokes_allowed, "it must lie between 1 and 20")
-        if not 1 <= self.repetitions <= 20:
-            raise NotAllowed("repetitions", self.repetitions, "it must lie between 1 and 20")
+        check_scale_ends(self.scale_ends)
+        check_range("strokes_allowed", self.strokes_allowed, 1, 20)
+        check_range("repetitions", self.repetitions, 1, 20)
         if not set(self.practice) <= set(self.indices):
             raise NotAllowed("practice", list(self.practice), f"each must be one of indices {list(self.indices)}")
         self._check_planted()
@@ -90,8 +86,7 @@ class BlockOutline:
     def _check_adaptive(self) -> None:
         if self.standard is None:
             raise NotAllowed("adaptive", self.adaptive, "it takes a standard, with which all are compared")
-        if not 10 <= (self.adaptive or 0) <= 200:
-            raise NotAllowed("adaptive", self.adaptive, "it must lie between 10 and 200 comparisons")
+        check_range("adaptive", self.adaptive, 10, 200, "comparisons")
         if self.repetitions != 1:
             raise NotAllowed("repetitions", self.repetitions, "an adaptive block repeats what its answers ask for")
 
@@ -107,10 +102,8 @@ class Face:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        if self.height is not None and not -500 <= self.height <= 500:
-            raise NotAllowed("height", self.height, "it must lie between -500 and 500 mm")
-        if self.contact_area is not None and not 1 <= self.contact_area <= 2000:
-            raise NotAllowed("contact_area", self.contact_area, "it must lie between 1 and 2000 mm2")
+        check_range("height", self.height, -500, 500, "mm")
+        check_range("contact_area", self.contact_area, 1, 2000, "mm2")
 
     @property
     def frame(self) -> Frame:
@@ -157,26 +150,9 @@ class Scale:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        if not 0 <= self.ticks <= 99:
-            raise NotAllowed("ticks", self.ticks, "it must lie between 0 and 99")
+        check_range("ticks", self.ticks, 0, 99)
         if self.ticks and self.answer != "line":
             raise NotAllowed("ticks", self.ticks, "only a line has marks")
-
-
-@dataclass(frozen=True, slots=True)
-class RestRules:
-    """When the subject rests."""
-
-    after_trials: int | None = None  # of a block
-    between_blocks: bool = False
-    duration: float | None = None  # [s]; left out: until the experimenter goes on
-
-    def __post_init__(self) -> None:
-        """Check ranges."""
-        if self.after_trials is not None and not 1 <= self.after_trials <= 1000:
-            raise NotAllowed("after_trials", self.after_trials, "it must lie between 1 and 1000")
-        if self.duration is not None and not 1 <= self.duration <= 3600:
-            raise NotAllowed("duration", self.duration, "it must lie between 1 and 3600 s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,8 +163,7 @@ class PreEvaluation:
 
     def __post_init__(self) -> None:
         """Check that there is one."""
-        if not self.instruction.strip():
-            raise NotAllowed("instruction", self.instruction, "it must not be empty")
+        check_text("instruction", self.instruction)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +179,7 @@ class Protocol:
     masking: str = ""  # of sounds, such as "pink noise in headphones"; empty: none
     order: OrderRules = field(default_factory=OrderRules)
     scale: Scale = field(default_factory=Scale)
-    rests: RestRules = field(default_factory=RestRules)
+    rests: Rests = field(default_factory=Rests)
     shown: Shown = field(default_factory=Shown)
     pre_evaluation: PreEvaluation | None = None
     face: Face = field(default_factory=Face)
@@ -215,9 +190,8 @@ class Protocol:
         """Check ranges, that blocks and stimuli are distinct, and that answers and orders can be had."""
         if not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", self.name):
             raise NotAllowed("name", self.name, "it must be of small letters, digits and single hyphens")
-        check_seed("label_seed", self.label_seed)
-        if not 10 <= self.contact_angle <= 90:
-            raise NotAllowed("contact_angle", self.contact_angle, "it must lie between 10 and 90 degrees")
+        check_range("label_seed", self.label_seed, 0, LARGEST_SEED)
+        check_range("contact_angle", self.contact_angle, 10, 90, "degrees")
         if not self.blocks:
             raise NotAllowed("blocks", [], "there must be at least one")
         check_phases(self, self.phases)
@@ -230,8 +204,8 @@ class Protocol:
                 raise NotAllowed(f"blocks[{i}].name", name, "no two blocks may have the same name")
             self._check_answers(f"blocks[{i}]", block)
             self._check_order(f"blocks[{i}]", block)
-        judged = self.pre_evaluation is not None
-        check_translations(self.translations, self.blocks, self.language, pre_evaluation=judged)
+        ends = {block.name: block.scale_ends for block in self.blocks}
+        check_translations(self.translations, ends, self.language, pre_evaluation=self.pre_evaluation is not None)
 
     @property
     def labels(self) -> Labels:
@@ -349,9 +323,3 @@ def protocol_file(name_or_path: str | Path) -> Path:
         built_in = ", ".join(protocol_names())
         raise SettingsError(f"there is no protocol {text}; built in: {built_in}; or give the path of a .toml file")
     return Path(text)
-
-
-def check_seed(key: str, seed: int) -> None:
-    """Raise NotAllowed unless the seed is a whole number every language can hold."""
-    if not 0 <= seed <= LARGEST_SEED:
-        raise NotAllowed(key, seed, f"it must lie between 0 and {LARGEST_SEED}")
