@@ -1,6 +1,5 @@
 """The findings of a session as plain data, ready for any export."""
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +19,9 @@ from sessions.report.facts import scene_file, session_commands
 from sessions.report.trials import course, fields, flaws, left_out, model_in_short, modelled, predictions, strokes
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
-from sessions.statistics.psychometric import Psychometric, comparison, function_of
+from sessions.statistics.psychometric import Psychometric, function_of
 from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
-from sessions.statistics.scores import ScoreTable, joined, mean_scores, score_matrix, score_table
+from sessions.statistics.scores import ScoreTable, by_key, joined, mean_scores, score_matrix, score_table
 from sessions.strokes import Analysis
 from sessions.strokes.stroke import FIXED, AreaLaw, rule_for
 
@@ -116,18 +115,21 @@ Quantities = Mapping[str, Mapping[tuple[str, int], float]]  # name in `NAMES` ->
 
 def quantities(predictions: Sequence[PredictionFinding], strokes: Sequence[StrokeFinding]) -> Quantities:
     """Return each quantity by block and index, the mean over repetitions: the model's, and of the strokes it got."""
-    numbers_of: dict[str, defaultdict[tuple[str, int], list[float]]] = {name: defaultdict(list) for name in NAMES}
     by_number = {stroke.number: stroke for stroke in strokes}
-    for one in predictions:
-        if one.index is not None:
-            stroke = by_number.get(one.stroke or 0)
-            numbers = {name: getattr(one if name == MODEL_MU else stroke, FIELDS[name], None) for name in FIELDS}
-            numbers |= {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
-            numbers[MODEL] = one.sed
-            for name, value in numbers.items():
-                if value is not None:
-                    numbers_of[name][one.experiment, one.index].append(value)
-    return {name: {key: float(np.mean(all_of)) for key, all_of in own.items()} for name, own in numbers_of.items()}
+
+    def numbers(one: PredictionFinding) -> dict[str, float | None]:
+        stroke = by_number.get(one.stroke or 0)
+        own = {name: getattr(one if name == MODEL_MU else stroke, FIELDS[name], None) for name in FIELDS}
+        responses = {label: one.responses[name].value for label, name in RESPONSES.items() if name in one.responses}
+        return own | responses | {MODEL: one.sed}
+
+    rows = [(one.experiment, one.index, numbers(one)) for one in predictions if one.index is not None]
+
+    def means(name: str) -> dict[tuple[str, int], float]:
+        values = by_key(((block, i), value) for block, i, own in rows if (value := own.get(name)) is not None)
+        return {key: float(np.mean(repetitions)) for key, repetitions in values.items()}
+
+    return {name: means(name) for name in NAMES}
 
 
 def with_psychometric(
@@ -144,12 +146,13 @@ def with_psychometric(
 def _psychometric(block: Block, recording: Recording, analysis: Analysis) -> Psychometric:
     index = {trial.number: trial.stimulus.known_index for trial in block.trials}
     standard = next(index[trial.number] for trial in block.trials if trial.standard)
-    friction: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
-    for one in analysis.friction:
-        if one.trial in index and one.mu is not None and one.mu > 0.0:
-            friction["", index[one.trial]].append(one.mu)
+    friction = by_key(
+        (("", index[one.trial]), one.mu)
+        for one in analysis.friction
+        if one.trial in index and one.mu is not None and one.mu > 0.0
+    )
     answers = [
-        comparison("", standard, (index[first], index[record.trial.number]), record.choice)
+        ("", standard, (index[first], index[record.trial.number]), record.choice)
         for record in recording.trials
         if record.choice is not None and record.trial.number in index
         for first in [record.trial.compared_with]

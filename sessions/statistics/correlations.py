@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtri, stdtrit
 
 CONFIDENCE = 0.95
+TAILS = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)  # probabilities of the ends of an interval
 _EXACT_UP_TO = 7  # 7! = 5040 orders are counted one by one
 
 POWER = 0.8  # with which a study should tell two correlations apart (Cohen 1988, p. 56)
@@ -20,17 +22,17 @@ class Relation:
     """How y goes with x over n stimuli. A number is None where `reason` says why."""
 
     n: int
-    pearson: float | None
-    low: float | None  # 95 % interval of pearson (Fisher's z)
-    high: float | None
-    spearman: float | None
-    spearman_low: float | None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
-    spearman_high: float | None
-    spearman_p: float | None  # exact, two-sided: the share of all orders at least as far from 0
-    slope: float | None  # least-squares line y = intercept + slope x
-    intercept: float | None
-    without: tuple[tuple[int, float | None], ...]  # (label, pearson over the others) for each stimulus left out
-    reason: str | None
+    pearson: float | None = None
+    low: float | None = None  # 95 % interval of pearson (Fisher's z)
+    high: float | None = None
+    spearman: float | None = None
+    spearman_low: float | None = None  # 95 % interval of spearman (Fisher's z, its error by Bonett & Wright 2000)
+    spearman_high: float | None = None
+    spearman_p: float | None = None  # exact, two-sided: the share of all orders at least as far from 0
+    slope: float | None = None  # least-squares line y = intercept + slope x
+    intercept: float | None = None
+    without: tuple[tuple[int, float | None], ...] = ()  # (label, pearson over the others) for each stimulus left out
+    reason: str | None = None
 
 
 def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> Relation:
@@ -45,7 +47,7 @@ def relation(x: Sequence[float], y: Sequence[float], labels: Sequence[int]) -> R
     if r is None:
         few = "1 point is" if n == 1 else f"{n} points are"
         why = f"{few} too few for a correlation" if n < 3 else "one of the two does not vary"
-        return Relation(n, None, None, None, None, None, None, None, None, None, without, why)
+        return Relation(n, without=without, reason=why)
     slope, intercept = np.polyfit(x, y, 1)
     low, high = fisher_interval(r, n)
     why = None if low is not None else f"no interval of r from {n} points" if n < 4 else "no interval of a perfect r"
@@ -60,7 +62,7 @@ def slope_interval(related: Relation) -> tuple[float, float] | None:
     Its standard error follows from r: (slope / r) sqrt((1 - r^2) / (n - 2)).
     """
     r, slope, n = related.pearson, related.slope, related.n
-    if r is None or slope is None or not r or n < 3 or abs(r) > 1 - 1e-12:
+    if r is None or slope is None or not r or n < 3 or abs(r) > _PERFECT:
         return None
     half = t_quantile(n - 2) * abs(slope / r) * math.sqrt((1 - r * r) / (n - 2))
     return slope - half, slope + half
@@ -72,8 +74,6 @@ def t_quantile(dof: float) -> float:
     >>> round(t_quantile(9), 3), round(t_quantile(math.inf), 3)
     (2.262, 1.96)
     """
-    from scipy.special import stdtrit  # slow to load, and a window that opens waits for it
-
     return float(stdtrit(dof, (1 + CONFIDENCE) / 2))
 
 
@@ -94,7 +94,7 @@ def fisher_interval(r: float, n: int, inflated: float = 1.0) -> tuple[float | No
 
     None for fewer than four points, or where all points agree wholly or are each other's reverse.
     """
-    if n < 4 or abs(r) > 1 - 1e-12:
+    if n < 4 or abs(r) > _PERFECT:
         return None, None
     half = t_quantile(math.inf) * math.sqrt(inflated / (n - 3))
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
@@ -165,8 +165,6 @@ def cases_needed(first: float, second: float, mutual: float) -> int | None:
 
     None where no number of cases would: the correlations are equal, or the test has no value.
     """
-    from scipy.special import ndtri
-
     error = _pooled_variance(first, second, mutual)
     if error is None or abs(first - second) < 1e-9:
         return None
@@ -193,10 +191,12 @@ def contrast(first: float, second: float, mutual: float, n: int) -> Contrast | N
     return Contrast(n, difference, low, high, z, math.erfc(abs(z) / math.sqrt(2.0)))
 
 
-def partial_correlation(xy: float, xz: float, yz: float) -> float | None:
-    """Return the correlation of x and y given z, from their three correlations; None where z determines one of them."""
+def partial_correlation(xy: ArrayLike, xz: ArrayLike, yz: ArrayLike) -> NDArray[np.float64]:
+    """Return correlations of x and y given z, from their three correlations; nan where z determines one of them."""
+    xy, xz, yz = (np.asarray(r, np.float64) for r in (xy, xz, yz))
     left = (1 - xz * xz) * (1 - yz * yz)
-    return None if left < 1e-12 else float(np.clip((xy - xz * yz) / math.sqrt(left), -1.0, 1.0))
+    partial = np.where(left > 1e-12, xy - xz * yz, np.nan) / np.sqrt(np.where(left > 1e-12, left, 1.0))
+    return np.clip(partial, -1.0, 1.0)
 
 
 def left_out_error(x: Sequence[float], y: Sequence[float]) -> float | None:

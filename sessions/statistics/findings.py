@@ -9,13 +9,13 @@ import msgspec
 import numpy as np
 
 from sessions.prediction import SED
-from sessions.statistics.answers import Average, ConstantStimuli, Estimates
 from sessions.statistics.correlations import Relation
 from sessions.statistics.mixed_model import MixedModel, Spread
 from sessions.statistics.multiverse import PathFinding
+from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scales import Consistence, Exponent, Judgement, PairedScale
-from sessions.statistics.scores import IntervalEstimate, MeanScore, reversed_subjects
+from sessions.statistics.scores import Average, IntervalEstimate, MeanScore, reversed_subjects
 from sessions.statistics.visit import Exclusion, Visit, VisitOptions, scores_of
 from sessions.statistics.within_subjects import Agreement, Difference, RepeatedCorrelation, WithinMean
 
@@ -41,6 +41,25 @@ UNITS = {
     FINGERS: "1",
     WITHIN: "1",
 }  # of effects on the score, and of the spreads
+
+
+@dataclass(frozen=True, slots=True)
+class Estimates:
+    """Magnitude estimates, each subject with a scale of its own."""
+
+    geometric: Mapping[int, Average]  # by index: of the logarithms, as they were given
+    equal_moduli: Mapping[int, Average]  # likewise, brought to one modulus
+    repeated: RepeatedCorrelation | None  # of a subject's log estimates with the responses to its own strokes
+    left_out: tuple[str, ...]  # subjects who gave an estimate that is not above 0
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantStimuli:
+    """What comparisons with a standard say."""
+
+    functions: Mapping[str, Psychometric]  # of each subject
+    pse: Average | None  # of its logarithm, over subjects who have one
+    jnd: Average | None  # of its logarithm, over subjects whose JND is above 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,25 +304,25 @@ def found_flaws(
     visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
 ) -> tuple[PlantedFlaw, ...]:
     """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
-    named = {visit.session: visit for visit in visits}
+    by_session = {visit.session: visit for visit in visits}
     backwards = {subject for subject, _, _ in reversed_subjects([scores_of(visit, visit.rows) for visit in visits])}
-    rows_found: list[PlantedFlaw] = []
-    for session, faults in spoilt.items():
-        visit = named.get(session)
+
+    def detected(session: str, faults: Mapping[str, Any]) -> bool:
+        visit = by_session.get(session)
         if visit is None:
-            rows_found.append(PlantedFlaw(session, faults["expected"], session in failed))
-            continue
+            return session in failed
         rows = {row.trial: row for row in visit.rows}
         if any(faults.get(name) and faults[name] not in rows for name in (*_FLAWS, "unanswered", "aborted")):
-            # a trial that the session does not have
-            rows_found.append(PlantedFlaw(session, faults["expected"], detected=False))
-            continue
+            return False  # a trial that the session does not have
         seen = [flaw in rows[faults[name]].flaws for name, flaw in _FLAWS.items() if faults.get(name)]
         seen += [rows[faults["unanswered"]].score is None] if faults.get("unanswered") else []
         seen += [rows[faults["aborted"]].outcome == "open" and not visit.complete] if faults.get("aborted") else []
         seen += [visit.subject in backwards] if faults.get("reversed") else []
-        rows_found.append(PlantedFlaw(session, faults["expected"], bool(seen) and all(seen)))
-    return tuple(rows_found)
+        return bool(seen) and all(seen)
+
+    return tuple(
+        PlantedFlaw(session, faults["expected"], detected(session, faults)) for session, faults in spoilt.items()
+    )
 
 
 def found_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:

@@ -23,7 +23,7 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 _STARTS = ((1.0, 1.0), (0.3, 0.3), (3.0, 0.3), (0.3, 3.0), (3.0, 3.0))  # spreads relative to what is left
 _SINGULAR = 1e-4  # of the factor's diagonal, as lme4 has it
 _NOTHING = 1e-9  # of the factor: it enters by its square, which is then below round-off
-_POLISH = 6  # steps of Newton's method, after which nothing moves
+_STEPS = 6  # of Newton's method, after which nothing moves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,19 +45,16 @@ def restricted_fit(y: Array, columns: Array, subjects: Sequence[str] | Array, ow
     """
     sums = _Sums.of(y, columns, subjects, own)
     free = np.tril_indices(own)
-    tried = [optimize.minimize(sums.criterion, _start(one, own)[free], jac=True, method="BFGS") for one in _STARTS]
-    best: Array = min(tried, key=lambda one: float(one.fun)).x
-    return sums.fit(_polished(sums, best))
+    starts = (np.diag(spread[:own])[free] for spread in _STARTS)
+    optima = [optimize.minimize(sums.criterion, start, jac=True, method="BFGS") for start in starts]
+    best: Array = min(optima, key=lambda one: float(one.fun)).x
+    return sums.fit(_polish(sums, best))
 
 
-def _start(spread: tuple[float, float], own: int) -> Array:
-    return np.diag(spread[:own])
-
-
-def _polished(sums: "_Sums", at: Array) -> Array:
+def _polish(sums: "_Sums", at: Array) -> Array:
     """Return where the gradient vanishes to round-off, by Newton's method from a point close by."""
     value, slope = sums.criterion(at)
-    for _ in range(_POLISH):
+    for _ in range(_STEPS):
         step = 1e-6 * np.maximum(np.abs(at), 1e-2)
         curve = np.array(
             [(sums.criterion(at + e)[1] - sums.criterion(at - e)[1]) / (2 * e.sum()) for e in np.diag(step)]
@@ -220,7 +217,7 @@ class Spreads:
     """What differs between subjects, and from trial to trial within each."""
 
     level: Spread  # of the subjects' levels, at the mean of the covariate [unit of y]
-    slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None where none was asked for
+    slope: Spread | None  # of their slopes on the covariate [unit of y over unit of x]; None without one
     left: Spread  # of y about each subject's own line: the noise of single trials
     subjects: int
     dof: int  # of what is left
@@ -242,7 +239,7 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class MixedModel:
-    """A linear mixed model by restricted maximum likelihood: each subject has a level, perhaps a slope, of its own."""
+    """A linear mixed model by restricted maximum likelihood: each subject has a level and a slope of its own."""
 
     terms: tuple[Term, ...]
     middle: float  # mean of the first covariate, at which the intercept and the subjects' levels are given
@@ -250,7 +247,7 @@ class MixedModel:
     within_sd: float  # of what is left
     n: int
     subjects: int
-    slope_sd: float | None  # of the subjects' slopes on the first covariate; None where one slope was fitted for all
+    slope_sd: float  # of the subjects' slopes on the first covariate
     singular: bool  # subjects differ in fewer ways than were fitted: a spread is 0, or level and slope go as one
     spreads: Spreads | None  # the same standard deviations by least squares, with intervals; None where too few say so
 
@@ -260,19 +257,14 @@ class MixedModel:
 
 
 def mixed_model(
-    subjects: Sequence[str],
-    score: Sequence[float],
-    covariates: Mapping[str, Sequence[float]],
-    *,
-    slopes_differ: bool = False,
+    subjects: Sequence[str], score: Sequence[float], covariates: Mapping[str, Sequence[float]]
 ) -> MixedModel | str:
     """Return score (n) as intercept + sum of slopes times covariates (n each) + the subject's level + what is left.
 
-    With `slopes_differ` each subject also has its own slope on the first covariate. Without it the interval of that
-    slope is too narrow where subjects use more or less of the scale. Intervals are then t intervals, with as many
-    degrees of freedom as subjects less one for the level, as subjects in whom the covariate varies less one for the
-    slope, and for the others as many as a fit to each subject alone would leave; without it they are Wald's. The first
-    covariate counts from its mean, so that an offset of it changes nothing.
+    Each subject also has its own slope on the first covariate, else the interval of that slope would be too narrow
+    where subjects use more or less of the scale. t intervals have as many degrees of freedom as subjects less one for
+    the level, as subjects in whom the covariate varies less one for the slope, and for the others as many as a fit to
+    each subject alone would leave. The first covariate counts from its mean, so that an offset of it changes nothing.
 
     Carry-over and drift enter as covariates: the index scored before, and the trial's place in its block. Where
     nothing can be said a sentence says why.
@@ -288,41 +280,34 @@ def mixed_model(
     if not scale.all() or np.linalg.matrix_rank(columns / scale) < len(names):
         return "a term does not vary, or others determine it"
     varies = sum(float(np.ptp(columns[np.array(subjects) == one, 1])) > 0.0 for one in set(subjects))
-    if slopes_differ and varies < 2:
+    if varies < 2:
         return f"{names[1]} varies between the scores of {varies} of {count} subjects, and it takes two"
-    own = 2 if slopes_differ else 1
     levels = np.array(subjects)[:, None] == np.unique(np.array(subjects))[None, :]
     if fits_exactly(np.hstack([levels, columns[:, 1:] / scale[1:]]), np.array(score, np.float64)):
         return "all scores lie on the line but for round-off: there is nothing to tell an error from"
-    fit: Fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own)
-    spread = np.sqrt(np.diag(fit.among)) / scale[:own]
-    rest = max(len(score) - len(names) - (count - 1) * own, 1)
-    free = [count - 1, varies - 1, *([rest] * len(names))] if slopes_differ else [None] * len(names)
-    estimates = zip(names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free, strict=False)
-    terms = tuple(_term(name, estimate, error, dof) for name, estimate, error, dof in estimates)
+    fit = restricted_fit(np.array(score, np.float64), columns / scale, np.array(subjects), own=2)
+    level_sd, slope_sd = (np.sqrt(np.diag(fit.among)) / scale[:2]).tolist()
+    rest = max(len(score) - len(names) - (count - 1) * 2, 1)
+    free = [count - 1, varies - 1, *([rest] * (len(names) - 2))]
+    terms = map(_term, names, (fit.estimates / scale).tolist(), (fit.errors / scale).tolist(), free)
     first, *common = covariates.values()
-    differ = spreads(subjects, score, common, first) if slopes_differ else spreads(subjects, score, [first, *common])
     return MixedModel(
-        terms=terms,
+        terms=tuple(terms),
         middle=middle,
-        between_sd=float(spread[0]),
+        between_sd=level_sd,
         within_sd=fit.within,
         n=len(score),
         subjects=count,
-        slope_sd=float(spread[1]) if slopes_differ else None,
+        slope_sd=slope_sd,
         singular=fit.singular,
-        spreads=differ,
+        spreads=spreads(subjects, score, common, first),
     )
 
 
-def _term(name: str, estimate: float, error: float, dof: int | None) -> Term:
-    """Return a fixed effect with a t interval of `dof` degrees of freedom, Wald's where None."""
-    size = abs(estimate / error)
-    if dof is None:
-        half, p = t_quantile(math.inf), math.erfc(size / math.sqrt(2.0))
-    else:
-        half, p = t_quantile(dof), 2.0 * float(special.stdtr(dof, -size))
-    return Term(name, estimate, estimate - half * error, estimate + half * error, p)
+def _term(name: str, estimate: float, error: float, dof: int) -> Term:
+    """Return a fixed effect with a t interval of `dof` degrees of freedom."""
+    half, p = t_quantile(dof) * error, 2.0 * float(special.stdtr(dof, -abs(estimate / error)))
+    return Term(name, estimate, estimate - half, estimate + half, p)
 
 
 def spreads(

@@ -6,7 +6,6 @@ at every friction that is met: nothing is interpolated.
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -29,7 +28,7 @@ from sessions.prediction import (
 from sessions.prediction.scenes import scenes_of, settled, slides
 from sessions.recording import Recording
 from sessions.statistics.correlations import pearson
-from sessions.statistics.scores import surface_means
+from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 from sessions.strokes import Analysis, FrictionParameters, analyse
 from sessions.strokes.settings import AnalysisSettings, FilterSettings, SteadySettings, WindowRule
@@ -173,9 +172,8 @@ def _solved(
     Scenes that differ in friction alone are found beside one that is known, on its mesh, or else beside that of least
     friction, which is solved; where that fails they are solved themselves.
     """
-    alike: defaultdict[Scene, list[Scene]] = defaultdict(list)
-    for scene in sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf)):
-        alike[_kind(scene)].append(scene)
+    ordered = sorted(scenes, key=lambda one: (one.friction.mu, one.friction.tau_max or math.inf))
+    alike = by_key((_kind(scene), scene) for scene in ordered)
     first = {kind: group[0] for kind, group in alike.items()}
     solved = {kind: one for one in known if (kind := _kind(one.scene)) in first}
     new = [kind for kind in first if kind not in solved]

@@ -9,14 +9,15 @@ from typing import Any
 import numpy as np
 
 from sessions.prediction import SED, Quantity, shown_unit
-from sessions.statistics import answers
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.findings import (
     CARRY_OVER,
     DRIFT,
     FRICTION,
     INDEX,
+    ConstantStimuli,
     DescriptorFindings,
+    Estimates,
     Normalised,
     StudyFindings,
     SurfaceMean,
@@ -26,18 +27,44 @@ from sessions.statistics.findings import (
 )
 from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
 from sessions.statistics.multiverse import PathTrial, path_findings
+from sessions.statistics.psychometric import function_of
 from sessions.statistics.rivals import FIELDS, RESPONSES, RivalTrial, rivals_of_surfaces, rivals_within
-from sessions.statistics.scales import MODELS, consistence, paired_scale
-from sessions.statistics.scores import ScoreTable, mean_scores, reversed_subjects, score_matrix, surface_means
+from sessions.statistics.scales import (
+    MODELS,
+    Choice,
+    Exponent,
+    Judgement,
+    PairedScale,
+    consistence,
+    of_comparisons,
+    of_judgements,
+    paired_scale,
+    stevens_exponent,
+)
+from sessions.statistics.scores import (
+    Average,
+    IntervalEstimate,
+    ScoreTable,
+    average,
+    by_key,
+    mean_scores,
+    reversed_subjects,
+    score_matrix,
+    surface_means,
+)
 from sessions.statistics.visit import Exclusion, TrialRow, Visit, VisitOptions, decided, scores_of
 from sessions.statistics.within_subjects import (
+    Table,
     agreement,
     differences,
+    equal_moduli,
     holm,
     repeated_correlation,
     standardised,
     within_means,
 )
+
+Trials = Sequence[tuple[Visit, TrialRow]]
 
 
 def pooled(
@@ -54,22 +81,26 @@ def pooled(
     `planted` is what a synthetic study tells of itself: handed in, used for nothing but the comparison.
     """
     ordered = tuple(sorted(visits, key=lambda visit: visit.session))
-    copies = _copies(ordered)
+    same = by_key((visit.sha256, visit.session) for visit in ordered if visit.sha256)
+    copies = {session: first for first, *more in same.values() for session in more}
     counted = [visit for visit in ordered if visit.session not in copies]
     kept = [(v, row) for v in counted for row in v.rows if decided(exclusions, v.subject, row.descriptor) is None]
     tables = [scores_of(visit, [row for v, row in kept if v is visit]) for visit in counted]
     chosen = options or VisitOptions()
-    descriptors = tuple(
-        _descriptor(name, chosen, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
-        for name in dict.fromkeys(row.descriptor for _, row in kept)
+    descriptors = _with_holm(
+        [
+            _descriptor(name, chosen, quantity, tables, [(v, row) for v, row in kept if row.descriptor == name])
+            for name in dict.fromkeys(row.descriptor for _, row in kept)
+        ]
     )
-    descriptors = _with_holm(descriptors)
+    simulated = sum(bool(visit.simulated) for visit in ordered)
+    head = f"SIMULATED: {simulated} of the {len(ordered)} sessions of this study are simulated"
     return StudyFindings(
-        simulated=_simulated(ordered),
+        simulated=head if simulated else "",
         options=chosen,
         visits=ordered,
         failed=tuple(sorted(failed)),
-        copies=tuple(copies.items()),
+        copies=tuple((v.session, copies[v.session]) for v in ordered if v.session in copies),
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=descriptors,
@@ -81,15 +112,6 @@ def pooled(
     )
 
 
-def _copies(visits: Sequence[Visit]) -> dict[str, str]:
-    """Return the sessions that hold the recording of an earlier one once more, each with that one's name."""
-    first: dict[str, str] = {}
-    for visit in visits:
-        if visit.sha256:
-            first.setdefault(visit.sha256, visit.session)
-    return {v.session: first[v.sha256] for v in visits if v.sha256 and first[v.sha256] != v.session}
-
-
 def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFindings, ...]:
     ps = {one.descriptor: one.repeated.people_p for one in descriptors if one.repeated is not None}
     known = {descriptor: p for descriptor, p in ps.items() if p is not None}
@@ -97,56 +119,43 @@ def _with_holm(descriptors: Sequence[DescriptorFindings]) -> tuple[DescriptorFin
     return tuple(replace(one, repeated_holm=adjusted.get(one.descriptor)) for one in descriptors)
 
 
-def _simulated(visits: Sequence[Visit]) -> str:
-    made_up = sum(bool(visit.simulated) for visit in visits)
-    if not made_up:
-        return ""
-    return f"SIMULATED: {made_up} of the {len(visits)} sessions of this study are simulated"
-
-
 def _descriptor(
-    name: str,
-    options: VisitOptions,
-    quantity: Quantity,
-    tables: Sequence[ScoreTable],
-    trials: Sequence[tuple[Visit, TrialRow]],
+    name: str, options: VisitOptions, quantity: Quantity, tables: Sequence[ScoreTable], trials: Trials
 ) -> DescriptorFindings:
     indices = tuple(sorted({row.index for _, row in trials}))
-    means = tuple(mean for mean in mean_scores(tables) if mean.descriptor == name)
     matrix = score_matrix(tables, name)
-    surfaces = tuple(
-        _surface(index, quantity.name, [(v, r) for v, r in trials if r.index == index]) for index in indices
-    )
-    level = standardised(matrix)
-    answered = [(v, r, r.response(quantity.name), r.score) for v, r in trials]
-    points = [(v.subject, r, x, score) for v, r, x, score in answered if x is not None and score is not None]
-    scored = [(v.subject, r, r.score) for v, r in trials if r.score is not None]
-    chosen = answers.choices(trials)
-    scales = tuple(paired_scale(chosen, model) for model in MODELS) if chosen else ()
-    compared = answers.constant_stimuli(trials)
-    competing = [_rival_trial(subject, r, score) for subject, r, _, score in points]
+    answered = [(v.subject, r, r.response(quantity.name), r.score) for v, r in trials]
+    scored = [(subject, row, score) for subject, row, _, score in answered if score is not None]
+    points = [(subject, r, x, score) for subject, r, x, score in answered if x is not None and score is not None]
+    plain = tuple((subject, row.index, x, score) for subject, row, x, score in points)
+    pairs = choices(trials)
+    scales = tuple(paired_scale(pairs, model) for model in MODELS) if pairs else ()
+    compared = constant_stimuli(trials)
+    competing = [_rival_trial(subject, row, score) for subject, row, _, score in points]
     return DescriptorFindings(
         descriptor=name,
         indices=indices,
-        scores=means,
+        scores=tuple(mean for mean in mean_scores(tables) if mean.descriptor == name),
         within=within_means(matrix),
         agreement=agreement(matrix),
-        surfaces=surfaces,
+        surfaces=tuple(_surface(i, quantity.name, [(v, r) for v, r in trials if r.index == i]) for i in indices),
         answers={subject: tuple(row.get(index) for index in indices) for subject, row in matrix.items()},
-        points=tuple((subject, row.index, x, score) for subject, row, x, score in points),
-        mean_relation=_related([(p[0], p[1].index, p[2], p[3]) for p in points]),
-        repeated=repeated_correlation([p[0] for p in points], [p[2] for p in points], [p[3] for p in points]),
+        points=plain,
+        mean_relation=_related(plain),
+        repeated=repeated_correlation([p[0] for p in plain], [p[2] for p in plain], [p[3] for p in plain]),
         repeated_holm=None,
         rivals=rivals_within(competing, quantity.label),
         rivals_of_means=rivals_of_surfaces(competing, quantity.label),
-        without_subject=_without_subject([(p[0], p[2], p[3]) for p in points]),
-        normalised=_normalised(level, [(p[0], p[1].index, p[2]) for p in points]),
+        without_subject=_without_subject([(subject, x, score) for subject, _, x, score in plain]),
+        normalised=_normalised(standardised(matrix), plain),
         differences=differences(matrix),
-        estimates=answers.estimates(trials, quantity.name),
-        exponent=answers.exponent(trials),
+        estimates=estimates(trials, quantity.name),
+        exponent=exponent(trials),
         scales=scales,
-        consistence=consistence(chosen),
-        on_response=_model([(p[0], p[1], p[3]) for p in points], quantity, response_term(quantity)),
+        consistence=consistence(pairs),
+        on_response=_model(
+            [(subject, row, score) for subject, row, _, score in points], quantity, response_term(quantity)
+        ),
         on_index=_model(scored, quantity, INDEX),
         on_friction=_model([one for one in scored if one[1].mu is not None], quantity, INDEX, FRICTION),
         fingers=_fingers([(v.subject, row.index, row.mu) for v, row in trials if row.mu is not None]),
@@ -157,7 +166,7 @@ def _descriptor(
             within=True,
         ),
         constant_stimuli=compared,
-        latent=answers.latent_scales(trials, scales, compared),
+        latent=latent_scales(trials, scales, compared),
     )
 
 
@@ -182,9 +191,11 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *w
     Trials are subject, row and score. Subjects have slopes of their own on the first of `what`.
     """
     subjects, rows, scores = [one[0] for one in trials], [one[1] for one in trials], [one[2] for one in trials]
-    if len(set(subjects)) < 3:
+    count = len(set(subjects))
+    if count < 3:
         own = "scores" if what == (INDEX,) else "scores and strokes of their own"
-        return f"it takes three subjects with {own}, and there {_are(len(set(subjects)))}"
+        there = "there is 1" if count == 1 else f"there are {count or 'none'}"
+        return f"it takes three subjects with {own}, and {there}"
     columns = {
         INDEX: [row.index - 50.0 for row in rows],
         response_term(quantity): [shown_unit(quantity)[1] * (row.response(quantity.name) or 0.0) for row in rows],
@@ -193,11 +204,7 @@ def _model(trials: Sequence[tuple[str, TrialRow, float]], quantity: Quantity, *w
         CARRY_OVER: [0.0 if row.before is None else row.before - 50.0 for row in rows],
     }
     order = [name for name in (DRIFT, CARRY_OVER) if np.ptp(columns[name]) > 0.0]
-    return mixed_model(subjects, scores, {name: columns[name] for name in (*what, *order)}, slopes_differ=True)
-
-
-def _are(n: int) -> str:
-    return "is 1" if n == 1 else f"are {n or 'none'}"
+    return mixed_model(subjects, scores, {name: columns[name] for name in (*what, *order)})
 
 
 def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
@@ -208,11 +215,12 @@ def _fingers(trials: Sequence[tuple[str, int, float]]) -> Spread | None:
     return None if variances is None else variances.level
 
 
-def _surface(index: int, quantity: str, trials: Sequence[tuple[Visit, TrialRow]]) -> SurfaceMean:
+def _surface(index: int, quantity: str, trials: Trials) -> SurfaceMean:
     """Return means over subjects, each subject's own repeats averaged first."""
 
-    def over_subjects(value: Callable[[TrialRow], float | None]) -> answers.Average | None:
-        return answers.average(answers.by_subject([(v.subject, value(row)) for v, row in trials]))
+    def over_subjects(value: Callable[[TrialRow], float | None]) -> Average | None:
+        own = by_key((v.subject, number) for v, row in trials if (number := value(row)) is not None)
+        return average([float(np.mean(values)) for values in own.values()])
 
     response = over_subjects(lambda row: row.response(quantity))
     names = ("mu", "normal_force", "model_normal_force", "matching_depth")
@@ -235,14 +243,112 @@ def _without_subject(points: Sequence[tuple[str, float, float]]) -> tuple[tuple[
     for subject in dict.fromkeys(point[0] for point in points):
         rest = [point for point in points if point[0] != subject]
         repeated = repeated_correlation(*zip(*rest, strict=True)) if rest else None
-        if repeated is not None:
-            rows.append((subject, repeated.r))
+        rows += [] if repeated is None else [(subject, repeated.r)]
     return tuple(rows)
 
 
-def _normalised(table: Mapping[str, Mapping[int, float]], points: Sequence[tuple[str, int, float]]) -> Normalised:
-    """Return what scores say that were standardised; `points` are subject, index and response to its own stroke."""
-    means = answers.averages(table)
-    pairs = [(subject, i, x, table[subject][i]) for subject, i, x in points if i in table.get(subject, {})]
+def _normalised(table: Table, points: Sequence[tuple[str, int, float, float]]) -> Normalised:
+    """Return what scores say that were standardised; `points` are subject, index, response to its own stroke, score."""
+    pairs = [(subject, i, x, table[subject][i]) for subject, i, x, _ in points if i in table.get(subject, {})]
     within = repeated_correlation([p[0] for p in pairs], [p[2] for p in pairs], [p[3] for p in pairs])
-    return Normalised(means, _related(pairs), within)
+    return Normalised(_averages(table), _related(pairs), within)
+
+
+def _averages(table: Table) -> dict[int, Average]:
+    """Return the mean over subjects of each index."""
+    by_index = by_key((index, number) for row in table.values() for index, number in row.items())
+    return {index: mean for index, values in sorted(by_index.items()) if (mean := average(values)) is not None}
+
+
+# What trials answer otherwise than on a line: magnitude estimates, and choices of two.
+
+
+def estimates(trials: Trials, quantity: str) -> Estimates | None:
+    """Return what magnitude estimates say, beside that quantity of the model; None where nobody gave any."""
+    rows = [
+        (v.subject, row.index, row.estimate, row.response(quantity)) for v, row in trials if row.estimate is not None
+    ]
+    if not rows:
+        return None
+    no_logarithm = {subject for subject, _, value, _ in rows if value <= 0.0}
+    logs = [(subject, i, math.log(value), x) for subject, i, value, x in rows if subject not in no_logarithm]
+    own = by_key((subject, (index, log)) for subject, index, log, _ in logs)
+    table = {
+        subject: {index: math.exp(float(np.mean(values))) for index, values in by_key(pairs).items()}
+        for subject, pairs in sorted(own.items())
+    }
+    pairs = [(subject, x, log) for subject, _, log, x in logs if x is not None]
+    return Estimates(
+        _averages(_logs(table)),
+        _averages(_logs(equal_moduli(table))),
+        repeated_correlation(*zip(*pairs, strict=True)) if pairs else None,
+        tuple(sorted(no_logarithm)),
+    )
+
+
+def _logs(table: Table) -> dict[str, dict[int, float]]:
+    return {subject: {index: math.log(value) for index, value in row.items()} for subject, row in table.items()}
+
+
+def exponent(trials: Trials) -> Exponent | None:
+    """Return Stevens' exponent of magnitude estimates by the µ of the same strokes; None where nobody gave any."""
+    if all(row.estimate is None for _, row in trials):
+        return None
+    complete = [
+        (visit.subject, row.index, row.estimate, row.mu)
+        for visit, row in trials
+        if row.estimate is not None and row.estimate > 0.0 and row.mu is not None and row.mu > 0.0
+    ]
+    if not complete:
+        return Exponent(0, 0, None, reason="no trial has both an estimate above 0 and a µ of its own stroke")
+    return stevens_exponent(*zip(*complete, strict=True))
+
+
+def choices(trials: Trials) -> list[Choice]:
+    """Return every choice between the surface of a trial and the one stroked just before it, without a standard.
+
+    Pairs with a standard have a psychometric function; by them alone most scales would have no bound.
+    """
+    return [
+        Choice(visit.subject, row.before, row.index, row.choice == "first")
+        for visit, row in trials
+        if row.choice is not None and row.before is not None and row.standard is None
+    ]
+
+
+def constant_stimuli(trials: Trials) -> ConstantStimuli | None:
+    """Return the psychometric function of each subject who compared with a standard; None where nobody did."""
+    standards = [(visit, row) for visit, row in trials if row.standard is not None]
+    friction = by_key(((v.session, row.index), row.mu) for v, row in standards if row.mu is not None and row.mu > 0.0)
+    answers = by_key(
+        (v.subject, (v.session, row.standard, (row.before, row.index), row.choice))
+        for v, row in standards
+        if row.standard is not None and row.choice is not None and row.before is not None
+    )
+    if not answers:
+        return None
+    functions = {subject: function_of(own, friction) for subject, own in sorted(answers.items())}
+    pse = [one.pse.value for one in functions.values() if one.pse is not None]
+    jnd = [math.log(one.jnd.value) for one in functions.values() if one.jnd is not None and one.jnd.value]
+    return ConstantStimuli(functions, average(pse), average(jnd))
+
+
+def latent_scales(
+    trials: Trials, scales: Sequence[PairedScale], compared: ConstantStimuli | None
+) -> Mapping[Judgement, Mapping[int, IntervalEstimate]]:
+    """Return the latent values of each surface by every kind of judgement that has some."""
+    scores = [(v.subject, row.index, row.score) for v, row in trials if row.score is not None]
+    logs = [(v.subject, row.index, math.log(row.estimate)) for v, row in trials if row.estimate and row.estimate > 0.0]
+    jnd = None if compared is None else compared.jnd
+    by_judgement: dict[Judgement, Mapping[int, IntervalEstimate]] = {
+        "scores": of_judgements(scores),
+        "estimates": of_judgements(logs),
+    }
+    for scale in scales:
+        if scale.model == "Thurstone V":
+            by_judgement["choices"] = scale.values
+    if jnd is not None and jnd.low is not None and jnd.high is not None:
+        log_mu = by_key((row.index, math.log(row.mu)) for _, row in trials if row.standard is not None and row.mu)
+        middle = {index: math.exp(float(np.mean(logs))) for index, logs in sorted(log_mu.items())}
+        by_judgement["comparisons"] = of_comparisons(middle, (jnd.mean, jnd.low, jnd.high))
+    return {judgement: values for judgement, values in by_judgement.items() if values}

@@ -267,22 +267,8 @@ def _correlation(scatter: IntervalEstimate) -> IntervalEstimate:
     return IntervalEstimate(scatter.value / (1.0 + scatter.value), low, high)
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
-    """One answer: whether a surface was judged to have more than the standard."""
-
-    session: str
-    standard: int  # index of the surface, as the next
-    comparison: int
-    second: bool  # the comparison was stroked after the standard
-    chosen: bool  # the comparison was judged to have more
-
-
-def comparison(session: str, standard: int, pair: tuple[int, int], choice: str) -> Comparison:
-    """Return the answer to a pair of indices, in the order they were stroked, where "first" or "second" was chosen."""
-    first, second = pair
-    after = first == standard
-    return Comparison(session, standard, second if after else first, after, choice == ("second" if after else "first"))
+# One answer: its session, the standard's index, the pair in the order it was stroked, and "first" or "second" chosen
+Comparison = tuple[str, int, tuple[int, int], str]
 
 
 def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int], Sequence[float]]) -> Psychometric:
@@ -292,17 +278,20 @@ def function_of(answers: Sequence[Comparison], friction: Mapping[tuple[str, int]
     both surfaces have one. Answers of one session to one surface in one order make a level.
     """
     log_mu = {key: float(np.mean(np.log(values))) for key, values in friction.items() if values}
-    counted = [
-        one for one in answers if (one.session, one.comparison) in log_mu and (one.session, one.standard) in log_mu
-    ]
-    if answers and not counted:
+    presented: Counter[tuple[str, int, int, bool]] = Counter()
+    chosen: Counter[tuple[str, int, int, bool]] = Counter()
+    for session, standard, (first, second), choice in answers:
+        after = first == standard  # the comparison was stroked after the standard
+        index = second if after else first
+        if (session, index) in log_mu and (session, standard) in log_mu:
+            presented[session, standard, index, after] += 1
+            chosen[session, standard, index, after] += choice == ("second" if after else "first")
+    if answers and not presented:
         return Psychometric(0, reason="no friction was measured of the standard and of what it was compared with")
-    met = Counter((one.session, one.standard, one.comparison, one.second) for one in counted)
-    chosen = Counter((one.session, one.standard, one.comparison, one.second) for one in counted if one.chosen)
     return psychometric(
         [
-            Level(log_mu[session, index] - log_mu[session, standard], chosen[key], count, 1 if second else -1)
-            for key, count in sorted(met.items())
-            for session, standard, index, second in [key]
+            Level(log_mu[session, index] - log_mu[session, standard], chosen[key], count, 1 if after else -1)
+            for key, count in sorted(presented.items())
+            for session, standard, index, after in [key]
         ]
     )

@@ -1,7 +1,6 @@
 """What else follows the scores beside a model's quantity: its others, and friction, forces and speed of the strokes."""
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from sessions.prediction import BY_NAME, SED
 from sessions.statistics.correlations import (
-    CONFIDENCE,
+    TAILS,
     Contrast,
     cases_needed,
     contrast,
@@ -21,7 +20,7 @@ from sessions.statistics.correlations import (
     spearman,
 )
 from sessions.statistics.mixed_model import Array, akaike_weights, crossed_deviance
-from sessions.statistics.scores import surface_means
+from sessions.statistics.scores import by_key, surface_means
 from sessions.statistics.within_subjects import repeated_correlation
 
 MODEL = SED.label  # the published quantity, to which the others are compared where no other is named
@@ -91,8 +90,14 @@ def rivals_of_means(
 def rivals_of_surfaces(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
     """Return `rivals_of_means` of means over subjects, of the trials that have the model's quantity."""
     counted = [trial for trial in trials if model in trial.values]
+
+    def means(value: Callable[[RivalTrial], float | None]) -> Mapping[int, float]:
+        points = [(t.subject, t.index, v) for t in counted if (v := value(t)) is not None]
+        return surface_means(points) or {}
+
     names = [name for name in NAMES if any(name in trial.values for trial in counted)]
-    return rivals_of_means(*_means(counted, names), model)
+    series = {name: means(lambda t, name=name: t.values.get(name)) for name in names}
+    return rivals_of_means(means(lambda t: t.score), series, model)
 
 
 def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Rival, ...]:
@@ -108,12 +113,13 @@ def rivals_within(trials: Sequence[RivalTrial], model: str = MODEL) -> tuple[Riv
     deviances = {name: _deviance(name, counted) for name in names}
     whole = {name: value for name, value in deviances.items() if not isinstance(value, str)}
     weights = dict(zip(whole, akaike_weights(list(whole.values())), strict=True)) if whole else {}
-    rivals: list[Rival] = []
-    for name in names:
-        deviance = deviances[name]
-        rival = replace(_within(name, model, counted), weight=weights.get(name))
-        rivals.append(_because(rival, "weight", deviance if isinstance(deviance, str) else None))
-    return tuple(rivals)
+    return tuple(
+        _because(
+            replace(_within(name, model, counted), weight=weights.get(name)),
+            weight=deviance if isinstance(deviance, str) else None,
+        )
+        for name, deviance in deviances.items()
+    )
 
 
 def _ordered(model: str) -> tuple[str, ...]:
@@ -124,31 +130,30 @@ def _of_means(name: str, model: str, scores: Mapping[int, float], series: Mappin
     used = [name, model, *([MODEL_MU] if MODEL_MU in series else [])]
     own = [index for index in scores if index in series[name]]
     x, y = [series[name][i] for i in own], [scores[i] for i in own]
-    related = relation(x, y, own)
-    rival = Rival(name, len(own), related.pearson, related.low, related.high, left_out_error=left_out_error(x, y))
-    rival = _because(rival, "r", related.reason)
-    rival = _because(rival, "left_out_error", None if rival.left_out_error is not None else _NO_LINE)
+    related, error = relation(x, y, own), left_out_error(x, y)
+    rival = Rival(name, len(own), related.pearson, related.low, related.high, left_out_error=error)
+    rival = _because(rival, r=related.reason, left_out_error=_NO_LINE if error is None else None)
     shared = [i for i in scores if all(i in series[one] for one in used)]
     score = [scores[i] for i in shared]
     values = {one: [series[one][i] for i in shared] for one in used}
     if name != model:
         rival = _compared(rival, values[model], values[name], score)
     if MODEL_MU not in used or name == MODEL_MU:
-        return _because(rival, "partial", "µ itself is given")
+        return _because(rival, partial="µ itself is given")
     xy, xz, yz = pearson(values[name], score), pearson(values[name], values[MODEL_MU]), pearson(score, values[MODEL_MU])
-    partial = None if xy is None or xz is None or yz is None else partial_correlation(xy, xz, yz)
-    if partial is None:
-        return _because(rival, "partial", "µ determines it, or there are too few surfaces")
+    partial = math.nan if xy is None or xz is None or yz is None else float(partial_correlation(xy, xz, yz))
+    if math.isnan(partial):
+        return _because(rival, partial="µ determines it, or there are too few surfaces")
     low, high = fisher_interval(partial, len(shared) - 1)
     return replace(rival, partial=partial, partial_low=low, partial_high=high)
 
 
-def _compared(rival: Rival, model: Sequence[float], other: Sequence[float], score: Sequence[float]) -> Rival:
+def _compared(rival: Rival, model: Sequence[float], values: Sequence[float], score: Sequence[float]) -> Rival:
     """Return the rival with its difference from the model's quantity, over the surfaces that have both."""
-    first, second, mutual = pearson(model, score), pearson(other, score), pearson(model, other)
-    rho = spearman(model, other)
+    first, second, mutual = pearson(model, score), pearson(values, score), pearson(model, values)
+    rho = spearman(model, values)
     if first is None or second is None or mutual is None or rho is None:
-        return _because(rival, "contrast", "too few surfaces have both, or one of them does not vary")
+        return _because(rival, contrast="too few surfaces have both, or one of them does not vary")
     turned = math.copysign(1.0, first * second)
     rival = replace(
         rival,
@@ -156,70 +161,56 @@ def _compared(rival: Rival, model: Sequence[float], other: Sequence[float], scor
         same_order=abs(rho) > 1 - 1e-12,
         needed=cases_needed(abs(first), abs(second), turned * mutual),
     )
-    why = None if rival.contrast else "no test from these few surfaces, or of a perfect r"
-    return _because(rival, "contrast", why)
+    return _because(rival, contrast=None if rival.contrast else "no test from these few surfaces, or of a perfect r")
 
 
 def _within(name: str, model: str, trials: Sequence[RivalTrial]) -> Rival:
     used = [*dict.fromkeys((name, model, MODEL_MU))]
     mine = [trial for trial in trials if name in trial.values]
     x, y = [trial.values[name] for trial in mine], [trial.score for trial in mine]
-    subjects = [trial.subject for trial in mine]
-    related = repeated_correlation(subjects, x, y)
+    related, error = repeated_correlation([trial.subject for trial in mine], x, y), _left_out_surface(mine, name)
     low, high = (related.people if related is not None else None) or (None, None)
-    error = _left_out_surface(mine, name)
     rival = Rival(name, len(mine), None if related is None else related.r, low, high, left_out_error=error)
-    rival = _because(rival, "r", None if related is not None else "too few trials within subjects, or no variation")
-    rival = _because(rival, "left_out_error", None if error is not None else _NO_LINE)
+    no_r = "too few trials within subjects, or no variation" if related is None else None
+    rival = _because(rival, r=no_r, left_out_error=_NO_LINE if error is None else None)
     shared = [trial for trial in mine if all(one in trial.values for one in used)]
-    drawn = _resampled(shared, used)
-    few = f"it takes {_LEAST_SUBJECTS} subjects with trials that have all of them"
-    if drawn is None:
-        return _because(_because(rival, "partial", few), "contrast", None if name == model else few)
-    here, again = drawn
+    covariances = _covariances(shared, used)
+    if covariances is None:
+        few = f"it takes {_LEAST_SUBJECTS} subjects with trials that have all of them"
+        return _because(rival, partial=few, contrast=None if name == model else few)
     if name != model:
-        rival = _bootstrapped(rival, here, again, len(shared))
+        own, models = (_correlations(covariances, 0, column) for column in (1, 2))
+        steps = np.sign(models[0]) * models - np.sign(own[0]) * own
+        if math.isfinite(steps[0]):
+            low, high = _percentiles(steps[1:])
+            rival = replace(rival, contrast=Contrast(len(shared), float(steps[0]), low, high, None, None))
+        else:
+            rival = _because(rival, contrast="one of them does not vary within subjects")
     if name == MODEL_MU:
-        return _because(rival, "partial", "µ itself is given")
-    control, column = used.index(MODEL_MU) + 1, 1
-    partial = _partials(here[None], column, control)
-    if not np.isfinite(partial).all():
-        return _because(rival, "partial", "µ determines it")
-    ends = _percentiles(_partials(again, column, control))
-    return replace(rival, partial=float(partial[0]), partial_low=ends[0], partial_high=ends[1])
+        return _because(rival, partial="µ itself is given")
+    mu = used.index(MODEL_MU) + 1
+    partials = partial_correlation(*(_correlations(covariances, *pair) for pair in ((0, 1), (0, mu), (1, mu))))
+    if not math.isfinite(partials[0]):
+        return _because(rival, partial="µ determines it")
+    low, high = _percentiles(partials[1:])
+    return replace(rival, partial=float(partials[0]), partial_low=low, partial_high=high)
 
 
-def _bootstrapped(rival: Rival, here: Array, again: Array, n: int) -> Rival:
-    """Return the rival with its difference from the model's quantity, from covariances: score, rival, model, µ."""
-    signs = np.sign([_correlations(here[None], 0, column)[0] for column in (2, 1)])
-
-    def steps(covariances: Array) -> Array:
-        return signs[0] * _correlations(covariances, 0, 2) - signs[1] * _correlations(covariances, 0, 1)
-
-    step = float(steps(here[None])[0])
-    if not math.isfinite(step):
-        return _because(rival, "contrast", "one of them does not vary within subjects")
-    return replace(rival, contrast=Contrast(n, step, *_percentiles(steps(again)), None, None))
-
-
-def _resampled(trials: Sequence[RivalTrial], names: Sequence[str]) -> tuple[Array, Array] | None:
-    """Return the covariances within subjects of score and quantities, and those of subjects drawn anew.
+def _covariances(trials: Sequence[RivalTrial], names: Sequence[str]) -> Array | None:
+    """Return covariances within subjects of score and quantities (1 + b, c, c), then those of subjects drawn anew.
 
     Each subject's products are summed once; a draw is then a sum over the subjects drawn. None of too few subjects.
     """
-    subjects = list(dict.fromkeys(trial.subject for trial in trials))
-    if len(subjects) < _LEAST_SUBJECTS:
+    rows = by_key((trial.subject, [trial.score, *(trial.values[name] for name in names)]) for trial in trials)
+    if len(rows) < _LEAST_SUBJECTS:
         return None
-    columns = np.array([[trial.score, *(trial.values[name] for name in names)] for trial in trials])
-    columns = columns / np.abs(columns).max(axis=0, initial=1e-300)
-    whose = np.array([subjects.index(trial.subject) for trial in trials])
-    products: list[Array] = []
-    for code in range(len(subjects)):
-        own = columns[whose == code]
-        own = own - own.mean(axis=0)
-        products.append(own.T @ own)
-    draw = np.random.default_rng(0).multinomial(len(subjects), np.full(len(subjects), 1 / len(subjects)), _RESAMPLES)
-    return np.sum(products, axis=0), np.tensordot(draw.astype(np.float64), np.array(products), axes=1)
+    columns = [np.array(own) for own in rows.values()]
+    scale = np.abs(np.concatenate(columns)).max(axis=0, initial=1e-300)
+    centred = [own / scale - (own / scale).mean(axis=0) for own in columns]
+    products = np.array([own.T @ own for own in centred])
+    draws = np.random.default_rng(0).multinomial(len(rows), np.full(len(rows), 1 / len(rows)), _RESAMPLES)
+    again = np.tensordot(draws.astype(np.float64), products, axes=1)
+    return np.concatenate([products.sum(axis=0, keepdims=True), again])
 
 
 def _correlations(covariances: Array, first: int, second: int) -> Array:
@@ -228,36 +219,27 @@ def _correlations(covariances: Array, first: int, second: int) -> Array:
     return np.where(size > 0.0, covariances[:, first, second], np.nan) / np.sqrt(np.where(size > 0.0, size, 1.0))
 
 
-def _partials(covariances: Array, column: int, control: int) -> Array:
-    """Return the correlation of score and a column given another in each of many covariances; nan where none is."""
-    xy, xz, yz = (_correlations(covariances, *pair) for pair in ((0, column), (0, control), (column, control)))
-    left = (1 - xz * xz) * (1 - yz * yz)
-    return np.where(left > 1e-12, xy - xz * yz, np.nan) / np.sqrt(np.where(left > 1e-12, left, 1.0))
-
-
 def _percentiles(values: Array) -> tuple[float, float]:
-    low, high = np.nanquantile(values, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return float(low), float(high)
+    low, high = np.nanquantile(values, TAILS).tolist()
+    return low, high
 
 
 def _left_out_surface(trials: Sequence[RivalTrial], name: str) -> float | None:
     """Return the error of the scores of each surface by subjects' levels and one slope, both fitted to the others."""
+    subjects, whose = np.unique([trial.subject for trial in trials], return_inverse=True)
+    surfaces = np.array([trial.index for trial in trials])
+    x, y = np.array([trial.values[name] for trial in trials]), np.array([trial.score for trial in trials])
     errors: list[float] = []
-    for index in dict.fromkeys(trial.index for trial in trials):
-        kept = [trial for trial in trials if trial.index != index]
-        own: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
-        for t in kept:
-            own[t.subject].append((t.values[name], t.score))
-        level = {subject: [float(np.mean(one)) for one in zip(*pairs, strict=True)] for subject, pairs in own.items()}
-        steps = [(t.values[name] - level[t.subject][0], t.score - level[t.subject][1]) for t in kept]
-        size = sum(x * x for x, _ in steps)
-        if size <= 1e-24 * max((t.values[name] ** 2 for t in kept), default=1.0):
+    for surface in np.unique(surfaces):
+        kept = surfaces != surface
+        count = np.bincount(whose[kept], minlength=len(subjects))
+        levels = (np.bincount(whose[kept], v[kept], len(subjects)) / np.maximum(count, 1) for v in (x, y))
+        off_x, off_y = (v - level[whose] for v, level in zip((x, y), levels, strict=True))
+        size = float(off_x[kept] @ off_x[kept])
+        if size <= 1e-24 * float(np.max(x[kept] ** 2, initial=1e-300)):
             return None
-        slope = sum(x * y for x, y in steps) / size
-        for trial in trials:
-            if trial.index == index and trial.subject in level:
-                x, y = level[trial.subject]
-                errors.append(trial.score - y - slope * (trial.values[name] - x))
+        slope = float(off_x[kept] @ off_y[kept]) / size
+        errors += (off_y - slope * off_x)[~kept & (count[whose] > 0)].tolist()
     return math.sqrt(float(np.mean(np.square(errors)))) if errors else None
 
 
@@ -274,17 +256,6 @@ def _deviance(name: str, trials: Sequence[RivalTrial]) -> float | str:
     return "it does not vary, or the scores leave nothing to tell an error from" if deviance is None else deviance
 
 
-def _means(
-    trials: Sequence[RivalTrial], names: Sequence[str]
-) -> tuple[Mapping[int, float], Mapping[str, Mapping[int, float]]]:
-    """Return the means over subjects of scores and of quantities, by surface."""
-
-    def means(value: Callable[[RivalTrial], float | None]) -> Mapping[int, float]:
-        points = [(t.subject, t.index, v) for t in trials if (v := value(t)) is not None]
-        return surface_means(points) or {}
-
-    return means(lambda t: t.score), {name: means(lambda t, name=name: t.values.get(name)) for name in names}
-
-
-def _because(rival: Rival, what: str, why: str | None) -> Rival:
-    return rival if why is None else replace(rival, reasons={**rival.reasons, what: why})
+def _because(rival: Rival, **reasons: str | None) -> Rival:
+    """Return the rival with why it lacks a number, under the name of the field."""
+    return replace(rival, reasons=rival.reasons | {what: why for what, why in reasons.items() if why is not None})

@@ -16,7 +16,7 @@ standard has its unit in the just noticeable difference: from there to the stand
 """
 
 import math
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.sparse import csgraph
 
-from sessions.statistics.correlations import CONFIDENCE
+from sessions.statistics.correlations import TAILS
 from sessions.statistics.mixed_model import Term, mixed_model
 from sessions.statistics.psychometric import QUARTILE
-from sessions.statistics.scores import IntervalEstimate
+from sessions.statistics.scores import IntervalEstimate, by_key
 
 Array = NDArray[np.float64]
 Model = Literal["Bradley–Terry", "Thurstone V"]
@@ -79,7 +79,7 @@ class Consistence:
     zeta: float  # 1 less their ratio: 1 is an order, 0 as many circles as there can be
 
 
-def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry", seed: int = 0) -> PairedScale:
+def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") -> PairedScale:
     """Return the scale of choices, with intervals by a bootstrap over subjects."""
     indices = sorted({index for one in choices for index in (one.first, one.second)})
     subjects = sorted({one.subject for one in choices})
@@ -94,7 +94,7 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry", se
     fitted = _fit(whole, model)
     if fitted is None:
         return replace(none, reason="the likelihood has no finite maximum")
-    draws, why = _bootstrap(counts, model, fitted, seed)
+    draws, why = _bootstrap(counts, model, fitted)
     ends = [_estimate(value, draws[:, n] if why == "" else None) for n, value in enumerate(fitted.tolist())]
     deviance, freedom = _deviance(whole, fitted, model)
     return replace(
@@ -114,11 +114,8 @@ def consistence(choices: Sequence[Choice]) -> Mapping[str, Consistence]:
     A pair chosen equally often both ways leaves its subject out, for it has no direction.
     """
     out: dict[str, Consistence] = {}
-    for subject in sorted({one.subject for one in choices}):
-        won: Counter[tuple[int, int]] = Counter()
-        for one in choices:
-            if one.subject == subject:
-                won[(one.first, one.second) if one.first_chosen else (one.second, one.first)] += 1
+    for subject, own in sorted(by_key((one.subject, one) for one in choices).items()):
+        won = Counter((one.first, one.second) if one.first_chosen else (one.second, one.first) for one in own)
         indices = sorted({index for pair in won for index in pair})
         leads = {(a, b): won[a, b] - won[b, a] for a, b in combinations(indices, 2)}
         if len(indices) < 3 or not all(leads.values()):
@@ -196,12 +193,12 @@ def _fit(counts: Array, model: Model, begin: Array | None = None) -> Array | Non
     return None
 
 
-def _bootstrap(counts: Array, model: Model, begin: Array, seed: int) -> tuple[Array, str]:
+def _bootstrap(counts: Array, model: Model, begin: Array) -> tuple[Array, str]:
     """Return what fits to subjects drawn anew give (b, n + 1), and why that makes no interval, "" where it does."""
     subjects = len(counts)
     if subjects < LEAST_SUBJECTS:
         return np.zeros((0, 0)), f"an interval over subjects takes {LEAST_SUBJECTS} of them"
-    drawn = np.random.default_rng(seed).multinomial(subjects, np.full(subjects, 1.0 / subjects), RESAMPLES)
+    drawn = np.random.default_rng(0).multinomial(subjects, np.full(subjects, 1.0 / subjects), RESAMPLES)
     totals = np.tensordot(drawn.astype(np.float64), counts, axes=1)
     indices = range(counts.shape[2])
     fits = [None if _unbounded(total, indices) else _fit(total, model, begin) for total in totals]
@@ -213,7 +210,7 @@ def _bootstrap(counts: Array, model: Model, begin: Array, seed: int) -> tuple[Ar
 
 
 def _estimate(value: float, draws: Array | None) -> IntervalEstimate:
-    return IntervalEstimate(value, *([None, None] if draws is None else np.quantile(draws, [0.025, 0.975]).tolist()))
+    return IntervalEstimate(value, *([None, None] if draws is None else np.quantile(draws, TAILS).tolist()))
 
 
 def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
@@ -244,11 +241,7 @@ class Exponent:
 
 
 def stevens_exponent(
-    subjects: Sequence[str],
-    surfaces: Sequence[int],
-    answers: Sequence[float],
-    magnitudes: Sequence[float],
-    seed: int = 0,
+    subjects: Sequence[str], surfaces: Sequence[int], answers: Sequence[float], magnitudes: Sequence[float]
 ) -> Exponent:
     """Return the exponent of answers (n,) by magnitudes (n,), both above 0, in trials of subjects and surfaces (n,).
 
@@ -259,7 +252,7 @@ def stevens_exponent(
     if len(people) < LEAST_SUBJECTS or len(set(surfaces)) < LEAST_SUBJECTS:
         why = f"it takes {LEAST_SUBJECTS} subjects and {LEAST_SUBJECTS} surfaces"
         return Exponent(len(people), len(y), None, reason=why)
-    model = mixed_model(subjects, y.tolist(), {NAME: x.tolist()}, slopes_differ=True)
+    model = mixed_model(subjects, y.tolist(), {NAME: x.tolist()})
     plain = None if isinstance(model, str) else model.term(NAME)
     reason = model if isinstance(model, str) else ""
     cells = _cells(subjects, surfaces, y, x)
@@ -268,20 +261,18 @@ def stevens_exponent(
     here = _deming(cells)
     if here is None:
         return Exponent(len(people), len(y), plain, reason=reason or "magnitudes or answers do not vary over surfaces")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     drawn = [_deming(cells[rng.integers(0, len(cells), len(cells))]) for _ in range(RESAMPLES)]
     slopes = [one[0] for one in drawn if one is not None]
-    low, high = np.quantile(slopes, [0.025, 0.975]).tolist()
+    low, high = np.quantile(slopes, TAILS).tolist()
     return Exponent(len(people), len(y), plain, (here[0], low, high), here[1], reason)
 
 
 def _cells(subjects: Sequence[str], surfaces: Sequence[int], y: Array, x: Array) -> Array | None:
     """Return log answers and magnitudes (s, k, 2), each subject's mean taken away; None where a cell is empty."""
-    by_cell: defaultdict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
-    for subject, surface, one, other in zip(subjects, surfaces, y.tolist(), x.tolist(), strict=True):
-        by_cell[subject, surface].append((one, other))
+    by_cell = by_key(zip(zip(subjects, surfaces, strict=True), zip(y.tolist(), x.tolist(), strict=True), strict=True))
     people, indices = sorted(set(subjects)), sorted(set(surfaces))
-    if any((subject, index) not in by_cell for subject in people for index in indices):
+    if len(by_cell) < len(people) * len(indices):
         return None
     cells = np.array([[np.mean(by_cell[subject, index], axis=0) for index in indices] for subject in people])
     return cells - cells.mean(axis=1, keepdims=True)
@@ -307,7 +298,7 @@ Judgement = Literal["scores", "estimates", "choices", "comparisons"]
 JUDGEMENTS: tuple[Judgement, ...] = ("scores", "estimates", "choices", "comparisons")
 
 
-def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Mapping[int, IntervalEstimate]:
+def of_judgements(points: Sequence[tuple[str, int, float]]) -> Mapping[int, IntervalEstimate]:
     """Return the latent value of each surface, with mean 0, from subject, index and score or log estimate.
 
     Intervals are expanded percentiles of a bootstrap over subjects (Hesterberg 2015, Am. Stat. 69, 371): of few
@@ -315,11 +306,9 @@ def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Ma
     another judged do not count. Nothing of fewer than three others, of fewer than two surfaces, and where nothing is
     left to tell a unit from.
     """
-    own: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for subject, index, value in points:
-        own[subject][index].append(value)
+    own = by_key((subject, (index, value)) for subject, index, value in points)
     indices = sorted({index for _, index, _ in points})
-    whole = [[row[index] for index in indices] for row in own.values() if len(row) == len(indices)]
+    whole = [[row[i] for i in indices] for row in map(by_key, own.values()) if len(row) == len(indices)]
     if len(whole) < LEAST_SUBJECTS or len(indices) < 2:
         return {}
     cells = np.array([[np.mean(cell) for cell in row] for row in whole])
@@ -331,9 +320,9 @@ def of_judgements(points: Sequence[tuple[str, int, float]], seed: int = 0) -> Ma
     here = answered.values(np.arange(len(whole))[None])[0]
     if not np.isfinite(here).all():
         return {}
-    drawn = np.random.default_rng(seed).integers(0, len(whole), (RESAMPLES, len(whole)))
+    drawn = np.random.default_rng(0).integers(0, len(whole), (RESAMPLES, len(whole)))
     n = len(whole)
-    tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, (1.0 - CONFIDENCE) / 2.0)))
+    tail = float(special.ndtr(math.sqrt(n / (n - 1)) * special.stdtrit(n - 1, TAILS[0])))
     ends = np.nanquantile(answered.values(drawn), [tail, 1.0 - tail], axis=0).T.tolist()
     return {i: IntervalEstimate(value, *two) for i, value, two in zip(indices, here.tolist(), ends, strict=True)}
 

@@ -1,22 +1,36 @@
 """Scores of several subjects: means with their intervals, and how they go with a prediction."""
 
 import math
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+from scipy.special import chdtri
 
 from sessions.recording.log import TrialRecord
-from sessions.statistics.correlations import CONFIDENCE, pearson, t_quantile
+from sessions.statistics.correlations import TAILS, pearson, t_quantile
 
 if TYPE_CHECKING:
     from sessions.recording.reader import Recording
 
 SCALE = (0.0, 100.0)  # ends of the scale; nobody can answer beyond them
 _RESAMPLES = 10_000
+Key = TypeVar("Key", bound=Hashable)
+Value = TypeVar("Value")
+
+
+def by_key(pairs: Iterable[tuple[Key, Value]]) -> dict[Key, list[Value]]:
+    """Return the values of each key, keys in the order first met.
+
+    >>> by_key([("a", 1), ("b", 2), ("a", 3)])
+    {'a': [1, 3], 'b': [2]}
+    """
+    values: dict[Key, list[Value]] = {}
+    for key, value in pairs:
+        values.setdefault(key, []).append(value)
+    return values
 
 
 def bounds(low: float | None, high: float | None) -> tuple[float, float] | None:
@@ -36,6 +50,17 @@ class IntervalEstimate:
     def ends(self) -> tuple[float, float] | None:
         """The ends of the interval; None where one of them is missing."""
         return bounds(self.low, self.high)
+
+
+@dataclass(frozen=True, slots=True)
+class Average:
+    """A mean over subjects."""
+
+    n: int  # subjects, each one's own repeats averaged first
+    mean: float
+    sd: float | None  # between subjects; None of one alone, and so with the next two
+    low: float | None  # 95 % t interval
+    high: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +133,7 @@ def joined(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
     >>> len(joined([table, table]))
     1
     """
-    first: dict[str, ScoreTable] = {}
-    for table in tables:
-        first.setdefault(table.session, table)
-    return tuple(first.values())
+    return tuple(same[0] for same in by_key((table.session, table) for table in tables).values())
 
 
 def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
@@ -124,10 +146,9 @@ def subject_scores(tables: Iterable[ScoreTable]) -> tuple[Score, ...]:
     >>> subject_scores([first, again])
     (Score(subject='P01', descriptor='stickiness', index=20, score=20.0),)
     """
-    answers: defaultdict[tuple[str, str, int], list[float]] = defaultdict(list)
-    for table in tables:
-        for score in table.scores:
-            answers[table.subject, score.descriptor, score.index].append(score.score)
+    answers = by_key(
+        ((table.subject, one.descriptor, one.index), one.score) for table in tables for one in table.scores
+    )
     return tuple(Score(*key, score=float(np.mean(values))) for key, values in answers.items())
 
 
@@ -136,13 +157,11 @@ def mean_scores(tables: Iterable[ScoreTable]) -> tuple[MeanScore, ...]:
 
     Intervals are mean ± t(0.975, n - 1) s / sqrt(n), n the number of subjects.
     """
-    answers: defaultdict[str, defaultdict[int, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for score in subject_scores(tables):
-        answers[score.descriptor][score.index].append(score.score)
+    by_descriptor = by_key((one.descriptor, (one.index, one.score)) for one in subject_scores(tables))
     return tuple(
         _mean(descriptor, index, values)
-        for descriptor, by_index in answers.items()
-        for index, values in sorted(by_index.items())
+        for descriptor, scores in by_descriptor.items()
+        for index, values in sorted(by_key(scores).items())
     )
 
 
@@ -151,25 +170,30 @@ def reversed_subjects(tables: Iterable[ScoreTable]) -> tuple[tuple[str, str, flo
 
     They perhaps used the scale backwards; nothing is turned round for them.
     """
-    points: defaultdict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
-    for score in subject_scores(tables):
-        points[score.subject, score.descriptor].append((score.index, score.score))
-    rs = {key: pearson([i for i, _ in pairs], [s for _, s in pairs]) for key, pairs in points.items()}
-    return tuple((subject, descriptor, r) for (subject, descriptor), r in rs.items() if r is not None and r < 0)
+    points = by_key(((one.subject, one.descriptor), (one.index, one.score)) for one in subject_scores(tables))
+    rs = ((key, pearson(*zip(*pairs, strict=True))) for key, pairs in points.items())
+    return tuple((*key, r) for key, r in rs if r is not None and r < 0)
 
 
 def score_matrix(tables: Iterable[ScoreTable], descriptor: str) -> Mapping[str, Mapping[int, float]]:
     """Return subject -> index -> score of one descriptor, subjects sorted."""
-    rows: defaultdict[str, dict[int, float]] = defaultdict(dict)
-    for score in subject_scores(tables):
-        if score.descriptor == descriptor:
-            rows[score.subject][score.index] = score.score
-    return {subject: rows[subject] for subject in sorted(rows)}
+    scores = [one for one in subject_scores(tables) if one.descriptor == descriptor]
+    return {
+        subject: dict(row) for subject, row in sorted(by_key((s.subject, (s.index, s.score)) for s in scores).items())
+    }
 
 
-def mean_interval(values: Sequence[float]) -> tuple[float, float, float]:
-    """Return the standard deviation of two values or more, and the ends of the 95 % t interval of their mean."""
-    n, mean, sd = len(values), float(np.mean(values)), float(np.std(values, ddof=1))
+def average(values: Sequence[float]) -> Average | None:
+    """Return the mean of subjects' values with its 95 % t interval; None of none."""
+    return Average(len(values), float(np.mean(values)), *_interval(values)) if values else None
+
+
+def _interval(values: Sequence[float]) -> tuple[float, float, float] | tuple[None, None, None]:
+    """Return the standard deviation of values, and the ends of the 95 % t interval of their mean."""
+    n, mean = len(values), float(np.mean(values))
+    if n < 2:
+        return None, None, None
+    sd = float(np.std(values, ddof=1))
     half = t_quantile(n - 1) * sd / math.sqrt(n)
     return sd, mean - half, mean + half
 
@@ -180,18 +204,14 @@ def sd_interval(sd: float, n: int) -> tuple[float, float]:
     >>> tuple(round(end, 3) for end in sd_interval(1.0, 10))
     (0.688, 1.826)
     """
-    from scipy.special import chdtri
-
-    tail = (1 - CONFIDENCE) / 2
-    low, high = (sd * math.sqrt((n - 1) / float(chdtri(n - 1, upper))) for upper in (tail, 1 - tail))
+    low, high = (sd * math.sqrt((n - 1) / float(chdtri(n - 1, upper))) for upper in TAILS)
     return low, high
 
 
 def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
-    n, mean = len(values), float(np.mean(values))
-    if n < 2:
+    n, mean, (sd, low, high) = len(values), float(np.mean(values)), _interval(values)
+    if sd is None or low is None or high is None:
         return MeanScore(descriptor, index, n, mean, None, None, None, None, "one subject alone has no interval")
-    sd, low, high = mean_interval(values)
     bootstrap = _bootstrap(values) if low < SCALE[0] or high > SCALE[1] else None
     return MeanScore(descriptor, index, n, mean, sd, low, high, bootstrap, None)
 
@@ -199,8 +219,8 @@ def _mean(descriptor: str, index: int, values: Sequence[float]) -> MeanScore:
 def _bootstrap(values: Sequence[float]) -> tuple[float, float]:
     """Return the percentile interval of the mean, resampling subjects; always inside the range of the answers."""
     drawn = np.random.default_rng(0).choice(np.asarray(values), (_RESAMPLES, len(values)))
-    low, high = np.quantile(drawn.mean(axis=1), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    return float(low), float(high)
+    low, high = np.quantile(drawn.mean(axis=1), TAILS).tolist()
+    return low, high
 
 
 def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] | None:
@@ -216,9 +236,7 @@ def surface_means(points: Sequence[tuple[str, int, float]]) -> dict[int, float] 
     >>> {index: round(mean, 9) for index, mean in means.items()}
     {0: 6.0, 50: 7.0}
     """
-    own: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
-    for subject, index, value in points:
-        own[subject, index].append(value)
+    own = by_key(((subject, index), value) for subject, index, value in points)
     if not own:
         return None
     subjects, indices = sorted({subject for subject, _ in own}), sorted({index for _, index in own})
@@ -240,13 +258,14 @@ def grading(records: Iterable[TrialRecord]) -> dict[str, str]:
 
     The grading holds where the answers rise with the maker's number throughout. Raises Blinded while it is sealed.
     """
-    judgements: defaultdict[str, dict[int, float]] = defaultdict(dict)
-    for record in records:
-        answer = record.number if record.score is None else record.score
-        if record.trial.phase == "pre-evaluation" and answer is not None:
-            stimulus = record.trial.stimulus
-            judgements[stimulus.descriptor][stimulus.known_index] = answer
-    return {descriptor: _sentence(answers) for descriptor, answers in judgements.items()}
+    judgements = by_key(
+        (record.trial.stimulus.descriptor, (record.trial.stimulus.known_index, answer))
+        for record in records
+        if record.trial.phase == "pre-evaluation"
+        for answer in [record.number if record.score is None else record.score]
+        if answer is not None
+    )
+    return {descriptor: _sentence(dict(answers)) for descriptor, answers in judgements.items()}
 
 
 def _sentence(answers: dict[int, float]) -> str:

@@ -18,7 +18,7 @@ from sessions.report.tables.scales import (
     psychometric_sentences,
     psychometric_table,
 )
-from sessions.statistics.answers import constant_stimuli
+from sessions.statistics.pooled import constant_stimuli
 from sessions.statistics.psychometric import QUARTILE
 from sessions.statistics.visit import VisitOptions, visit_of
 from sessions.strokes.stroke import FIXED

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from sessions.report.tables.scales import latent_table
-from sessions.statistics.answers import ConstantStimuli, average, latent_scales
+from sessions.statistics.findings import ConstantStimuli
+from sessions.statistics.pooled import latent_scales
 from sessions.statistics.psychometric import QUARTILE
 from sessions.statistics.scales import JUDGEMENTS, Choice, of_comparisons, of_judgements, paired_scale
+from sessions.statistics.scores import average
 
 VALUES = {0: -1.2, 20: -0.5, 50: 0.1, 80: 0.4, 100: 1.2}  # mean 0
 SCATTER = math.sqrt(0.5)  # of one judgement: the difference of two scatters by 1

@@ -84,7 +84,7 @@ def test_intervals_hold_planted_values_in_90_to_98_of_a_hundred():
     held, studies = np.zeros(6), 60
     for study in range(studies):
         rng = np.random.default_rng([11, study])
-        found = paired_scale(drawn(rng, values, first, 20, 0.2), "Thurstone V", study)
+        found = paired_scale(drawn(rng, values, first, 20, 0.2), "Thurstone V")
         # people of different scales make the mean chance flatter: 1 / sqrt(1 + 2 spread^2) of the values
         truth = np.append(values, first) / math.sqrt(1.0 + 2.0 * 0.2**2)
         ends = [*found.values.values(), found.first]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from sessions.report.tables.scales import scale_sentences, scales_table
-from sessions.statistics.answers import choices, constant_stimuli, exponent
+from sessions.statistics.pooled import choices, constant_stimuli, exponent
 from sessions.statistics.scales import MODELS, Choice, consistence, paired_scale
 
 

@@ -8,11 +8,10 @@ import numpy as np
 from sessions.report.contents import Report
 from sessions.report.tables import Cell, Notes, Row, Rows, Table, table
 from sessions.report.wording import NONE, capital, digits, p_value, places
-from sessions.statistics.answers import Average
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.scales import JUDGEMENTS, Judgement, PairedScale
-from sessions.statistics.scores import IntervalEstimate, bounds
+from sessions.statistics.scores import Average, IntervalEstimate, bounds
 
 CONSISTENT = 1.0  # coefficient of consistence of choices that follow one order
 

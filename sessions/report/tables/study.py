@@ -19,10 +19,9 @@ from sessions.report.wording import (
     significant,
     three_figures,
 )
-from sessions.statistics.answers import Average
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.scores import MeanScore, bounds
+from sessions.statistics.scores import Average, MeanScore, bounds
 from sessions.statistics.visit import Visit
 from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
 
