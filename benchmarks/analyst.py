@@ -32,7 +32,7 @@ def main() -> None:
 def _work(folder: Path) -> None:
     """Print the processor time of each thing that is asked for."""
     begun = time.process_time()
-    from daq_app.analyst import messages as m
+    from daq_app.analyst import state as m
     from daq_app.analyst.work import Work
 
     print(f"loading the work                 {time.process_time() - begun:6.2f} s")
@@ -98,7 +98,7 @@ def _painting(film) -> None:  # noqa: ANN001
 
 def _stops(folder: Path) -> None:
     """Print how long a stop takes to be answered, while the model answers."""
-    from daq_app.analyst import messages as m
+    from daq_app.analyst import state as m
     from daq_app.analyst.process import Analyst
 
     took: list[float] = []

@@ -174,7 +174,7 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
 
 def _take_analyst(application, session: Path, size, theme, path) -> None:  # noqa: ANN001
     """Take a picture of each of the analyst's places, on a copy of a session."""
-    from daq_app.analyst import messages as m
+    from daq_app.analyst import state as m
     from daq_app.qt.analyst_window import AnalystWindow
 
     def until(condition) -> None:  # noqa: ANN001

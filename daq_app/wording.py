@@ -3,6 +3,7 @@
 import os
 from collections.abc import Mapping
 from functools import lru_cache
+from math import isfinite
 from pathlib import Path
 from typing import TypeVar
 from xml.etree import ElementTree
@@ -50,6 +51,17 @@ def tr(text: str, /, **values: object) -> str:
 def tr_noop(texts: T) -> T:
     """Return texts as they are. `daq-app translate` finds them here; whoever shows one calls `tr` (as QT_TR_NOOP)."""
     return texts
+
+
+def quantity(value: float | None, digits: int, unit: str = "") -> str:
+    """Return a number with its unit and a true minus sign, never a minus zero; a dash where it is not known.
+
+    >>> quantity(-0.001, 2, "N"), quantity(-1.25, 1), quantity(None, 0, "mm/s")
+    ('0.00 N', '−1.2', '–')
+    """
+    if value is None or not isfinite(value):
+        return "–"
+    return f"{round(value, digits) + 0.0:.{digits}f} {unit}".rstrip().replace("-", "−")
 
 
 def errors_words(mesh: float | None, effect: str = "") -> str:

@@ -1,16 +1,15 @@
 """What is said of the finger that is shown, with which colours, and of two sessions side by side."""
 
 from collections import defaultdict
-from dataclasses import dataclass
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.frame import FieldChoice, Finger, Frame, Range, automatic_range
 from daq_app.analyst.session_words import greatest_errors, sed_words
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.report.contents import PredictionFinding, Report
 
-Number = float | None
+Compared = tuple[tuple[str, tuple[tuple[float | None, float | None], ...]], ...]
 NAMES = tr_noop(("µ", "SED [kPa]", "score"))
 PHASES = {
     "pressing": tr_noop("pressing down"), "sticking": tr_noop("sticking: dragged, nothing slips yet"),
@@ -18,35 +17,17 @@ PHASES = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """One quantity of one stimulus in both sessions."""
+def compared(first: Report, second: Report) -> Compared:
+    """Return every stimulus of either session, experiments in their order, and both sessions' means of each of `NAMES`.
 
-    first: Number
-    second: Number
-
-    @property
-    def difference(self) -> Number:
-        """Return the second less the first; None where one of them is missing."""
-        return None if self.first is None or self.second is None else self.second - self.first
-
-
-@dataclass(frozen=True, slots=True)
-class ComparedRow:
-    """One stimulus that either session has."""
-
-    experiment: str
-    index: int
-    pairs: tuple[Pair, ...]  # of `NAMES`, means over repetitions
-
-
-def compared(first: Report, second: Report) -> tuple[ComparedRow, ...]:
-    """Return every stimulus of either session, experiments in their order; mu is the one the model got."""
+    mu is the one that the model got; None where a session has no number.
+    """
     tables = [_numbers(report) for report in (first, second)]
     names = [experiment.name for report in (first, second) for experiment in report.experiments]
     keys = sorted({*tables[0], *tables[1]}, key=lambda key: (names.index(key[0]) if key[0] in names else -1, *key))
-    pairs = ((key, [[table.get(key, {}).get(name) for table in tables] for name in NAMES]) for key in keys)
-    return tuple(ComparedRow(*key, tuple(Pair(*values) for values in rows)) for key, rows in pairs)
+    one, other = ([table.get(key, {}) for key in keys] for table in tables)
+    rows = (tuple((a.get(name), b.get(name)) for name in NAMES) for a, b in zip(one, other, strict=True))
+    return tuple((f"{experiment} {index}", row) for (experiment, index), row in zip(keys, rows, strict=True))
 
 
 def _numbers(report: Report) -> dict[tuple[str, int], dict[str, float]]:

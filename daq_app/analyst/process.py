@@ -9,7 +9,7 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.child_process import begin
 from daq_app.wording import tr
 

@@ -4,8 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal
 
-from daq_app.analyst.messages import Step
-from daq_app.analyst.state import AnalystState, Row, chosen, rows
+from daq_app.analyst.state import AnalystState, Row, Step, chosen, rows
 from daq_app.wording import errors_words, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding

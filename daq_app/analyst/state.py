@@ -1,18 +1,177 @@
-"""Everything the analyst's window knows, message by message."""
+"""What the analyst's window asks of the work, what the work says, and what is known after each message."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from daq_app.analyst import messages as m
-from daq_app.analyst.frame import Finger
+import msgspec
+from msgspec import Struct
+
+from daq_app.analyst.frame import Film, Finger
+from daq_app.analyst.stroke import Edge, History, RawReadings
 from daq_app.wording import tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 
+Key = tuple[int | None, int | None]  # trial, and number of the stroke, of a predicted row
+
+
+# ---- what the work says
+
+
+class Step(Struct, frozen=True):
+    """Work goes on."""
+
+    part: float  # of all of it, 0 to 1
+    words: str
+    left: float | None = None  # about how long it will still take [s]; None: not known
+    load_steps: int = 0  # of which `part` are done; 0: it is not done in load steps
+
+
+class ReportReady(Struct, frozen=True):
+    """What is known of the session now: its strokes alone, or the model's answers too."""
+
+    stage: Literal["analysed", "predicted"]
+    report: Report
+    history: History = History()
+
+
+class Answered(Struct, frozen=True, eq=False):
+    """The model's answer to one trial."""
+
+    finding: PredictionFinding
+    finger: Finger | None  # None where there is no answer
+
+
+class Drawn(Struct, frozen=True):
+    """A picture of the session; `png` is empty where there are no numbers for it."""
+
+    name: str
+    title: str
+    png: bytes
+
+
+class Filmed(Struct, frozen=True, eq=False):
+    """The history of one trial's finger."""
+
+    key: Key
+    film: Film
+    why: str = ""  # why it ends before a settled state; "" where it has one
+
+
+class Read(Struct, frozen=True, eq=False):
+    """The readings around one stroke, as they were recorded."""
+
+    stroke: int  # its number
+    readings: RawReadings
+
+
+class Compared(Struct, frozen=True, eq=False):
+    """Another session, analysed and predicted alike."""
+
+    folder: str
+    report: Report
+    fingers: Mapping[Key, Finger] = msgspec.field(default_factory=dict[Key, Finger])  # the settled ones
+
+
+class Done(Struct, frozen=True):
+    """A file is whole, or a decision is recorded, undone or redone, and every number follows."""
+
+    sentence: str
+
+
+class Problem(Struct, frozen=True):
+    """Something could not be done; what was known before stays."""
+
+    sentence: str
+
+
+class Cancelled(Struct, frozen=True):
+    """Somebody stopped the work; what was done before stays."""
+
+
+class Idle(Struct, frozen=True):
+    """All that was asked for is done."""
+
+
+# ---- what the window asks
+
+
+class Choose(Struct, frozen=True):
+    """Somebody chose a trial, or a stroke of a recording without trials."""
+
+    row: int
+
+
+class Move(Struct, frozen=True):
+    """Somebody moved an edge of a stroke's windows."""
+
+    stroke: int  # its number
+    edge: Edge
+    time: float  # [s, device time]
+    by: str  # a code, never a name
+    why: str
+
+
+class Undo(Struct, frozen=True):
+    """The last decision is taken back, or with `again` the last taking back."""
+
+    by: str
+    again: bool = False
+
+
+class Respond(Struct, frozen=True):
+    """Another quantity at the ending is held against the scores."""
+
+    response: str  # one of `solver.quantities`
+
+
+class Draw(Struct, frozen=True):
+    """Asks for a picture of the session."""
+
+    name: str
+
+
+class ShowHistory(Struct, frozen=True):
+    """Asks for the way of one trial's finger."""
+
+    key: Key
+
+
+class ShowReadings(Struct, frozen=True):
+    """Asks for the readings around one stroke."""
+
+    stroke: int  # its number
+
+
+class Compare(Struct, frozen=True):
+    """Asks for another session beside this one."""
+
+    folder: str
+
+
+class Write(Struct, frozen=True):
+    """Asks for a file: "report", one of `sessions.exchange.FORMATS`, or "picture NAME" of what `pictures` names."""
+
+    what: str
+    path: str
+
+
+class GoOn(Struct, frozen=True):
+    """What was stopped goes on."""
+
+
+class Stop(Struct, frozen=True):
+    """Whatever is being done is stopped."""
+
+
+Ask = Choose | Move | Undo | Draw | ShowHistory | ShowReadings | Compare | Write | GoOn | Stop
+Said = Step | ReportReady | Answered | Drawn | Filmed | Read | Compared | Done | Problem | Cancelled | Idle
+Message = Ask | Said | Respond
+
 Stage = Literal["opening", "analysed", "predicted"]
-OPENING = m.Step(0.0, tr_noop("opening"))
+OPENING = Step(0.0, tr_noop("opening"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,14 +181,14 @@ class AnalystState:
     folder: Path
     stage: Stage = "opening"
     report: Report | None = None
-    history: m.History = field(default_factory=m.History)
+    history: History = field(default_factory=History)
     version: int = 0  # of the report; pictures drawn of an earlier one are out of date
-    fingers: Mapping[m.Key, Finger] = field(default_factory=dict[m.Key, Finger])
-    drawn: Mapping[str, m.Drawn] = field(default_factory=dict[str, m.Drawn])  # of this version, by name
-    film: m.Filmed | None = None  # the last that was asked for
-    read: m.Read | None = None  # likewise
-    compared: m.Compared | None = None
-    step: m.Step | None = OPENING  # None: nothing is being done
+    fingers: Mapping[Key, Finger] = field(default_factory=dict[Key, Finger])
+    drawn: Mapping[str, Drawn] = field(default_factory=dict[str, Drawn])  # of this version, by name
+    film: Filmed | None = None  # the last that was asked for
+    read: Read | None = None  # likewise
+    compared: Compared | None = None
+    step: Step | None = OPENING  # None: nothing is being done
     outcome: str = ""  # how the last work ended
     halted: bool = False  # somebody stopped the model's answers
     row: int = 0  # that is chosen
@@ -45,64 +204,64 @@ class Row:
     prediction: PredictionFinding | None
 
     @property
-    def key(self) -> m.Key:
+    def key(self) -> Key:
         """What the model's answers of it are found by."""
         return self.trial, None if self.stroke is None else self.stroke.number
 
 
-def fold(state: AnalystState, message: m.Message) -> AnalystState:
+def fold(state: AnalystState, message: Message) -> AnalystState:
     """Return the state after a message; what was known stays until it is known anew."""
     match message:
-        case m.ReportReady():
+        case ReportReady():
             return _on_report(state, message)
-        case m.Answered():
+        case Answered():
             return _answered(state, message)
-        case m.Drawn():
+        case Drawn():
             return replace(state, drawn={**state.drawn, message.name: message})
-        case m.Filmed():
+        case Filmed():
             return replace(state, film=message, outcome="")
-        case m.Read():
+        case Read():
             return replace(state, read=message)
-        case m.Respond(response):
+        case Respond(response):
             return replace(state, response=response)
-        case m.Compared():
+        case Compared():
             return replace(state, compared=message, outcome="")
-        case m.Step() | m.Idle() | m.Done() | m.Problem() | m.Cancelled():
+        case Step() | Idle() | Done() | Problem() | Cancelled():
             return _gone_on(state, message)
         case _:
             return _on_request(state, message)
 
 
-def _gone_on(state: AnalystState, said: m.Step | m.Idle | m.Done | m.Problem | m.Cancelled) -> AnalystState:
+def _gone_on(state: AnalystState, said: Step | Idle | Done | Problem | Cancelled) -> AnalystState:
     match said:
-        case m.Step():
+        case Step():
             return replace(state, step=said)
-        case m.Idle():
+        case Idle():
             return replace(state, step=None)
-        case m.Done(sentence):
+        case Done(sentence):
             return replace(state, outcome=sentence)
-        case m.Problem(sentence):
+        case Problem(sentence):
             return replace(state, step=None, outcome=sentence)
-        case m.Cancelled():
+        case Cancelled():
             kept = "" if state.report is None else tr(" What was done before is kept.")
             return replace(state, step=None, outcome=tr("Stopped.{kept}", kept=kept), halted=state.stage != "predicted")
 
 
-def _on_request(state: AnalystState, request: m.Ask) -> AnalystState:
+def _on_request(state: AnalystState, request: Ask) -> AnalystState:
     match request:
-        case m.Choose(row):
+        case Choose(row):
             row = max(0, min(row, len(rows(state)) - 1))
             return state if row == state.row else replace(state, row=row, outcome="")  # which was of the one before
-        case m.Write(what, path):
-            return replace(state, step=m.Step(0.0, tr("writing {what} to {path}", what=what, path=path)), outcome="")
-        case m.GoOn():
-            return replace(state, step=m.Step(0.0, tr("predicting")), outcome="", halted=False)
-        case m.Stop():
-            return replace(state, step=m.Step(0.0, tr("stopping")))
-        case m.ShowReadings():
+        case Write(what, path):
+            return replace(state, step=Step(0.0, tr("writing {what} to {path}", what=what, path=path)), outcome="")
+        case GoOn():
+            return replace(state, step=Step(0.0, tr("predicting")), outcome="", halted=False)
+        case Stop():
+            return replace(state, step=Step(0.0, tr("stopping")))
+        case ShowReadings():
             return state
         case _:
-            return replace(state, step=m.Step(0.0, tr("working")), outcome="")
+            return replace(state, step=Step(0.0, tr("working")), outcome="")
 
 
 def rows(state: AnalystState) -> tuple[Row, ...]:
@@ -122,7 +281,7 @@ def chosen(state: AnalystState) -> Row | None:
     return listed[state.row] if state.row < len(listed) else None
 
 
-def _on_report(state: AnalystState, message: m.ReportReady) -> AnalystState:
+def _on_report(state: AnalystState, message: ReportReady) -> AnalystState:
     """Take a report; answers to strokes that did not change since stay until they are given anew."""
     report, before = message.report, state.report
     fingers = state.fingers
@@ -145,7 +304,7 @@ def _measured(stroke: StrokeFinding) -> tuple[int, object]:
     return stroke.number, (stroke.trial, friction)
 
 
-def _answered(state: AnalystState, answered: m.Answered) -> AnalystState:
+def _answered(state: AnalystState, answered: Answered) -> AnalystState:
     report, finding = state.report, answered.finding
     if report is None:
         return state

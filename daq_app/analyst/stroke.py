@@ -110,7 +110,7 @@ def _with_forces(recording: Recording, stroke: StrokeFinding, block: ReadingBloc
 
 
 class History(Struct, frozen=True):
-    """The decisions that can be undone, the last one first, and those that can be redone, the first one first."""
+    """The decisions that can be undone, the last one at the end, and those that can be redone, the next one first."""
 
     done: tuple[str, ...] = ()  # each in words
     undone: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import NAMES, compared, film_words, named_errors
 from daq_app.analyst.frame import FIELD_ERRORS, Finger
 from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
@@ -216,11 +216,9 @@ class Work:
 
         if (other := self._other) is None:
             return None
-        listed = ((f"{row.experiment} {row.index}", row.pairs) for row in compared(self._report, other))
-        rows = [(words, [(pair.first, pair.second) for pair in pairs]) for words, pairs in listed]
         names, simulated = (self._report.session, other.session), self._report.simulated or other.simulated
         with look():
-            return compared_panel(NAMES, names, rows, simulated=simulated)
+            return compared_panel(NAMES, names, compared(self._report, other), simulated=simulated)
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""

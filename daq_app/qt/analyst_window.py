@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_words, row_words
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
@@ -57,7 +57,6 @@ class LineageLabel(QLabel):
         self.setAccessibleName(tr("from the number back to its readings"))
 
     def show_links(self, links: tuple[Link, ...]) -> None:
-        """Show a way."""
         if links == self._links:
             return
         self._links = links
@@ -120,8 +119,7 @@ class AnalystWindow(QMainWindow):
         self._timer.start(LOOK)
         self._show()
 
-    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
-        """Return the size the window opens with."""
+    def sizeHint(self) -> QSize:
         return QSize(1440, 860)
 
     def take(self, message: m.Message) -> None:
@@ -130,14 +128,12 @@ class AnalystWindow(QMainWindow):
         self._show()
 
     def ask(self, request: m.Ask) -> None:
-        """Ask the work for something."""
         if isinstance(request, m.Choose) and request.row == self.state.row:
             return
         self._work.ask(request)
         self.take(request)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Stop the work with Esc; undo and redo with the keys that the system has for it."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Undo):
             self.stroke.decisions.stack.undo()
             return
@@ -159,14 +155,13 @@ class AnalystWindow(QMainWindow):
             case _:
                 super().keyPressEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the columns beside each other, or on pages where there is little room."""
         super().resizeEvent(event)
         self._place_columns()
         self.keys.fit()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
-        """End the work with the window."""
+    def closeEvent(self, event: QCloseEvent) -> None:
         self._timer.stop()
         self._work.close()
         super().closeEvent(event)
@@ -183,13 +178,11 @@ class AnalystWindow(QMainWindow):
             self._show()
 
     def write_report(self) -> None:
-        """Ask for a file, and have the report written."""
         name, _ = QFileDialog.getSaveFileName(self, tr("Report"), str(self.state.folder / "report.html"), "*.html")
         if name:
             self.ask(m.Write("report", name))
 
     def write_export(self) -> None:
-        """Ask for a folder, and have the chosen export written."""
         what = self.format.currentText()
         name, _ = QFileDialog.getSaveFileName(self, tr("New folder"), f"{self.state.folder.name}-{what}")
         if name:
@@ -301,7 +294,6 @@ class TrialsColumn(QWidget):
         vbox(head, (self.list, 3), below, self.responses, self.errors, (self.relation, 2), on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        """Show what is known now."""
         listed = row_words(state)
         self.list.blockSignals(True)
         if len(listed) != self.list.count():

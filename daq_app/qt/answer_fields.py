@@ -85,7 +85,6 @@ class ScoreLine(QAbstractSlider):
 
     @property
     def answered(self) -> bool:
-        """Say whether there is an answer."""
         return self.answer.score is not None
 
     def begin(self, ends: tuple[str, str], ticks: int = 0) -> None:
@@ -94,7 +93,6 @@ class ScoreLine(QAbstractSlider):
         self._take(Answer())
 
     def answer_event(self, hand: Hand | None) -> Scored:
-        """Return the answer."""
         return self.answer.released().scored(hand)
 
     def place_of(self, position: float) -> QPointF:
@@ -102,8 +100,7 @@ class ScoreLine(QAbstractSlider):
         line, along = self._line(), position / 100.0
         return QPointF(line.left() + (1.0 - along if self._mirrored else along) * line.width(), line.center().y())
 
-    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
-        """Return the size that holds the line and its reach."""
+    def sizeHint(self) -> QSize:
         scale = self._pixels_per_mm
         return QSize(round((LENGTH + MARK) * scale), round(2 * REACH * scale))
 
@@ -115,21 +112,17 @@ class ScoreLine(QAbstractSlider):
             return True
         return super().event(event)
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Place the mark."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton:
             self._take(self.answer.pressed(self._now(), self._position(event.position()), _device(event)))
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Move the mark along."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         self._take(self.answer.dragged(self._now(), self._position(event.position()), _device(event)))
 
-    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Leave the mark where it is."""
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         self._take(self.answer.released())
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Place and move the mark with the keyboard."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         step = KEYS.get(Qt.Key(event.key()))
         if step is None:
             super().keyPressEvent(event)
@@ -138,12 +131,11 @@ class ScoreLine(QAbstractSlider):
             step = -step
         self._take(self.answer.stepped(self._now(), step))
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
+    def wheelEvent(self, event: QWheelEvent) -> None:
         """Move nothing: a wheel is turned by mistake."""
         event.ignore()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the line, its two ends, and the mark where there is one."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         t, mm, line = theme_of(self), self._pixels_per_mm, self._line()
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -231,11 +223,9 @@ class _Field(QWidget):
 
     @property
     def answered(self) -> bool:
-        """Say whether there is an answer."""
         return self.answer.value is not None
 
     def answer_event(self, hand: Hand | None) -> Event:
-        """Return the answer."""
         return self.answer.judgement(hand)
 
 
@@ -256,7 +246,6 @@ class NumberField(_Field):
         self.setFocusProxy(self.field)
 
     def begin(self) -> None:
-        """Begin another answer."""
         self.answer = Choice()
         self.field.clear()
         self.changed.emit()
@@ -285,16 +274,14 @@ class ChoiceOfTwo(_Field):
         fill(layout, 1, self.first, self.second, 1)
 
     def begin(self) -> None:
-        """Begin another answer."""
         self._take(Choice())
 
     def set_words(self, first: str, second: str) -> None:
-        """Name the buttons."""
         for choice, words in ((self.first, first), (self.second, second)):
             choice.setText(words)
             choice.setAccessibleName(words)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Choose with 1 and 2, or the arrows: the first stands where reading begins."""
         back, on = Qt.Key.Key_Left, Qt.Key.Key_Right
         if self.layoutDirection() == Qt.LayoutDirection.RightToLeft:
@@ -348,8 +335,7 @@ class PressBar(QWidget):
             self._force = force
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the bar."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         box = QRectF(self.rect()).adjusted(1, 1, -1, -1)
         filled = QRectF(box)

@@ -10,8 +10,8 @@ from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, named, regrade, say, scrolled, vbox
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.recorder.messages import AcknowledgeOverloads, Connect, Tare
-from daq_app.window.live_feed import AXES
-from daq_app.window.messages import Message
+from daq_app.window.live_feed import LOADS
+from daq_app.window.state import Message
 from daq_app.window.view import NAMES, Bar, BenchView
 from daq_app.wording import tr, tr_noop
 
@@ -40,7 +40,7 @@ class BenchPanel(Panel):
         self._counters = {name: label("0") for name in SHOWN_COUNTERS}
         for count in self._counters.values():
             count.setAlignment(Qt.AlignmentFlag.AlignRight)
-        self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
+        self._bars = {name: LoadBar(name, scale) for name in LOADS}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
         self._choice.setLineEdit(EntryLine(self._typed, self._leave))
@@ -55,7 +55,6 @@ class BenchPanel(Panel):
         vbox(self._built(), on=self, margins=2)
 
     def show_view(self, view: BenchView) -> None:
-        """Show the bench."""
         before, self._view = self._view, view
         if view == before:
             return
@@ -152,14 +151,13 @@ class BenchStrip(Panel):
         """Show no transducer; `expand` shows the bench whole."""
         super().__init__(tr("bench, folded"), "strip")
         self._lamp = Lamp(tr("transducer"))
-        self._bars = {name: LoadBar(name, scale) for name in (*AXES, "combined")}
+        self._bars = {name: LoadBar(name, scale) for name in LOADS}
         self.setFixedWidth(round(150 * scale))
         self._words = label("", "quiet", wrap=True)
         whole, lamp = button(tr("Bench  B"), tr("show the bench"), expand), hbox(self._lamp, (self._words, 1))
         vbox(whole, lamp, *self._bars.values(), 1, on=self, margins=GRID)
 
     def show_view(self, view: BenchView) -> None:
-        """Show the bench."""
         self._lamp.show_grade(view.lamp, view.lamp_words)
         say(self._words, view.lamp_words)
         for bar in view.bars:
@@ -179,12 +177,10 @@ class LoadBar(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setFixedHeight(round(2.75 * GRID * scale))
 
-    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
-        """Return the usual size."""
+    def sizeHint(self) -> QSize:
         return QSize(round(200 * self._scale), self.height())
 
     def show_bar(self, bar: Bar) -> None:
-        """Show a load."""
         if bar == self._bar:
             return
         self._bar = bar
@@ -198,8 +194,7 @@ class LoadBar(QWidget):
         self.setToolTip(self.accessibleName())
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint name, bar, peak and noise."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         t, bar = theme_of(self), self._bar
         painter = QPainter(self)
         left, right = round(self.NAME * self._scale), round(self.NOISE * self._scale)

@@ -15,10 +15,20 @@ from daq_app.recorder.messages import REQUESTS, Report, Request
 from daq_app.window.live_feed import LiveFeed, Load, together
 from daq_app.window.live_model import Settle
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.messages import DevicesFound, DrawingFailed, Judged, LifeKnown, Loaded, Message, Searching, Tick
-from daq_app.window.state import AppState, fold
+from daq_app.window.state import (
+    AppState,
+    DevicesFound,
+    DrawingFailed,
+    Judged,
+    LifeKnown,
+    Loaded,
+    Message,
+    Searching,
+    Tick,
+    fold,
+)
+from daq_app.window.stroke_quality import Judge
 from daq_app.window.subject import translator
-from daq_app.window.take_watch import Judge
 from daq_app.window.view import View, derive_view
 from drivers.catalog import reachable
 from sessions.plan.plan import Frame
@@ -74,7 +84,6 @@ class Bridge(QObject):
 
     @property
     def recording(self) -> bool:
-        """Say whether a session is being recorded."""
         return self.state.session is not None and not self.state.session.over
 
     def connecting(self, uri: str) -> None:
@@ -98,11 +107,9 @@ class Bridge(QObject):
             self._client.close()
 
     def session_now(self) -> float:
-        """Return the session clock [s]."""
         return self._clock() + self.session_offset
 
     def post(self, message: Message) -> None:
-        """Take a message from another thread."""
         self._from_threads.put(message)
 
     def send(self, message: Message) -> None:

@@ -17,8 +17,8 @@ from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
-from daq_app.window.messages import Message
 from daq_app.window.new_session import SessionForm, Unfinished, subject_texts, unfinished
+from daq_app.window.state import Message
 from daq_app.window.subject import SubjectText, translator
 from daq_app.window.view import BenchView, bench_summary
 from daq_app.wording import tr
@@ -84,7 +84,6 @@ class CutShort(Panel):
         threading.Thread(target=look, daemon=True).start()
 
     def show_sessions(self, sessions: tuple[Unfinished, ...]) -> None:
-        """Offer these sessions."""
         if sessions != self._shown:
             self._shown = sessions
             self._sessions.clear()

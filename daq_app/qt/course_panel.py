@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 from daq_app.qt.parts import EntryLine, Panel, bare, button, hbox, label, say, stacked, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
-from daq_app.window.messages import Message
+from daq_app.window.state import Message
 from daq_app.window.view_course import Button, CourseView, PlanRow
 from daq_app.wording import tr, tr_noop
 from sessions.run import steps
@@ -56,11 +56,9 @@ class CoursePanel(Panel):
 
     @property
     def asking(self) -> bool:
-        """Say whether a reason or note is being typed."""
         return self._bottom.currentIndex() == 1
 
     def show_view(self, view: CourseView) -> None:
-        """Show the course."""
         before, self._view = self._view, view
         waiting = tr("waiting {timer}", timer=view.timer) if view.timer else ""
         say(self._timer, waiting, tr("Time since this was asked:"))
@@ -126,7 +124,7 @@ class CoursePanel(Panel):
             if row.kind == "current":
                 self.plan.scrollToItem(item, QListWidget.ScrollHint.EnsureVisible)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Fold the picture of the subject's page where the plan needs the room."""
         super().resizeEvent(event)
         self.mirror.open.set_room(self.height() >= self._roomy)

@@ -56,7 +56,6 @@ class Sight(QObject):
         self.changed.emit()
 
     def set_line(self, line: Line | None) -> None:
-        """Draw a line [mm], or none."""
         self.line = line
         self.changed.emit()
         self.cut.emit()
@@ -134,25 +133,22 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
         painter.end()
 
     def size_with(self, head: str) -> QSize:
-        """Return the size of what is drawn with a `head` over it."""
         return self.size() + QSize(0, ceil(self._height_of(head)))
 
     def paint_finger(self, painter: QPainter) -> None:
-        """Paint the finger where the view box has it."""
         if self.frame is not None:
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
             painter.setFont(self._font)
             picture = FingerPainter(painter, self._tokens, self.view(), self._here(), self.frame, self._parts)
             picture.paint(self.look, self._shades[self.look.field.signed], self.sight.line)
 
-    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:  # noqa: ARG002, N802  Qt's name
-        """Write what is said of the finger over it."""
+    def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         painter.setFont(self._font)
         painter.setPen(QColor(self._tokens.quiet))
         words = QRectF(4.0, 0.0, self.width() - 8.0, self._above())
         painter.drawText(words, int(Qt.AlignmentFlag.AlignLeft | Qt.TextFlag.TextWordWrap), self._words)
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802  Qt's name
+    def paintEvent(self, event: QPaintEvent) -> None:
         """Draw a ring around all of it while it has the keyboard."""
         pg.GraphicsLayoutWidget.paintEvent(self, event)
         if self.hasFocus():
@@ -160,29 +156,25 @@ class FingerCanvas(pg.GraphicsLayoutWidget):
             painter.setPen(QPen(QColor(self._tokens.act), 2))
             painter.drawRect(self.rect().adjusted(1, 1, -1, -1))
 
-    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Take hold of the picture, or begin a line."""
+    def mousePressEvent(self, event: QMouseEvent) -> None:
         self._box.draws = self.sight.draws_line or bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
         pg.GraphicsLayoutWidget.mousePressEvent(self, event)
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Say what is under the pointer."""
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         pg.GraphicsLayoutWidget.mouseMoveEvent(self, event)
         self._pointer = event.position()
         self._probe()
 
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Show all of it."""
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         event.accept()
         self.sight.look_at(None)
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
-        """Say nothing of a place any more."""
+    def leaveEvent(self, event: QEvent) -> None:
         self._pointer = None
         self._probe()
         pg.GraphicsLayoutWidget.leaveEvent(self, event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Zoom with + and −, move with arrows, show all with Home, draw a line; leave other keys to the window."""
         key = Qt.Key(event.key())
         if key in (Qt.Key.Key_Plus, Qt.Key.Key_Equal):
@@ -282,8 +274,7 @@ class _Box(pg.ViewBox):
         self.translateBy(x=across * width, y=up * width)
         self._tell()
 
-    def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:  # noqa: ANN401, N802  pyqtgraph's name
-        """Move the picture, or draw a line."""
+    def mouseDragEvent(self, ev: Any, axis: int | None = None) -> None:  # noqa: ANN401  pyqtgraph has no types
         if not self.draws:
             pg.ViewBox.mouseDragEvent(self, ev, axis)
             return
@@ -302,12 +293,10 @@ class _FingerItem(pg.GraphicsObject):
         pg.GraphicsObject.__init__(self)
         self._canvas = canvas
 
-    def boundingRect(self) -> QRectF:  # noqa: N802  Qt's name
-        """Return all of the canvas."""
+    def boundingRect(self) -> QRectF:
         return QRectF(QPointF(), QSizeF(self._canvas.size()))
 
     def paint(self, painter: QPainter, *_: object) -> None:
-        """Paint it."""
         self._canvas.paint_finger(painter)
 
 

@@ -58,7 +58,6 @@ class FingerPainter:
     parts: Parts
 
     def paint(self, look: Look, shades: list[QColor], line: Line | None) -> None:
-        """Paint everything inside the box."""
         painter, ink, box = self.painter, QColor(self.tokens.text), self.box
         ground = self._placed(np.array([[0.0, 0.0]]))[0].y()
         painter.save()

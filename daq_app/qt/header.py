@@ -10,7 +10,7 @@ from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import Panel, button, hbox, label, regrade, say
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, font, theme_of
-from daq_app.window.messages import Message
+from daq_app.window.state import Message
 from daq_app.window.view import Banner, View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
@@ -42,7 +42,6 @@ class Header(QWidget):
         self._saved.setFixedWidth(QFontMetrics(font(SMALL, scale)).horizontalAdvance("saved 99.9 s ago "))
 
     def show_view(self, view: View) -> None:
-        """Show the top line."""
         say(self._heading, view.heading)
         say(self._device, f"{view.bench.name}: {view.bench.lamp_words}")
         say(self._language, name_of(view.subject.language), tr("language that the subject reads"))
@@ -54,7 +53,7 @@ class Header(QWidget):
         regrade(self._words, "wrong" if view.lamp.grade == "wrong" else "")
         say(self._saved, view.lamp.saved)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the lamp below the subject where the strip is too narrow for one row."""
         super().resizeEvent(event)
         wide = self.width() >= self._one_row
@@ -103,7 +102,6 @@ class Notice(Panel):
         self.setVisible(not folds or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:
-        """Show a sentence of the window's own."""
         self._warning = sentence
         self.show_view(self._banner, sentence)
 
@@ -134,7 +132,6 @@ class ToDo(Panel):
         hbox(self._arrow, (self.sentence, 1), self._buttons, on=self, margins=room, spacing=2 * GRID)
 
     def show_what(self, sentence: str, primary: Button | None, direction: int) -> None:
-        """Show a sentence, its button and the stroke's direction."""
         say(self.sentence, sentence)
         self._arrow.show_direction(direction)
         self._arrow.setVisible(direction != 0 or not self._small)
@@ -174,8 +171,7 @@ class Arrow(QWidget):
             self.setToolTip(self.accessibleName())
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the arrow."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         if not self._direction:
             return
         painter = QPainter(self)

@@ -178,7 +178,7 @@ class Keyboard(QObject):
             case "text":
                 return False
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802  Qt's name
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         """Give the keys of the plan and of the subject's window to whom they are meant for."""
         if event.type() != QEvent.Type.KeyPress or not isinstance(event, QKeyEvent) or self._subject.measuring:
             return False

@@ -13,15 +13,15 @@ from daq_app.qt.live_plot import Curve, LivePlot
 from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, vbox
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font
-from daq_app.window.course_state import Mark, picture_end
+from daq_app.window.course_state import PICTURE, Mark, picture_end
 from daq_app.window.live_feed import LiveFeed
 from daq_app.window.live_model import MODEL_CHANNELS, ModelTrace, model_words
 from daq_app.window.live_model_process import LiveModel
 from daq_app.window.live_trace import CHANNELS, PlotScale
-from daq_app.wording import tr, tr_noop
+from daq_app.wording import quantity, tr, tr_noop
 
 LENGTHS = (1, 2, 5, 10, 20, 60)  # what can be shown [s]
-READ = (("N", "N", 2, N), ("T", "N", 2, T), ("mu", "", 2, MU), ("speed", "mm/s", 0, ""))
+COLOURS = {"N": N, "T": T, "mu": MU}  # under the captions of the numbers
 SIZES = ((TITLE, "title"), (TEXT, "value"), (SMALL, "tight"))  # of the numbers: the first for which there is room
 LEAST_FOR_ACTS = 170  # a lower panel has room for the numbers alone, before the font's scale [px]
 NAMES = {  # as spoken
@@ -87,18 +87,15 @@ class LiveBar(QWidget):
 
     def show_numbers(self, values: NDArray[np.float64]) -> None:
         """Show the means of the last readings (channels, n)."""
-        for channel, unit, digits, _ in READ:
+        for channel, form in PICTURE.items():
             known = values[CHANNELS.index(channel)]
             known = known[np.isfinite(known)]
-            # Adding nothing makes a zero of what would be a minus zero.
-            text = f"{round(float(known.mean()), digits) + 0.0:.{digits}f} {unit}".strip() if len(known) else "–"
-            text = text.replace("-", "−")
+            text = quantity(float(known.mean()) if len(known) else None, *form)
             if text != self.values[channel].text():
                 say(self.values[channel], text)
                 self.values[channel].setAccessibleName(spoken(channel, text))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Hide the last numbers, and shorten the buttons, where the bar is too narrow for them."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
@@ -136,19 +133,19 @@ class LiveBar(QWidget):
         return metrics.horizontalAdvance(WIDEST[channel]) + 4
 
     def _numbers(self) -> QHBoxLayout:
-        for channel, _, _, colour in READ:
+        for channel in PICTURE:
             value = label("–", "title")
             value.setFixedWidth(self._widest(channel, TITLE))
             value.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
             value.setAccessibleName(spoken(channel, "–"))
             caption = label(short_name(channel), "quiet")
-            if colour:
-                caption.setStyleSheet(f"border-bottom: 3px solid {colour};")
+            if channel in COLOURS:
+                caption.setStyleSheet(f"border-bottom: 3px solid {COLOURS[channel]};")
             self.values[channel] = value
             self._pairs.append((caption, value))
         # Where there is room, a caption stands nearer to its own number than to another.
         spread = [part for pair in self._pairs for part in (1, *pair)]
-        return hbox(*spread[1:], len(READ), spacing=GRID)
+        return hbox(*spread[1:], len(PICTURE), spacing=GRID)
 
 
 def spoken(channel: str, text: str) -> str:
@@ -221,7 +218,6 @@ class LivePanel(Panel):
             self.bar.show_forces(shown)
 
     def show_seconds(self, seconds: int) -> None:
-        """Show the last so many seconds."""
         self._seconds = seconds
         for plot in (*self.plots, self._model_plot):
             plot.show_axis(seconds)
@@ -234,7 +230,6 @@ class LivePanel(Panel):
             self.show_seconds(LENGTHS[at])
 
     def show_finite(self, finite: bool) -> None:
-        """Follow the finger at finite strain, or at small strain."""
         self.bar.finite.setChecked(finite)
         self._model.follow_at("finite" if finite else "small")
 
@@ -300,8 +295,7 @@ class LivePanel(Panel):
         picture, row = (None, np.empty(0)) if shown is None else (shown.picture, shown.row)
         self.finger.show_model(picture, row, words, clock)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Take the room there is; what there is none for is folded."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         for act in (self.bar.finite, self.bar.length, self.bar.hold):  # their keys still serve
             act.setVisible(self.height() >= self._least_for_acts)

@@ -61,8 +61,7 @@ class ContactMap(PaintedWidget):
         self.setAccessibleName(tr("centre of pressure on the sample: {where}", where=where))
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Copy the sample, and paint the trail upon it."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = self.painter_on_ground()
         per_mm = self._per_mm()
         if not len(self._trail) or per_mm <= TOO_SMALL:
@@ -93,7 +92,6 @@ class ContactMap(PaintedWidget):
         return QPointF(min(self.width() / 2, room - ACROSS * self._per_mm() / 2), self.height() / 2)
 
     def draw_ground(self) -> QPixmap:
-        """Return sample, grid, words and arrow."""
         t = self.theme
         picture = blank(self, t.surface)
         per_mm = self._per_mm()
@@ -168,8 +166,7 @@ class FingerView(QWidget):
         self.setToolTip(words.words)
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint words, finger and row."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter, t = QPainter(self), theme_of(self)
         painter.fillRect(self.rect(), QColor(t.surface))
         painter.setFont(font(SMALL, self._scale, bold=self._words.state in ("settled", "instead", "beyond")))

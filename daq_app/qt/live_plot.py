@@ -4,7 +4,7 @@ Painted by hand: what stands still is painted once and copied, curves are lines 
 a fraction of what a scene of items does (docs/decisions/2026-11-21-the-live-plots-are-painted.md).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,7 +46,7 @@ class LivePlot(PaintedWidget):
         curves: Sequence[Curve],
         scale: PlotScale,
         type_scale: float,
-        channels: Sequence[str] = CHANNELS,
+        channels: Iterable[str] = CHANNELS,
     ) -> None:
         """Show nothing yet; `channels` names the rows of what will be shown."""
         super().__init__()
@@ -84,8 +84,7 @@ class LivePlot(PaintedWidget):
         self._scale = scale
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Copy what stands still, and draw the rest upon it."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = self.painter_on_ground()
         inside = self._inside()
         painter.setClipRect(inside)
@@ -112,7 +111,6 @@ class LivePlot(PaintedWidget):
         return self._scale.low - beyond, self._scale.high + beyond
 
     def draw_ground(self) -> QPixmap:
-        """Return axes, grid, numbers and names."""
         picture = blank(self, self.theme.surface)
         painter = QPainter(picture)
         painter.setFont(font(SMALL, self._type_scale))

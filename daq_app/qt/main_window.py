@@ -27,8 +27,8 @@ from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.recorder.messages import AcknowledgeOverloads, Tare
 from daq_app.window.checklist import first_missing, headline
-from daq_app.window.messages import NewSession
 from daq_app.window.new_session import Bench, Refused, SessionForm, bench_of, checked, pilot_form
+from daq_app.window.state import NewSession
 from daq_app.window.view import View
 from daq_app.window.view_course import Button
 from daq_app.wording import tr
@@ -92,12 +92,10 @@ class MainWindow(QMainWindow):
         self._line_changed()
         self._fit()
 
-    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
-        """Return the size the window opens with."""
+    def sizeHint(self) -> QSize:
         return QSize(1440, 860)
 
     def show_view(self, view: View) -> None:
-        """Show what is known now."""
         course = view.course
         self.header.show_view(view)
         self.notice.show_view(view.banner, "" if course is None else course.notice)
@@ -161,7 +159,6 @@ class MainWindow(QMainWindow):
         }
 
     def go_to(self, room: Room) -> None:
-        """Show a room, where it can be."""
         self.rooms.go_to(room)
         if room != "review":
             (self.page.subject if self.rooms.room == "prepare" else self).setFocus()
@@ -173,17 +170,15 @@ class MainWindow(QMainWindow):
         else:
             self.middle.leave()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Obey the keys; those of a field that is typed in never come here."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if not self.keyboard.press(event):
             super().keyPressEvent(event)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Fold what there is no room for."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
         now = self.bridge.state.now
         if self.bridge.recording and now - self._close_asked > LEAVING:
@@ -330,6 +325,6 @@ class MainWindow(QMainWindow):
 class _Panels(QHBoxLayout):
     """The panels beside each other: only where the window is lower than their least heights are they scrolled."""
 
-    def hasHeightForWidth(self) -> bool:  # noqa: N802  Qt's name
+    def hasHeightForWidth(self) -> bool:
         """Say no: a scroll area would give panels with words that wrap the height that they like best."""
         return False

@@ -12,11 +12,9 @@ from daq_app.qt.live_panel import PLOTS, LivePanel, short_name, spoken
 from daq_app.qt.live_plot import LivePlot
 from daq_app.qt.parts import Panel, Wrapped, button, hbox, label, named, regrade, say, scrolled, stacked, vbox
 from daq_app.qt.tokens import GRID, SMALL, TARGET
-from daq_app.window.course_state import Mark
+from daq_app.window.course_state import PICTURE, Mark
 from daq_app.window.live_trace import Columns
-from daq_app.window.stroke_quality import PICTURE
-from daq_app.window.view_course import CourseView, StrokeView
-from daq_app.window.view_trials import KINDS, Inspection, Tile, inspection
+from daq_app.window.view_course import KINDS, CourseView, Inspection, StrokeView, Tile, inspection
 from daq_app.wording import tr
 
 # Grades of the style sheet: of tiles, and of strokes.
@@ -44,7 +42,6 @@ class TrialStrip(QScrollArea):
         self.setFixedHeight(max(lines, TARGET) + 12 + GRID // 2)  # with the scroll bar
 
     def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
-        """Show the trials."""
         if tiles == self._shown:
             return
         while len(self.tiles) > len(tiles):
@@ -102,7 +99,6 @@ class InspectedTrial(QWidget):
         vbox(head, self.verdict, self.details, cells, *plots, 0, on=self, spacing=GRID // 2)
 
     def show_trial(self, shown: Inspection) -> None:
-        """Show a trial."""
         if shown == self._shown:
             return
         self._shown = shown
@@ -197,7 +193,6 @@ class Middle(QWidget):
             self.inspect(number)
 
     def leave(self) -> None:
-        """Go back to the signals."""
         if self.inspected is not None:
             self.inspect(self.inspected)
 

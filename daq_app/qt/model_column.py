@@ -6,7 +6,7 @@ from pathlib import Path
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFileDialog, QTabWidget, QWidget
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import (
     common_range,
     compared,
@@ -103,7 +103,6 @@ class ModelColumn(QWidget):
         vbox(self.tabs, on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        """Show what is known now."""
         before, self._state = self._state, state
         film = shown_film(state)
         if film is not self._film:

@@ -12,8 +12,8 @@ from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, la
 from daq_app.qt.screens import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
-from daq_app.window.messages import LanguageChosen, Message
 from daq_app.window.new_session import AXES, Bench, SessionForm, enrolled, enrolment, offered, place_of
+from daq_app.window.state import LanguageChosen, Message
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Hand
 from sessions.plan.protocols import protocol_names
@@ -104,7 +104,6 @@ class NewSessionPage(Panel):
             line.textChanged.connect(self._place_changed)
 
     def form(self) -> SessionForm:
-        """Return what stands on the page."""
         return SessionForm(
             subject=self.subject.text(),
             protocol=self.protocol.currentText(),
@@ -125,7 +124,6 @@ class NewSessionPage(Panel):
         )
 
     def show_bench(self, bench: Bench) -> None:
-        """Offer what the bench allows."""
         # A simulated bench knows where its face lies.
         self._height.setVisible(self.with_forces.isChecked() and bench.frame is None)
         self._area.setVisible(self.with_forces.isChecked())
@@ -151,7 +149,6 @@ class NewSessionPage(Panel):
         self._show_screen()
 
     def show_tablet(self, words: str, missing: str, picture: bytes) -> None:
-        """Do as `ScreenFields` says."""
         self.screen_fields.show_tablet(words, missing, picture)
         self._show_screen()
 
@@ -284,13 +281,13 @@ class NewSessionPage(Panel):
         self._two = round(TWO * scale)
         self.setMinimumWidth(round(280 * min(scale, 1.25)))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the cards in two columns where there is room."""
         super().resizeEvent(event)
         wide = self.width() >= self._two
         self._columns.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+    def changeEvent(self, event: QEvent) -> None:
         """Look for studies anew where the window is turned to: another program may have made one."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ActivationChange:

@@ -104,8 +104,7 @@ class PaintedWidget(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)  # nothing behind it needs painting
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Paint the ground for the new size."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.forget_ground()
 
@@ -114,7 +113,6 @@ class PaintedWidget(QWidget):
         self._ground = None
 
     def redraw(self) -> None:
-        """Paint everything anew, the ground too."""
         self.forget_ground()
         self.update()
 
@@ -137,7 +135,6 @@ class Lamp(QWidget):
     """A lamp: a ring when off, a disc when well or recording, a triangle to look at, a square when wrong."""
 
     def __init__(self, name: str) -> None:
-        """Start switched off; `name` is said to screen readers."""
         super().__init__()
         self._grade: Grade = "off"
         self._name = name
@@ -145,15 +142,13 @@ class Lamp(QWidget):
         self.show_grade("off", "off")
 
     def show_grade(self, grade: Grade, words: str) -> None:
-        """Show a state and its words."""
         self.setAccessibleName(f"{self._name}: {words}")
         self.setToolTip(words)
         if grade != self._grade:
             self._grade = grade
             self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the shape of the state."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         t = theme_of(self)
         colour = {"off": t.quiet, "on": t.record, "well": t.quiet, "look": t.look, "wrong": t.wrong}[self._grade]
         painter = QPainter(self)

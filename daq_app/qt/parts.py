@@ -85,12 +85,11 @@ class Wrapped(QLabel):
             self._fit()
         self.setVisible(self._keeps_room or bool(text))
 
-    def hasHeightForWidth(self) -> bool:  # noqa: N802  Qt's name
+    def hasHeightForWidth(self) -> bool:
         """Say that its height is its own affair."""
         return False
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Take the height for another width."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         if event.size().width() != event.oldSize().width():
             self._least = self.fontMetrics().height() if self._keeps_room else 1
@@ -130,18 +129,16 @@ class _Choice(QComboBox):
         self._label.setBuddy(self)
         self._label.hide()
 
-    def sizeHint(self) -> QSize:  # noqa: N802  Qt's name
-        """Return at least the height of a target."""
+    def sizeHint(self) -> QSize:
         return super().sizeHint().expandedTo(QSize(0, TARGET))
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+    def changeEvent(self, event: QEvent) -> None:
         """Move the label to the parent that the list is given."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.ParentChange:
             self._label.setParent(self.parentWidget())
 
-    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802  Qt's name
-        """Leave the wheel to the page."""
+    def wheelEvent(self, event: QWheelEvent) -> None:
         event.ignore()
 
 
@@ -157,12 +154,10 @@ class EntryLine(QLineEdit):
     """A line that keeps Enter and Esc to itself: Enter there is not the window's primary button."""
 
     def __init__(self, keep: Callable[[], None], left: Callable[[], None]) -> None:
-        """Call `keep` at Enter and `left` at Esc."""
         super().__init__()
         self._keep, self._left = keep, left
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Take the two keys; type the others."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self._keep()
         elif event.key() == Qt.Key.Key_Escape:
@@ -314,13 +309,11 @@ class Openness:
         return self._wanted if self.room else self._instead
 
     def set_room(self, room: bool) -> None:
-        """Say whether there is room."""
         if room != self.room:
             self.room, self._instead = room, False
             self._place()
 
     def toggle(self) -> None:
-        """Open or close it."""
         if self.room:
             self._wanted = not self._wanted
             settings().setValue(self._key, "yes" if self._wanted else "no")

@@ -2,7 +2,7 @@
 
 import io
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,7 +14,7 @@ from PySide6.QtGui import QImage, QPainter, QPaintEvent
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QProgressDialog, QPushButton, QSizePolicy, QWidget
 
-from daq_app.analyst.finger_words import NAMES, ComparedRow
+from daq_app.analyst.finger_words import NAMES, Compared
 from daq_app.qt.finger_canvas import FingerCanvas
 from daq_app.qt.parts import button, hbox, label, say, vbox
 from daq_app.qt.tables import TextTable
@@ -47,7 +47,6 @@ class SaveButtons(QWidget):
         self.set_name("")
 
     def set_name(self, name: str) -> None:
-        """Take the name of what is shown; "" for nothing."""
         self._name = name
         for widget in self.buttons:
             widget.setEnabled(bool(name))
@@ -87,13 +86,11 @@ class _Canvas(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_png(self, content: bytes, words: str) -> None:
-        """Show a picture, or words in its place."""
         self._image = QImage.fromData(content) if content else QImage()
         self._words = words
         self.update()
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint it."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         if self._image.isNull():
             painter.drawText(self.rect(), self._words)
@@ -120,7 +117,7 @@ class ComparedView(QWidget):
         vbox(hbox((self.words, 1), self.choose), (self.table, 1), (self.picture, 2), on=self)
         self.show_rows((), ("", ""))
 
-    def show_rows(self, rows: Sequence[ComparedRow], sessions: tuple[str, str]) -> None:
+    def show_rows(self, rows: Compared, sessions: tuple[str, str]) -> None:
         """Show the stimuli of two sessions, by their names."""
         there = bool(sessions[1])
         named = "\n".join(f"{name}: {session}" for name, session in zip("AB", sessions, strict=True))
@@ -128,11 +125,12 @@ class ComparedView(QWidget):
         self.table.setVisible(there)
         self.picture.setVisible(there)
         lines: list[tuple[str, ...]] = []
-        for row in rows:
-            cells = [f"{row.experiment} {row.index}"]
-            for name, pair in zip(NAMES, row.pairs, strict=True):
+        for stimulus, pairs in rows:
+            cells = [stimulus]
+            for name, (first, second) in zip(NAMES, pairs, strict=True):
                 digits = 1 if name == "score" else 3
-                values = (pair.first, ""), (pair.second, ""), (pair.difference, "+")
+                difference = None if first is None or second is None else second - first
+                values = (first, ""), (second, ""), (difference, "+")
                 cells += ["–" if one is None else f"{one:{sign}.{digits}f}".replace("-", "−") for one, sign in values]
             lines.append(tuple(cells))
         self.table.show_lines(tuple(lines))

@@ -96,14 +96,13 @@ class ZoomedPlot(pg.PlotWidget):
             for curve in curves:
                 self._names.addItem(curve, curve.name())
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Show all with Home; leave every other key to the window."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Home:
             self.reset()
         else:
             event.ignore()
 
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
         """Say what stands at the pointer, as far as the plot knows it."""
         pg.PlotWidget.mouseMoveEvent(self, event)
         box: Any = self.getPlotItem().getViewBox()
@@ -121,8 +120,7 @@ class ZoomedPlot(pg.PlotWidget):
         self.words.move(round(left), round(room.top()))
         self.words.show()
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
-        """Say nothing of a place any more."""
+    def leaveEvent(self, event: QEvent) -> None:
         self._hide_words()
         pg.PlotWidget.leaveEvent(self, event)
 
@@ -130,8 +128,7 @@ class ZoomedPlot(pg.PlotWidget):
         self.words.hide()
         self._pointer.hide()
 
-    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802  Qt's name
-        """Show all."""
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         event.accept()
         self.reset()
 
@@ -221,7 +218,6 @@ class FieldBar(QWidget):
 
     @property
     def field(self) -> FieldChoice:
-        """The field that is drawn."""
         return FIELD_CHOICES[max(self.which.currentIndex(), 0)]
 
     @property
@@ -236,7 +232,6 @@ class FieldBar(QWidget):
         return (ends[0], ends[1]) if self.mode == FIXED and ends[0] < ends[1] else automatic
 
     def fix(self, ends: Range) -> None:
-        """Fix the colours at these ends."""
         self._automatic = ends
         self.ranges.setCurrentIndex(FIXED)
         self._fix()

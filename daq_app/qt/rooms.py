@@ -28,7 +28,7 @@ from daq_app.qt.keys import KEYS
 from daq_app.qt.parts import Panel, button, hbox, label, vbox
 from daq_app.qt.preferences import name_of, recent_sessions, remember_session
 from daq_app.qt.tokens import GRID, theme_of
-from daq_app.window.messages import NewSession
+from daq_app.window.state import NewSession
 from daq_app.wording import EXPERIMENTER, languages, tr, tr_noop
 
 if TYPE_CHECKING:
@@ -127,7 +127,6 @@ class Menus:
         help_menu.addAction(tr("About daq-app"), lambda: about_box(window).show())
 
     def show_state(self, *, in_hand: bool, over: bool, opened: bool) -> None:
-        """Offer what can be done now."""
         for action in self.course:
             action.setEnabled(in_hand and not over)
         self.pilot.setEnabled(not in_hand)
@@ -207,7 +206,6 @@ class ReviewRoom(QWidget):
             self.open(listed[0])
 
     def choose(self) -> None:
-        """Ask for the folder of a session, and open it."""
         listed = recent_sessions()
         name = QFileDialog.getExistingDirectory(self, tr("Session folder"), str(listed[0].parent) if listed else ".")
         if name:
@@ -229,7 +227,6 @@ class ReviewRoom(QWidget):
         self.analyst.show()
 
     def leave(self) -> None:
-        """End the work on the session that is open."""
         if self.analyst is not None:
             self.analyst.close()
             self._row.removeWidget(self.analyst)
@@ -261,14 +258,12 @@ class Rooms(QStackedWidget):
 
     @property
     def room(self) -> Room:
-        """Return the room that is shown."""
         if self.currentIndex() == 1:
             return "review"
         return "prepare" if self._bridge.view.course is None else "run"
 
     @property
     def over(self) -> bool:
-        """Say whether the session in hand has ended."""
         session = self._bridge.state.session
         return session is not None and session.over
 
@@ -291,12 +286,10 @@ class Rooms(QStackedWidget):
         self.show_state()
 
     def choose(self) -> None:
-        """Ask for a session, and open it."""
         self._entered().choose()
         self.show_state()
 
     def open(self, folder: Path) -> None:
-        """Look at a recorded session."""
         self._entered().open(folder)
         self.show_state()
 

@@ -27,7 +27,6 @@ class Millimetres:
 
     @property
     def words(self) -> str:
-        """Return where it comes from."""
         return "checked with a ruler" if self.checked else "as the screen says, not checked with a ruler"
 
 
@@ -95,7 +94,6 @@ class RulerCheck(QWidget):
         vbox(sentence, 1, hbox(1, self._line, 1), 1, row, self._wrong, on=self, margins=4 * GRID)
 
     def begin(self, screen: QScreen) -> None:
-        """Check this screen."""
         self._screen = screen
         self._line.set_pixels_per_mm(millimetres(screen).pixels)
         self._measured.setText("100")

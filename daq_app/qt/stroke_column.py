@@ -6,7 +6,7 @@ from PySide6.QtCore import QSettings, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QFontMetrics, QUndoCommand, QUndoStack
 from PySide6.QtWidgets import QFormLayout, QLineEdit, QTabWidget, QWidget
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.session_words import FRICTION_HEAD, friction_table, numbers
 from daq_app.analyst.state import AnalystState, chosen
 from daq_app.analyst.stroke import Edge, History
@@ -70,7 +70,6 @@ class StrokeColumn(QWidget):
         vbox((self.stroke, 4), row, self.decisions, (self.tabs, 3), on=self, spacing=GRID // 2)
 
     def show_state(self, state: AnalystState) -> None:
-        """Show what is known now."""
         row = chosen(state)
         stroke = None if row is None else row.stroke
         if stroke is not self._stroke:
@@ -94,7 +93,6 @@ class StrokeColumn(QWidget):
                 self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
 
     def go_to_window(self) -> None:
-        """Go to the handle where the steady window begins."""
         self.stroke.handles["steady begin"].setFocus()
 
     def go_to_readings(self) -> None:
@@ -106,7 +104,6 @@ class StrokeColumn(QWidget):
             self.readings.go_to(int(readings.time.searchsorted(self._stroke.steady[0])))
 
     def go_to_numbers(self) -> None:
-        """Go to the numbers."""
         self.tabs.setCurrentIndex(NUMBERS)
         self._scroll.setFocus()
 
@@ -209,11 +206,9 @@ class DecisionsBar(QWidget):
         vbox(row, self.sentences_label, on=self, spacing=GRID // 2)
 
     def who(self) -> str:
-        """Return the code of who decides."""
         return self.by.text().strip() or NOBODY
 
     def reason(self) -> str:
-        """Return why."""
         return self.why.text().strip() or DRAGGED
 
     def _ask(self, again: bool) -> None:

@@ -48,8 +48,7 @@ class EdgeHandle(QPushButton):
         self._time = time
         self._show()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Move by the arrows, record with Enter, go back with Esc."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         far = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
         match event.key():
             case Qt.Key.Key_Left:
@@ -63,7 +62,7 @@ class EdgeHandle(QPushButton):
             case _:
                 super().keyPressEvent(event)
 
-    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802  Qt's name
+    def focusOutEvent(self, event: QFocusEvent) -> None:
         """Go back to where it was: only Enter records."""
         if self._away:
             self._back()
@@ -140,7 +139,6 @@ class StrokeView(QWidget):
         self.show_stroke(None)
 
     def show_stroke(self, stroke: StrokeFinding | None) -> None:
-        """Show a stroke, or nothing."""
         trace = None if stroke is None else stroke.trace
         other = self._stroke is None or stroke is None or stroke.number != self._stroke.number
         self._stroke = stroke
@@ -199,7 +197,6 @@ class StrokeView(QWidget):
                 line.setPos(now)
 
     def show_edges(self) -> None:
-        """Show every edge where it is."""
         placed = {} if self._stroke is None else {one.edge: one for one in edges_of(self._stroke)}
         for edge in EDGES:
             one = placed.get(edge)

@@ -55,14 +55,13 @@ class SubjectPicture(QWidget):
         self.page.hide()
         self.update()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+    def changeEvent(self, event: QEvent) -> None:
         """Draw the page anew in another theme, once its window has it too."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.StyleChange and (view := self._view) is not None:
             QTimer.singleShot(0, self, lambda: self._draw(view))
 
-    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: ARG002, N802  Qt's name
-        """Paint the picture in the middle, with a line around it."""
+    def paintEvent(self, event: QPaintEvent) -> None:
         if self._picture.isNull():
             return
         ratio = self.devicePixelRatioF()
@@ -194,8 +193,7 @@ class SubjectPreview(QDialog):
 class _Pages(QListWidget):
     """A list in which the keys that turn pages turn them too."""
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Turn a page; every other key is the list's own."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         step = STEPS.get(Qt.Key(event.key()))
         if step is None:
             super().keyPressEvent(event)

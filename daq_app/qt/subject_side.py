@@ -20,7 +20,7 @@ from daq_app.tablet.dialogue import AnswerGiven, Dialogue, Force, FromTablet, He
 from daq_app.tablet.server import TabletServer, own_address
 from daq_app.window.course_state import SessionState
 from daq_app.window.live_trace import LiveTrace
-from daq_app.window.messages import Message
+from daq_app.window.state import Message
 from daq_app.window.subject import SubjectView, translator
 from daq_app.window.view import View
 from daq_app.wording import tr
@@ -75,12 +75,10 @@ class TabletScreen(QObject):
         return "" if self.server.connected else self.words
 
     def show_view(self, view: SubjectView, session: SessionState | None) -> None:
-        """Show what is to be done now."""
         mirrored = direction(view.language) == Qt.LayoutDirection.RightToLeft
         self._dialogue.show(view, session, translator(view.language), mirrored=mirrored)
 
     def show_force(self, trace: LiveTrace) -> None:
-        """Show how hard the finger presses."""
         part, now = min(max(newest_force(trace) / FULL, 0.0), 1.0), time.monotonic()
         if now - self._last_sent >= FORCE_EVERY and round(part * STEPS) != round(self._part * STEPS):
             self._part, self._last_sent = part, now
@@ -156,7 +154,6 @@ class SubjectSide(QObject):
             self._bring()
 
     def show_force(self) -> None:
-        """Show how hard is pressed, where the subject is to see it."""
         trace = self._bridge.feed.trace
         if self._tablet is not None and self._bridge.view.subject.force:
             self._tablet.show_force(trace)

@@ -66,12 +66,10 @@ class SubjectWindow(QWidget):
 
     @property
     def scoring(self) -> bool:
-        """Say whether an answer is waited for."""
         return self._view is not None and self._view.asks
 
     @property
     def asks(self) -> Kind:
-        """Return what the subject is asked for."""
         return "read" if self._view is None else self._view.kind
 
     @property
@@ -121,8 +119,7 @@ class SubjectWindow(QWidget):
             if layout.totalHeightForWidth(self.width()) <= self.height():
                 return
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Let the texts fit the room there is."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._fit_type()
 
@@ -159,7 +156,7 @@ class SubjectWindow(QWidget):
         self.line.set_pixels_per_mm(millimetres(self.screen()).pixels)
         self._scale.fit()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         """Let Enter be Next, and every other key of the line go to the line."""
         if self.scoring and not self.measuring and event.key() in GIVING:
             self.take_key(event)
@@ -175,7 +172,7 @@ class SubjectWindow(QWidget):
         else:
             QApplication.sendEvent(self._way.focusProxy() or self._way, event)
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+    def showEvent(self, event: QShowEvent) -> None:
         """Follow the window to screens of another size from now on."""
         super().showEvent(event)
         # Not on a move: that event comes before the screen is the other one.
@@ -186,13 +183,13 @@ class SubjectWindow(QWidget):
         self.fit_screen()
         self.screen_changed.emit()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802  Qt's name
+    def changeEvent(self, event: QEvent) -> None:
         """Follow a change of the screen's scaling."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.DevicePixelRatioChange:
             self.fit_screen()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802  Qt's name
+    def closeEvent(self, event: QCloseEvent) -> None:
         """Only hide: an answer that is being given is not lost."""
         event.ignore()
         self.hide()
@@ -272,13 +269,11 @@ class _Scale(QWidget):
             end.setMargin(GRID)  # keeps the words apart; Arabic letters reach beyond the height of the label's own font
 
     def show_ends(self, ends: tuple[str, str]) -> None:
-        """Show what the two ends mean."""
         for shown, words in zip(self._ends, ends, strict=True):
             say(shown, words)
         self.fit()
 
     def set_type(self, size: float, scale: float) -> None:
-        """Set the words in letters of a size."""
         for end in self._ends:
             _set_type(end, size, scale)
         self.fit()
@@ -296,8 +291,7 @@ class _Scale(QWidget):
         self.setFixedHeight(line.height() + tallest + GRID)
         self.setMinimumWidth(line.width())
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802  Qt's name
-        """Take the room there is."""
+    def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.fit()
 

@@ -30,7 +30,6 @@ class CopiedTable(QTableView):
     """A table that is read; Ctrl+C copies the selected range as tab-separated values."""
 
     def __init__(self, name: str) -> None:
-        """Show no line yet; screen readers say `name`."""
         super().__init__()
         self.setAccessibleName(name)
         self.setTabKeyNavigation(False)
@@ -38,8 +37,7 @@ class CopiedTable(QTableView):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.verticalHeader().hide()
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Copy; leave every other key to the table."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy):
             QGuiApplication.clipboard().setText(self.selected_text())
         else:
@@ -60,8 +58,7 @@ class CopiedTable(QTableView):
 class _ByNumber(QSortFilterProxyModel):
     """Sorts numbers by their value, whatever stands after them."""
 
-    def lessThan(self, left: Index, right: Index) -> bool:  # noqa: N802  Qt's name
-        """Say which of two cells comes first."""
+    def lessThan(self, left: Index, right: Index) -> bool:
         return sort_key(str(left.data())) < sort_key(str(right.data()))
 
 
@@ -71,7 +68,6 @@ class TextTable(CopiedTable):
     chosen = Signal(int)  # its number before any sorting
 
     def __init__(self, name: str, head: Sequence[str]) -> None:
-        """Show no line yet; screen readers say `name`."""
         super().__init__(name)
         self._shown: tuple[tuple[str, ...], ...] = ()
         self._cells = QStandardItemModel(0, len(head), self)
@@ -84,7 +80,6 @@ class TextTable(CopiedTable):
         self.selectionModel().currentRowChanged.connect(self._went)
 
     def show_lines(self, lines: tuple[tuple[str, ...], ...], at: int = -1) -> None:
-        """Show lines, and stand at one of them."""
         if lines != self._shown:
             self._shown = lines
             with QSignalBlocker(self.selectionModel()):
@@ -148,13 +143,12 @@ class ReadingsTable(QWidget):
             widest = max(head, *(metrics.horizontalAdvance(str(text)) for text in texts), 0)
             self.table.setColumnWidth(column, round(1.15 * widest) + 2 * GRID)  # steady ones are bold
 
-    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802  Qt's name
+    def showEvent(self, event: QShowEvent) -> None:
         """Fit the columns to the type, which is known by now."""
         super().showEvent(event)
         self._fit_columns()
 
     def go_to(self, row: int) -> None:
-        """Show one reading."""
         if 0 <= row < self._model.rowCount():
             self.table.selectRow(row)
             self.table.scrollTo(self._model.index(row, 0), QTableView.ScrollHint.PositionAtCenter)
@@ -171,27 +165,22 @@ class _Model(QAbstractTableModel):
         self._bold.setBold(True)
 
     def show_readings(self, readings: RawReadings | None, steady: tuple[float, float] | None) -> None:
-        """Take other readings."""
         self.beginResetModel()
         self._readings, self._steady = readings, steady
         self.endResetModel()
 
-    def rowCount(self, parent: Index | None = None) -> int:  # noqa: ARG002, N802  Qt's name
-        """Return the number of readings."""
+    def rowCount(self, parent: Index | None = None) -> int:
         return 0 if self._readings is None else len(self._readings)
 
-    def columnCount(self, parent: Index | None = None) -> int:  # noqa: ARG002, N802  Qt's name
-        """Return the number of columns."""
+    def columnCount(self, parent: Index | None = None) -> int:
         return len(HEAD) + 8
 
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401, N802
-        """Return the name of a column."""
+    def headerData(self, section: int, orientation: Qt.Orientation, role: int = 0) -> Any:  # noqa: ANN401
         if role != Qt.ItemDataRole.DisplayRole or orientation != Qt.Orientation.Horizontal:
             return None
         return (*map(tr, HEAD), *(tr("raw {channel}", channel=n) for n in range(1, 7)), "N [N]", "T [N]")[section]
 
     def data(self, index: Index, role: int = 0) -> Any:  # noqa: ANN401  whatever a role asks for
-        """Return a number as text."""
         r = self._readings
         if r is None:
             return None

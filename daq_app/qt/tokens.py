@@ -1,7 +1,9 @@
 """Colours, sizes and type of the window: one set of tokens for light and dark, and the style sheet made of it."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from string import Template
 from unicodedata import category, normalize
 
 from PySide6.QtCore import Qt
@@ -11,6 +13,7 @@ from PySide6.QtWidgets import QWidget
 GRID = 8  # everything keeps to multiples of it [device-independent pixels]
 TARGET = 40  # least height of what is clicked or touched
 SMALL, TEXT, TITLE, HEADLINE = 13, 15, 20, 32  # type, before the system's font scale
+STYLE = Path(__file__).with_name("style.qss")  # names of tokens and sizes stand after a $
 USUAL_POINTS = 10.0  # size of a system's interface font that asks for no scaling
 
 # Okabe and Ito's palette, distinct with every common colour blindness.
@@ -35,20 +38,14 @@ class Tokens:
     record: str  # the recording lamp
 
 
-_COLOURS = {  # of the light and of the dark theme
-    "ground": ("#eceeef", "#16191b"),
-    "surface": ("#f8f9f9", "#1e2224"),
-    "raised": ("#ffffff", "#2a2f32"),
-    "line": ("#c3c8cb", "#454c50"),
-    "text": ("#14181a", "#eef1f2"),
-    "quiet": ("#535c61", "#a4adb2"),
-    "act": ("#0b5a8a", "#7cc4f0"),
-    "on_act": ("#ffffff", "#0b1a24"),
-    "wrong": ("#b3261e", "#ff8a80"),
-    "look": ("#8a5a00", "#f3c15c"),
-    "record": ("#c5221f", "#ff5a52"),
-}
-LIGHT, DARK = (Tokens(dark=bool(at), **{name: pair[at] for name, pair in _COLOURS.items()}) for at in (0, 1))
+LIGHT = Tokens(
+    dark=False, ground="#eceeef", surface="#f8f9f9", raised="#ffffff", line="#c3c8cb", text="#14181a", quiet="#535c61",
+    act="#0b5a8a", on_act="#ffffff", wrong="#b3261e", look="#8a5a00", record="#c5221f",
+)  # fmt: skip
+DARK = Tokens(
+    dark=True, ground="#16191b", surface="#1e2224", raised="#2a2f32", line="#454c50", text="#eef1f2", quiet="#a4adb2",
+    act="#7cc4f0", on_act="#0b1a24", wrong="#ff8a80", look="#f3c15c", record="#ff5a52",
+)  # fmt: skip
 
 
 def current_tokens() -> Tokens:
@@ -104,99 +101,13 @@ def palette(t: Tokens) -> QPalette:
 
 
 def style_sheet(t: Tokens, scale: float) -> str:
-    """Return the style sheet of every widget of the window."""
-    return _panels(t, scale) + _buttons(t, scale) + _fields(t)
-
-
-def _px(size: float, scale: float) -> str:
-    return f"{round(size * scale)}px"
-
-
-def _tall(size: int, scale: float, least: int) -> str:
-    """Return the least height of a button: that of a line of its type."""
-    return f"{max(least, QFontMetrics(font(size, scale)).height())}px"
-
-
-def _panels(t: Tokens, scale: float) -> str:
-    return f"""
-* {{ font-size: {_px(TEXT, scale)}; color: {t.text}; }}
-QWidget#window, QMainWindow {{ background: {t.ground}; border: none; }}
-QFrame[role="panel"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
-QFrame[role="strip"] {{ background: {t.surface}; border: 1px solid {t.line}; border-radius: 6px; }}
-QFrame[role="card"] {{ border: 1px solid {t.line}; border-radius: 6px; }}
-QLabel {{ background: transparent; }}
-QLabel[role="quiet"] {{ color: {t.quiet}; font-size: {_px(SMALL, scale)}; }}
-QLabel[role="tight"] {{ font-size: {_px(SMALL, scale)}; }}
-QLabel[role="value"] {{ font-size: {_px(TEXT, scale)}; }}
-QLabel[role="title"] {{ font-size: {_px(TITLE, scale)}; font-weight: 600; }}
-QLabel[role="section"] {{ color: {t.quiet}; font-size: {_px(SMALL, scale)}; font-weight: 600; }}
-QLabel[role="name"] {{ font-size: {_px(TEXT, scale)}; font-weight: 600; }}
-QLabel[role="headline"] {{ font-size: {_px(HEADLINE, scale)}; font-weight: 600; }}
-QLabel[role="simulated"] {{ color: {t.look}; font-weight: 700; border: 2px solid {t.look}; border-radius: 4px;
-  padding: 2px 8px; }}
-QLabel[grade="wrong"] {{ color: {t.wrong}; font-weight: 600; }}
-QLabel[grade="look"] {{ color: {t.look}; font-weight: 600; }}
-QFrame[role="banner"][grade="wrong"] {{ background: {t.wrong}; border-radius: 6px; }}
-QFrame[role="banner"][grade="wrong"] QLabel {{ color: {t.surface}; font-weight: 600; }}
-QFrame[role="banner"][grade="look"] {{ background: {t.surface}; border: 2px solid {t.look}; border-radius: 6px; }}
-"""
-
-
-def _buttons(t: Tokens, scale: float) -> str:
-    return f"""
-QPushButton {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 6px;
-  min-height: {_tall(TEXT, scale, TARGET - 10)}; padding: 4px 14px; }}
-QPushButton:hover {{ border-color: {t.quiet}; }}
-QPushButton:pressed {{ background: {t.line}; }}
-QComboBox:disabled {{ color: {t.quiet}; }}
-QLineEdit:disabled, QPushButton:disabled {{ color: {t.quiet}; background: {t.ground}; border-style: dashed; }}
-QPushButton:focus, QLineEdit:focus, QPlainTextEdit:focus, QListWidget:focus, QTreeWidget:focus {{
-  border: 2px solid {t.act}; }}
-QPushButton[role="primary"] {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; font-weight: 600;
-  font-size: {_px(TITLE, scale)}; min-height: {_tall(TITLE, scale, TARGET)}; padding: 8px 28px; }}
-QPushButton[role="primary"]:focus {{ border: 3px solid {t.text}; }}
-QPushButton[role="primary"]:disabled {{ background: {t.ground}; color: {t.quiet}; border: 2px dashed {t.line}; }}
-QPushButton:checked {{ border: 2px solid {t.act}; }}
-QPushButton[role="rail"] {{ padding: 6px 2px; font-size: {_px(SMALL, scale)}; background: transparent; border: none; }}
-QPushButton[role="rail"]:checked {{ background: {t.raised}; border: 2px solid {t.act}; }}
-QPushButton[role="small"] {{ padding: 4px 4px; }}
-QPushButton[role="tile"] {{ padding: 2px 6px; font-size: {_px(SMALL, scale)}; font-weight: 600; }}
-QPushButton[role="tile"][grade="wrong"] {{ color: {t.look}; border: 2px solid {t.look}; }}
-QPushButton[role="tile"][grade="current"] {{ border: 2px solid {t.text}; }}
-QPushButton[role="tile"][grade="coming"] {{ color: {t.quiet}; border-style: dashed; }}
-QPushButton[role="tile"]:checked {{ background: {t.act}; color: {t.on_act}; border: 2px solid {t.act}; }}
-QPushButton[role="tile"]:focus {{ border: 2px solid {t.act}; }}
-QPushButton[role="handle"] {{ padding: 4px 2px; font-size: {_px(SMALL, scale)}; }}
-"""
-
-
-def _fields(t: Tokens) -> str:
-    return f"""
-QMenuBar, QMenu {{ background: {t.surface}; }}
-QMenuBar::item:selected, QMenu::item:selected {{ background: {t.act}; color: {t.on_act}; }}
-QMenu::item:disabled {{ color: {t.quiet}; }}
-QLineEdit, QPlainTextEdit {{ background: {t.raised}; border: 1px solid {t.line};
-  border-radius: 4px; padding: 4px 8px; min-height: {TARGET - 12}px; selection-background-color: {t.act};
-  selection-color: {t.on_act}; }}
-QAbstractItemView {{ selection-background-color: {t.act}; selection-color: {t.on_act};
-  background: {t.surface}; alternate-background-color: {t.raised}; }}
-QListView::item:selected, QTreeView::item:selected, QTableView::item:selected {{ background: {t.act};
-  color: {t.on_act}; }}
-QComboBox QLineEdit {{ border: none; min-height: 0; padding: 0 6px; }}
-QComboBox QAbstractItemView {{ background: {t.raised}; }}
-QHeaderView::section {{ background: {t.ground}; color: {t.quiet}; border: 1px solid {t.line}; padding: 3px 6px; }}
-QProgressBar {{ background: {t.raised}; border: 1px solid {t.line}; border-radius: 4px; text-align: center; }}
-QProgressBar::chunk {{ background: {t.line}; }}
-QListWidget, QTreeWidget {{ background: {t.surface}; border: 2px solid transparent; }}
-QListWidget::item {{ padding: 3px 2px; }}
-QScrollBar:vertical {{ background: transparent; width: 12px; }}
-QScrollBar::handle:vertical {{ background: {t.line}; border-radius: 4px; min-height: 24px; margin: 2px; }}
-QScrollBar::add-line:vertical, QScrollBar::sub-line:vertical {{ height: 0; }}
-QScrollBar:horizontal {{ background: transparent; height: 12px; }}
-QScrollBar::handle:horizontal {{ background: {t.line}; border-radius: 4px; min-width: 24px; margin: 2px; }}
-QScrollBar::add-line:horizontal, QScrollBar::sub-line:horizontal {{ width: 0; }}
-QToolTip {{ background: {t.raised}; color: {t.text}; border: 1px solid {t.line}; padding: 4px; }}
-"""
+    """Return the style sheet of every widget of the window; a button is at least as high as a line of its type."""
+    sizes = {"small": SMALL, "text": TEXT, "title": TITLE, "headline": HEADLINE}
+    lengths = {f"px_{name}": round(size * scale) for name, size in sizes.items()}
+    tall = (("button", TEXT, TARGET - 10), ("primary", TITLE, TARGET))
+    lengths |= {f"tall_{name}": max(least, QFontMetrics(font(size, scale)).height()) for name, size, least in tall}
+    pixels = {name: f"{length}px" for name, length in (lengths | {"tall_field": TARGET - 12}).items()}
+    return Template(STYLE.read_text(encoding="utf-8")).substitute(asdict(t) | pixels)
 
 
 def missing_glyphs(texts: Iterable[str], font: QFont) -> str:

@@ -101,7 +101,6 @@ class TransportBar(QWidget):
 
     @property
     def playing(self) -> bool:
-        """Say whether it plays."""
         return self._transport.playing
 
     def set_times(self, times: Sequence[float], at: int = 0) -> None:
@@ -122,7 +121,6 @@ class TransportBar(QWidget):
             say(self.place, "")
 
     def toggle(self) -> None:
-        """Play, or pause."""
         if not len(self._times):
             return
         now = time.monotonic()
@@ -138,12 +136,10 @@ class TransportBar(QWidget):
             self.seek(min(max(self._shown + by, 0), len(self._times) - 1))
 
     def seek(self, at: int) -> None:
-        """Go to an instant."""
         self._transport = self._transport.sought(self._times[at], time.monotonic())
         self._show(self._times[at])
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802  Qt's name
-        """Obey Space, the arrows, Home and End."""
+    def keyPressEvent(self, event: QKeyEvent) -> None:
         match event.key():
             case Qt.Key.Key_Space:
                 self.toggle()

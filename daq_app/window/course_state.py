@@ -4,15 +4,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, cast, get_args
 
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
 from daq_app.recorder import messages as m
 from daq_app.recorder.messages import Kind
-from daq_app.window.messages import Judged, Message
-from daq_app.window.stroke_quality import Quality
 from daq_app.wording import tr, tr_noop
 from sessions.plan.plan import Block, SessionPlan, Trial
 from sessions.recording import LoggedEvent
 from sessions.run import steps
 from sessions.run.runner import SessionEnd, Status
+from sessions.strokes import FrictionParameters
 
 Phase = Literal[
     "idle", "resting", "mounting", "taring", "ready", "stroking", "scoring", "settling", "paused", "closing", "ended",
@@ -22,7 +25,46 @@ REPORTED: frozenset[str] = frozenset(get_args(Phase)) - {"resuming"}  # phases t
 IN_A_TRIAL = frozenset({"mounting", "taring", "ready", "stroking", "scoring", "settling"})
 Outcome = Literal["coming", "done", "skipped"]
 AFTER_LIFT = 1.0  # of unloaded readings stay beside a stroke that is shown: the way back to zero is seen [s]
+PICTURE = {"N": (2, "N"), "T": (2, "N"), "mu": (2, ""), "speed": (0, "mm/s")}  # its rows, with digits and unit
 MARKS = 40  # that are kept for the plots: more than a minute can hold
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokePicture:
+    """The course of a stroke with some time around it, n readings, as it is shown when its trial is inspected."""
+
+    time: NDArray[np.float64]  # (n,) [s, device time]
+    values: NDArray[np.float64]  # (4, n) rows of PICTURE: N, T [N], mu [-], speed [mm/s]; nan where it means nothing
+    onset: float | None  # [s, device time]
+    lift: float | None
+    means: tuple[float | None, ...]  # of the rows of PICTURE over the steady window
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """What is known of a stroke before it is scored. Provisional: the analysis of the recording is what counts."""
+
+    grade: Literal["good", "doubtful", "refused"]
+    words: tuple[str, ...]  # what is wrong, the worst first; none for a good stroke
+    sentences: tuple[str, ...]  # the same at length
+    steady: tuple[float, float] | None  # [s, device time]
+    mu: float | None  # mean of T/N over the steady window [-]
+    interval: tuple[float, float] | None
+    speed: float | None  # [mm/s]
+    fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
+    friction: FrictionParameters | None = None  # that the model is to get
+    normal_force: float | None = None  # mean over the steady window [N]
+    advice: str = ""  # what to do about the worst, one sentence
+    picture: StrokePicture | None = None
+    redo: bool = False  # another stroke mends the worst
+
+
+class Judged(Struct, frozen=True):
+    """The last stroke was looked at."""
+
+    trial: int
+    take: int
+    quality: Quality
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,13 +164,13 @@ def session_begun(begun: m.SessionBegun, now: float) -> SessionState:
     return replace(session, marks=())  # theirs is the clock of a stream that has ended
 
 
-def session_after(session: SessionState, message: Message, now: float) -> SessionState:
+def session_after(session: SessionState, message: object, now: float) -> SessionState:
     """Return the session after a message that came at `now` [s]; the same object where it does not concern it."""
     after = _after(session, message, now)
     return after if after.phase == session.phase else replace(after, since=now)
 
 
-def _after(session: SessionState, message: Message, now: float) -> SessionState:
+def _after(session: SessionState, message: object, now: float) -> SessionState:
     match message:
         case LoggedEvent():
             return _logged(session, message)
@@ -147,7 +189,7 @@ def _after(session: SessionState, message: Message, now: float) -> SessionState:
             return _shown(_ended(session, message), message)
 
 
-def _ended(session: SessionState, message: Message) -> SessionState:
+def _ended(session: SessionState, message: object) -> SessionState:
     match message:
         case m.SessionEnded(folder, end, resumable):
             return replace(_over(session), folder=folder, end=end, resumable=resumable)
@@ -187,7 +229,7 @@ def redo_targets(session: SessionState) -> tuple[TrialState, ...]:
     return (trial,) if first is None else (first, trial)
 
 
-def _shown(session: SessionState, message: Message) -> SessionState:
+def _shown(session: SessionState, message: object) -> SessionState:
     """Return the session after a command: what it asks for is what is waited for now."""
     match message:
         case steps.AskBegin():
@@ -209,7 +251,7 @@ def _shown(session: SessionState, message: Message) -> SessionState:
             return _noticed(session, message)
 
 
-def _noticed(session: SessionState, message: Message) -> SessionState:
+def _noticed(session: SessionState, message: object) -> SessionState:
     match message:
         case steps.ShowInstruction(block):
             return replace(session, block=block)

@@ -22,6 +22,7 @@ from sessions.strokes.settings import RatioSettings
 Array = NDArray[np.float64]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+LOADS = (*AXES, tr_noop("combined"))
 FLOOR = RatioSettings().force_floor  # ratio, speed and centre of pressure mean nothing below this normal force [N]
 LAG = 0.1  # the speed is the way of the centre of pressure over this time [s] ...
 SMOOTH = 0.05  # ... between two means over this one [s]
@@ -33,29 +34,27 @@ KEPT = 90.0  # readings of a take that are kept to be looked at, at most [s]
 class Load:
     """Shares of the rated range, the greatest of some readings; 1 is the rated load. nan where no range is stated."""
 
-    axes: tuple[float, ...] = (0.0,) * 6
-    combined: float = 0.0  # see `drivers.calibration.loads`
+    shares: tuple[float, ...] = (0.0,) * 7  # of LOADS, as `drivers.calibration.loads` has them
 
     def latched(self, other: "Load") -> "Load":
         """Return the greater of each share.
 
-        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0), 0.9).latched(Load((0.2,) * 6, 0.4)).axes
-        (0.2, 0.2, 0.9, 0.2, 0.2, 0.2)
+        >>> Load((0.1, 0.0, 0.9, 0.0, 0.0, 0.0, 0.9)).latched(Load((0.2,) * 6 + (0.4,))).shares
+        (0.2, 0.2, 0.9, 0.2, 0.2, 0.2, 0.9)
         """
-        pairs = zip(self.axes, other.axes, strict=True)
-        return Load(tuple(float(np.fmax(a, b)) for a, b in pairs), float(np.fmax(self.combined, other.combined)))
+        return Load(tuple(np.fmax(self.shares, other.shares).tolist()))
 
     @property
     def over(self) -> tuple[str, ...]:
         """Return the names of what is beyond its rated load."""
-        over = tuple(name for name, share in zip(AXES, self.axes, strict=True) if share > ALARM)
-        return (*over, tr_noop("combined")) if self.combined > ALARM_COMBINED else over
+        limits = (*(ALARM,) * 6, ALARM_COMBINED)
+        named = zip(LOADS, self.shares, limits, strict=True)
+        return tuple(name for name, share, limit in named if share > limit)
 
     @property
     def near(self) -> tuple[str, ...]:
         """Return the names of what is near its rated load, or beyond it."""
-        named = zip((*AXES, "combined"), (*self.axes, self.combined), strict=True)
-        return tuple(name for name, share in named if share > WARNING)
+        return tuple(name for name, share in zip(LOADS, self.shares, strict=True) if share > WARNING)
 
 
 def load_of(wrench: Array, rated: Array) -> Load:
@@ -63,10 +62,7 @@ def load_of(wrench: Array, rated: Array) -> Load:
 
     `wrench` is not zeroed: what strains the transducer includes its zero.
     """
-    if not len(wrench):
-        return Load()
-    greatest = loads(wrench, rated).max(axis=0)
-    return Load(tuple(greatest[:6].tolist()), float(greatest[6]))
+    return Load(tuple(loads(wrench, rated).max(axis=0).tolist())) if len(wrench) else Load()
 
 
 def together(reports: Iterable[Report]) -> Iterator[Report]:

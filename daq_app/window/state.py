@@ -4,23 +4,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
+from msgspec import Struct
 
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
-from daq_app.window.course_state import SessionState, session_after, session_begun
+from daq_app.window.course_state import Judged, SessionState, session_after, session_begun
 from daq_app.window.live_feed import Load
-from daq_app.window.messages import (
-    DevicesFound,
-    Dismissed,
-    DrawingFailed,
-    LanguageChosen,
-    LifeKnown,
-    Loaded,
-    Message,
-    NewSession,
-    Searching,
-    Tick,
-)
 from daq_app.wording import tr
 from drivers.catalog import Probe
 from drivers.transducer import Health, TransducerInfo
@@ -31,6 +20,62 @@ from sessions.recording import LoggedEvent
 Six = tuple[float, float, float, float, float, float]
 Link = Literal["none", "connecting", "open", "lost"]
 _FROM_RECORDER = frozenset(m.REPORTS)
+
+
+class Tick(Struct, frozen=True):
+    """Time has passed."""
+
+    now: float  # [s] of the machine's monotonic clock
+
+
+class Searching(Struct, frozen=True):
+    """Devices are being looked for."""
+
+
+class DevicesFound(Struct, frozen=True):
+    """What answered when devices were looked for."""
+
+    devices: tuple[Probe, ...]
+
+
+class Loaded(Struct, frozen=True):
+    """How far the readings that have just come load the transducer."""
+
+    load: Load
+
+
+class LifeKnown(Struct, frozen=True):
+    """What a serial number has been through was looked up."""
+
+    serial: str
+    life: Life | None
+
+
+class Dismissed(Struct, frozen=True):
+    """The experimenter has read the sentence of a failure."""
+
+
+class NewSession(Struct, frozen=True):
+    """The experimenter leaves a session that has ended, for the page where the next is begun."""
+
+
+class DrawingFailed(Struct, frozen=True):
+    """A picture could not be drawn; the recording is not touched by it."""
+
+    sentence: str
+
+
+class LanguageChosen(Struct, frozen=True):
+    """The language that the next session's subject reads was chosen."""
+
+    language: str
+
+
+Own = (
+    Tick | Searching | DevicesFound | Loaded | LifeKnown | Judged | Dismissed | NewSession | DrawingFailed
+    | LanguageChosen
+)  # fmt: skip
+Message = m.Request | m.Report | Own  # what `fold` takes
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +159,7 @@ def _loaded(bench: BenchState, message: Message) -> BenchState:
     match message:
         case m.HealthReport():
             # The recorder's is complete: latching it would bring back what was acknowledged while it was on its way.
-            peak = Load(tuple(message.peak), message.combined_peak)
+            peak = Load((*message.peak, message.combined_peak))
             return replace(bench, health=message.health, rate=message.rate, saturated=message.saturated, peak=peak)
         case Loaded(load):
             return replace(bench, load=load, peak=bench.peak.latched(load))

@@ -1,22 +1,30 @@
-"""How good the last stroke was, said while the stimulus is still mounted: the analysis of its take, in few words."""
+"""How good the last stroke was, said while its stimulus is mounted: the analysis of a take, in its own process."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
-from numpy.typing import NDArray
 
+from daq_app.child_process import give_way, process_pool
+from daq_app.recorder import messages as m
+from daq_app.window.course_state import Judged, Quality, StrokePicture
+from daq_app.window.live_feed import LiveFeed
+from daq_app.window.state import AppState, DrawingFailed
 from daq_app.wording import tr, tr_noop
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes import AnalysisSettings, FlawName, FrictionParameters
+from sessions.recording import LoggedEvent
+from sessions.run import steps
+from sessions.strokes import AnalysisSettings, FlawName
 from sessions.strokes.analysis import analyse_blocks
 from sessions.strokes.stroke import Stroke
 
 KEEP_OFF = tr_noop("Keep the finger off until the stroke.")
+AFTER = 0.35  # unloaded readings after a lift that belong to the picture of a stroke [s]
 FELL = 0.5  # a normal force that falls by this share along the steady window is worth a word [-]
 
 # Few words for what an experimenter can do something about, and what to do, as a command to whoever runs the session.
@@ -42,37 +50,6 @@ FLAWS: Mapping[FlawName, tuple[str, str]] = {
 }
 LEAVING = tr_noop("pressed less than half as hard at the end")
 PRESS_ON = tr_noop("Keep pressing until the end.")
-PICTURE = ("N", "T", "mu", "speed")  # rows of a stroke's picture
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StrokePicture:
-    """The course of a stroke with some time around it, n readings, as it is shown when its trial is inspected."""
-
-    time: NDArray[np.float64]  # (n,) [s, device time]
-    values: NDArray[np.float64]  # (4, n) rows of PICTURE: N, T [N], mu [-], speed [mm/s]; nan where it means nothing
-    onset: float | None  # [s, device time]
-    lift: float | None
-    means: tuple[float | None, ...]  # of the rows of PICTURE over the steady window
-
-
-@dataclass(frozen=True, slots=True)
-class Quality:
-    """What is known of a stroke before it is scored. Provisional: the analysis of the recording is what counts."""
-
-    grade: Literal["good", "doubtful", "refused"]
-    words: tuple[str, ...]  # what is wrong, the worst first; none for a good stroke
-    sentences: tuple[str, ...]  # the same at length
-    steady: tuple[float, float] | None  # [s, device time]
-    mu: float | None  # mean of T/N over the steady window [-]
-    interval: tuple[float, float] | None
-    speed: float | None  # [mm/s]
-    fell: float | None  # by what share N fell from the first to the last quarter of the steady window [-]
-    friction: FrictionParameters | None = None  # that the model is to get
-    normal_force: float | None = None  # mean over the steady window [N]
-    advice: str = ""  # what to do about the worst, one sentence
-    picture: StrokePicture | None = None
-    redo: bool = False  # another stroke mends the worst
 
 
 def stroke_quality(
@@ -137,3 +114,78 @@ def _fell(stroke: Stroke) -> float | None:
         return None
     quarter = max(len(normal) // 4, 1)
     return float(1.0 - np.median(normal[-quarter:]) / np.median(normal[:quarter]))
+
+
+class Judge:
+    """Watches the takes that pass, and says of each stroke how good it was."""
+
+    def __init__(self, say: Callable[[Judged | DrawingFailed], None]) -> None:
+        """Tell by `say`, from another thread."""
+        self._say = say
+        self._worker: ProcessPoolExecutor | None = None
+        self._take: tuple[int, int] | None = None  # trial and take in hand
+        self._offset = 0.0  # of the times in the log to those of the stream [s]
+        self._due: float | None = None  # when the take is to be looked at [s, device time]
+
+    def prepare(self) -> None:
+        """Start the process, so that the first stroke need not wait for it."""
+        if self._worker is None:
+            self._worker = process_pool(1)
+            self._worker.submit(_warm)
+
+    def close(self) -> None:
+        """Let go of the process."""
+        if self._worker is not None:
+            self._worker.shutdown(wait=False, cancel_futures=True)
+
+    def heard(self, report: m.Report, feed: LiveFeed) -> None:
+        """Follow the course: a take begins, the finger lifts."""
+        match report:
+            case steps.StartTake(trial, take):
+                self._take, self._due = (trial, take), None
+                feed.take_begins()
+            case LoggedEvent(kind="finger_lifted", data=data):
+                self._due = float(data["time"]) - self._offset + AFTER
+            case LoggedEvent(kind="readings_joined", data=data):
+                self._offset = float(data["time_offset"])
+            case m.SessionBegun():
+                self._offset, self._due = 0.0, None
+            case LoggedEvent(kind="contact_onset"):
+                self._due = None
+            case _:
+                pass
+
+    def look(self, feed: LiveFeed, state: AppState) -> None:
+        """Have the take looked at once enough came after the lift."""
+        newest, session, info = feed.trace.newest, state.session, state.bench.info
+        if self._due is None or newest is None or newest < self._due:
+            return
+        self._due = None
+        if session is None or info is None or self._take is None:
+            return
+        number, take = self._take
+        trial = session.of(number)
+        block = feed.take()
+        if trial is None or not len(block):
+            return
+        self.prepare()
+        assert self._worker is not None
+        future = self._worker.submit(stroke_quality, block, session.plan, in_newtons(info), trial.trial)
+        future.add_done_callback(lambda done: self._judged(number, take, done))
+
+    def _judged(self, number: int, take: int, done: "Future[Quality]") -> None:
+        if done.cancelled():
+            return
+        if error := done.exception():
+            self._worker = None  # the next stroke gets another
+            name = type(error).__name__
+            self._say(DrawingFailed(tr("the last stroke was not looked at: {name} {error}", name=name, error=error)))
+            return
+        self._say(Judged(number, take, done.result()))
+
+
+def _warm() -> None:
+    """Load what the analysis needs, and let this process go behind window and recorder."""
+    give_way()
+    for name in ("scipy.linalg.lapack", "scipy.special"):
+        import_module(name)

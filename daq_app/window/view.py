@@ -7,12 +7,11 @@ from typing import Literal
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
 from daq_app.window.course_state import SessionState
-from daq_app.window.live_feed import AXES
-from daq_app.window.messages import Dismissed, Message
-from daq_app.window.state import AppState, BenchState
+from daq_app.window.live_feed import AXES, LOADS
+from daq_app.window.state import AppState, BenchState, Dismissed, Message
 from daq_app.window.subject import SubjectView, Translate, mirror_view, subject_view
 from daq_app.window.view_course import CourseView, course_view
-from daq_app.wording import sentence, tr, tr_noop
+from daq_app.wording import quantity, sentence, tr, tr_noop
 from drivers.transducer import TransducerInfo
 
 NAMES = tr_noop(("zeros", "moved", "noise", "overloads"))
@@ -179,18 +178,15 @@ def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wron
 def _rate(bench: BenchState) -> str:
     if bench.info is None:
         return "–"
-    rate = f"{bench.info.rate:.0f}" if isfinite(bench.info.rate) else "unknown"
-    measured = f"{bench.rate:.0f}" if isfinite(bench.rate) else "–"
-    return tr("{measured} Hz (set {asked})", measured=measured, asked=rate)
+    rate = quantity(bench.info.rate, 0) if isfinite(bench.info.rate) else "unknown"
+    return tr("{measured} Hz (set {asked})", measured=quantity(bench.rate, 0), asked=rate)
 
 
 def _bars(bench: BenchState) -> tuple[Bar, ...]:
     over = set(bench.peak.over)
     noise = ["–"] * 6 if bench.zero is None else [_noise(n, u) for n, u in zip(bench.zero.noise, UNITS, strict=True)]
-    rows = zip(AXES, bench.load.axes, bench.peak.axes, noise, strict=True)
-    bars = [Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows]
-    all_together = Bar("combined", _share(bench.load.combined), _share(bench.peak.combined), "combined" in over, "")
-    return (*bars, all_together)
+    rows = zip(LOADS, bench.load.shares, bench.peak.shares, (*noise, ""), strict=True)
+    return tuple(Bar(name, _share(now), _share(peak), name in over, text) for name, now, peak, text in rows)
 
 
 def _share(value: float) -> float | None:
@@ -212,10 +208,8 @@ def _tare(bench: BenchState) -> str:
     if bench.zero is None:
         return tr("not measured")
     zero = bench.zero
-    # Adding nothing makes a zero of what would be a minus zero.
-    texts = [f"{round(1000 * force) + 0:d}" for force in zero.mean[:3]]
-    texts += [f"{round(torque, 1) + 0.0:.1f}" for torque in zero.mean[3:]]
-    fx, fy, fz, tx, ty, tz = (f"{axis} {text}".replace("-", "−") for axis, text in zip(AXES, texts, strict=True))
+    texts = [quantity(1000 * force, 0) for force in zero.mean[:3]] + [quantity(torque, 1) for torque in zero.mean[3:]]
+    fx, fy, fz, tx, ty, tz = (f"{axis} {text}" for axis, text in zip(AXES, texts, strict=True))
     return tr(
         "{forces}\n{torques}\nover {duration:.1f} s, n = {readings}",
         forces=f"{fx}, {fy}, {fz} mN", torques=f"{tx}, {ty}, {tz} N mm",
@@ -229,7 +223,7 @@ def _drift(bench: BenchState) -> str:
     if bench.zero is bench.first_zero:
         return tr("first zero")
     moved = max(abs(a - b) for a, b in zip(bench.zero.mean[:3], bench.first_zero.mean[:3], strict=True))
-    return tr("{moved:.0f} mN since the first", moved=1000 * moved)
+    return tr("{moved} since the first", moved=quantity(1000 * moved, 0, "mN"))
 
 
 def _devices(bench: BenchState) -> tuple[DeviceRow, ...]:

@@ -1,16 +1,21 @@
-"""The course of a session as the experimenter sees it: what to do now, the plan, and the last stroke."""
+"""The course of a session as the experimenter sees it: what to do now, the plan, its trials and their strokes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.recorder import messages as m
-from daq_app.window.course_state import IN_A_TRIAL, SessionState, TrialState, redo_targets
-from daq_app.window.messages import Message, NewSession
-from daq_app.window.state import BenchState
-from daq_app.window.stroke_quality import Quality
-from daq_app.window.view_trials import Tile, tiles
-from daq_app.wording import tr, tr_noop
+from daq_app.window.course_state import (
+    IN_A_TRIAL,
+    PICTURE,
+    Quality,
+    SessionState,
+    StrokePicture,
+    TrialState,
+    redo_targets,
+)
+from daq_app.window.state import BenchState, Message, NewSession
+from daq_app.wording import quantity, tr, tr_noop
 from sessions.plan.plan import PROXIMAL_TO_DISTAL, SessionPlan, Trial
 from sessions.run import steps
 
@@ -20,6 +25,48 @@ NO_ANSWER: Mapping[type, steps.Event] = {  # of a subject who cannot say
     steps.AskChoice: steps.PairedChoice(None),
 }
 WAYS = {1: tr_noop("away from the subject"), -1: tr_noop("towards the subject")}
+TileKind = Literal["done", "redone", "flawed", "current", "skipped", "coming"]
+KINDS: dict[TileKind, tuple[str, str]] = {  # a shape that shows the state without colour, and the state in words
+    "done": ("✓", tr_noop("done")),
+    "redone": ("↻", tr_noop("done again")),
+    "flawed": ("!", tr_noop("done, its stroke has a flaw")),
+    "current": ("▶", tr_noop("in hand")),
+    "skipped": ("–", tr_noop("skipped")),
+    "coming": ("○", tr_noop("still to come")),
+}
+NO_FORCES = tr_noop("Forces are not shown in this protocol.")
+
+
+@dataclass(frozen=True, slots=True)
+class Tile:
+    """One trial: its shape and words tell its state without colour."""
+
+    number: int
+    code: str
+    kind: TileKind
+
+    @property
+    def words(self) -> str:
+        """Return the trial and its state for a screen reader.
+
+        >>> Tile(3, "D86", "flawed").words
+        'trial 3, D86: done, its stroke has a flaw'
+        """
+        return tr("trial {number}, {code}: {state}", number=self.number, code=self.code, state=tr(KINDS[self.kind][1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What is shown of one trial: never what is measured now."""
+
+    number: int
+    heading: str
+    verdict: str  # one line; or why there is none
+    details: str  # every flaw at length, the worst first
+    grade: Literal["none", "good", "doubtful", "refused"] = "none"
+    cells: tuple[tuple[str, str], ...] = tuple((name, "–") for name in PICTURE)  # means over the steady window
+    picture: StrokePicture | None = None
+    steady: tuple[float, float] | None = None  # [s, device time]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +156,7 @@ def course_view(session: SessionState, bench: BenchState, now: float) -> CourseV
 def _no_forces(plan: SessionPlan) -> str:
     if not plan.forces:
         return tr("No forces are recorded: this visit is of scores only.")
-    return "" if "forces" in plan.shown.experimenter else tr("Forces are not shown in this protocol.")
+    return "" if "forces" in plan.shown.experimenter else tr(NO_FORCES)
 
 
 def _redo(again: tuple[TrialState, ...], sends: steps.Redo | None) -> Button:
@@ -286,3 +333,64 @@ def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
     parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
     redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
     return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)
+
+
+def tiles(session: SessionState) -> tuple[Tile, ...]:
+    """Return a tile for each trial, in the order of the plan."""
+    return tuple(Tile(t.trial.number, t.code, _kind(session, t)) for t in session.trials)
+
+
+def inspection(session: SessionState, number: int) -> Inspection | None:
+    """Return what is shown of a trial; None where the session has no trial of that number."""
+    trial = session.of(number)
+    if trial is None:
+        return None
+    again = tr(", take {takes}", takes=trial.takes) if trial.takes > 1 else ""
+    state = tr(KINDS[_kind(session, trial)][1])
+    heading = tr("Trial {number}, {code}{again}: {state}", number=number, code=trial.code, again=again, state=state)
+    shown = session.plan.shown.experimenter
+    if trial.answer is not None and "answer" in shown:
+        heading = f"{heading}, {trial.answer}"
+    details = tr("Its take before was discarded: {why}.", why=trial.discarded.rstrip(".")) if trial.discarded else ""
+    quality = trial.quality
+    if "forces" not in shown:
+        return Inspection(number, heading, tr(NO_FORCES), details)
+    if quality is None:
+        return Inspection(number, heading, _why_none(session, trial), details)
+    picture = quality.picture
+    means = (None,) * len(PICTURE) if picture is None else picture.means
+    cells = tuple((name, quantity(mean, *form)) for (name, form), mean in zip(PICTURE.items(), means, strict=True))
+    at_length = " ".join((*quality.sentences, details)).strip()
+    return Inspection(number, heading, verdict(quality), at_length, quality.grade, cells, picture, quality.steady)
+
+
+def verdict(quality: Quality) -> str:
+    """Return one verdict on a stroke: whether it is to be done again, the worst flaw, then what to do.
+
+    >>> verdict(Quality("refused", ("pressed too lightly",), (), None, None, None, None, None, advice="Press harder."))
+    'Redo: pressed too lightly. Press harder.'
+    """
+    if not quality.words:
+        return tr("Good")
+    opening = tr("Redo") if quality.grade == "refused" or quality.redo else tr("Doubtful")
+    return f"{opening}: {tr(quality.words[0]).rstrip('.')}. {tr(quality.advice)}".strip()
+
+
+def _kind(session: SessionState, trial: TrialState) -> TileKind:
+    if trial.trial.number == session.trial and session.phase != "ended":
+        return "current"
+    if trial.outcome != "done":
+        return trial.outcome
+    if trial.quality is not None and trial.quality.words:
+        return "flawed"
+    return "redone" if trial.takes > 1 else "done"
+
+
+def _why_none(session: SessionState, trial: TrialState) -> str:
+    if not session.plan.forces:
+        return tr("No forces are recorded in this session.")
+    if trial.outcome == "coming":
+        return tr("Its stroke is still to come.")
+    if trial.outcome == "skipped":
+        return tr("It was left out: no stroke of it counts.")
+    return tr("Its stroke was recorded, and this window has not looked at it: Review shows it after the session.")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from daq_app.recorder import messages as m
+from daq_app.window.course_state import Quality
 from daq_app.window.state import AppState, fold
-from daq_app.window.stroke_quality import Quality
 from drivers.calibration import Calibration
 from drivers.transducer import Health, TransducerInfo
 from sessions.plan.protocols import plan, protocol

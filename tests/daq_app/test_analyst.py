@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import compared, finger_words
 from daq_app.analyst.frame import FIELD_ERRORS, Contact, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
@@ -211,22 +211,22 @@ def test_two_sessions_are_held_against_each_other_stimulus_by_stimulus(state):
     first = report.predictions[0]
     higher = replace(first, mu=first.mu + 0.1, sed=first.sed + 0.001)
     other = replace(report, predictions=(higher, *report.predictions[1:]))
-    found = {(row.experiment, row.index): row.pairs for row in compared(report, other)}
+    found = dict(compared(report, other))
     assert len(found) == len({(p.experiment, p.index) for p in report.predictions})
     for key, (mu, sed, score) in found.items():
-        same = key != (first.experiment, first.index)
-        assert mu.difference == pytest.approx(0.0 if same else 0.1)
-        assert sed.difference == pytest.approx(0.0 if same else 1.0)
-        assert score.difference == 0.0
+        same = key != f"{first.experiment} {first.index}"
+        assert mu[1] - mu[0] == pytest.approx(0.0 if same else 0.1)
+        assert sed[1] - sed[0] == pytest.approx(0.0 if same else 1.0)
+        assert score[1] == score[0]
 
 
-def test_a_stimulus_that_one_session_lacks_has_no_difference(state):
+def test_a_stimulus_that_one_session_lacks_has_no_number_of_it(state):
     report = state.report
     rest = replace(report, predictions=report.predictions[1:])
     gone = report.predictions[0]
-    row = next(r for r in compared(report, rest) if (r.experiment, r.index) == (gone.experiment, gone.index))
-    assert row.pairs[0].second is None
-    assert row.pairs[0].difference is None
+    first, second = dict(compared(report, rest))[f"{gone.experiment} {gone.index}"][0]
+    assert first is not None
+    assert second is None
 
 
 # ---- the work

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from daq_app.analyst.messages import Problem
 from daq_app.analyst.process import Analyst
+from daq_app.analyst.state import Problem
 from daq_app.batch.pool import _in_pool
 from daq_app.child_process import interpreter
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Connect, Device, Failed, Gone
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.take_watch import Judge
+from daq_app.window.stroke_quality import Judge
 from sessions.statistics.visit import VisitOptions
 from solver.verification import processes
 

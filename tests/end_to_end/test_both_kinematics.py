@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.session_words import session_pictures
 from daq_app.analyst.work import NothingToShow, Work
 from daq_app.cli.main import run

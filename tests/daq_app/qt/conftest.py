@@ -17,7 +17,7 @@ from daq_app.qt.subject_window import SubjectWindow
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.messages import Dismissed, NewSession
+from daq_app.window.state import Dismissed, NewSession
 
 PACE = 8.0  # simulated seconds in a real one; the drawing of twice as many readings costs more than waiting
 PATIENCE = 60.0  # far beyond what anything takes [s]

@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES
 from daq_app.analyst.state import chosen
 from daq_app.qt import preferences, tokens
@@ -30,10 +30,9 @@ from daq_app.qt.plots import ZoomedPlot
 from daq_app.qt.rooms import about_box
 from daq_app.qt.subject_picture import SubjectPreview
 from daq_app.qt.subject_window import SubjectWindow
-from daq_app.window.course_state import Mark
+from daq_app.window.course_state import Judged, Mark
 from daq_app.window.live_model import ModelWords
 from daq_app.window.live_trace import CHANNELS, Columns
-from daq_app.window.messages import Judged
 from daq_app.window.new_session import SessionForm
 from daq_app.window.subject import preview, translator
 from daq_app.window.view import derive_view

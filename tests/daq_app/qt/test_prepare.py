@@ -11,8 +11,8 @@ from qt_events import wheel
 
 from daq_app.qt.answer_fields import NumberField
 from daq_app.recorder.messages import Connect, Disconnect
-from daq_app.window.messages import DevicesFound, Searching
 from daq_app.window.new_session import Unfinished
+from daq_app.window.state import DevicesFound, Searching
 
 pytestmark = pytest.mark.qt
 

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication, QFileDialog, QLineE
 
 from daq_app.qt.rooms import ReviewRoom
 from daq_app.recorder.messages import Connect, Disconnect
-from daq_app.window.messages import NewSession
+from daq_app.window.state import NewSession
 
 pytestmark = pytest.mark.qt
 

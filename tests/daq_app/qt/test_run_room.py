@@ -9,11 +9,10 @@ from daq_app.qt import preferences, tokens
 from daq_app.qt.live_panel import LivePanel
 from daq_app.qt.middle import InspectedTrial, TrialStrip
 from daq_app.qt.preferences import DRAWER, DRAWER_SIZES
-from daq_app.window.course_state import Mark
+from daq_app.window.course_state import Mark, StrokePicture
 from daq_app.window.live_trace import CHANNELS, LiveTrace
-from daq_app.window.messages import NewSession
-from daq_app.window.stroke_quality import StrokePicture
-from daq_app.window.view_trials import Inspection, Tile
+from daq_app.window.state import NewSession
+from daq_app.window.view_course import Inspection, Tile
 from sessions.run import steps
 from tests.daq_app.qt.test_session_by_keyboard import begin, one_trial
 from tests.daq_app.qt.written_text import cut_off
@@ -127,7 +126,7 @@ def test_an_inspected_trial_is_read_whole_where_there_is_least_room(application,
     words = "Redo: the finger was not lifted between strokes. Lift the finger between strokes."
     shown.show_trial(
         Inspection(
-            12, "Trial 12, D86, take 2: done again, score 40", words, "refused", words, cells, picture, (1.0, 2.0)
+            12, "Trial 12, D86, take 2: done again, score 40", words, words, "refused", cells, picture, (1.0, 2.0)
         )
     )
     shown.resize(420, round(640 * scale))  # as the middle of a window of 1366 pixels at 200 % is

@@ -12,8 +12,8 @@ from daq_app.qt.subject_side import TabletScreen
 from daq_app.recorder.client import Recorder
 from daq_app.recorder.messages import Stop
 from daq_app.window.live_model_process import LiveModel
-from daq_app.window.messages import NewSession
 from daq_app.window.new_session import bench_of
+from daq_app.window.state import NewSession
 from sessions.recording import Recording
 from sessions.run import steps
 from tests.daq_app.qt.conftest import Driver, application  # noqa: F401  a fixture

@@ -75,8 +75,8 @@ def test_the_load_is_that_of_what_the_transducer_feels_its_zero_included():
     feed.device(INFO)
     zero = (0.0, 0.0, -9e6, 0.0, 0.0, 0.0)  # a plate of 9 N
     load = feed.add(live(0, sliding(10, normal=9.0, mu=0.5), zero=zero), FRAME)
-    assert load.axes[2] == pytest.approx(0.5)
-    assert load.axes[0] == pytest.approx(4.5 / 36)
+    assert load.shares[2] == pytest.approx(0.5)
+    assert load.shares[0] == pytest.approx(4.5 / 36)
 
 
 def test_the_take_holds_every_reading_since_it_began_with_its_number_and_time():

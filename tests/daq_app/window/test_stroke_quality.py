@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from daq_app.window import stroke_quality
-from daq_app.window.view_trials import verdict
+from daq_app.window.view_course import verdict
 from drivers.readings import ReadingBlock
 from sessions.strokes import FlawName
 from sessions.strokes.stroke import Flaw

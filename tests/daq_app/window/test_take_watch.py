@@ -9,7 +9,7 @@ import pytest
 
 PREPARED = """
 import os, signal
-from daq_app.window.take_watch import Judge
+from daq_app.window.stroke_quality import Judge
 
 if __name__ == "__main__":
     judge = Judge(print)

@@ -7,11 +7,9 @@ import pytest
 from session_messages import BAD, BEGUN, FIRST, GOOD, PLAN, READY, SCORE, SECOND, TARE, TOUCH, after, logged
 
 from daq_app.recorder import messages as m
-from daq_app.window.messages import Judged
+from daq_app.window.course_state import Judged, StrokePicture
 from daq_app.window.state import BenchState
-from daq_app.window.stroke_quality import StrokePicture
-from daq_app.window.view_course import course_view
-from daq_app.window.view_trials import KINDS, inspection, tiles, verdict
+from daq_app.window.view_course import KINDS, course_view, inspection, tiles, verdict
 from sessions.plan.plan import Shown
 from sessions.run import steps
 

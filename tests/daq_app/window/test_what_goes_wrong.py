@@ -6,7 +6,7 @@ import pytest
 import session_messages as script
 
 from daq_app.recorder import messages as m
-from daq_app.window.messages import Judged
+from daq_app.window.course_state import Judged
 from daq_app.window.view import derive_view
 from sessions.plan.protocols import plan, protocol
 from sessions.run import steps

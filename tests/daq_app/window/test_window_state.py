@@ -30,8 +30,7 @@ from session_messages import (
 from daq_app.recorder import messages as m
 from daq_app.recorder.device_history import Life
 from daq_app.window.live_feed import Load
-from daq_app.window.messages import Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
-from daq_app.window.state import AppState
+from daq_app.window.state import AppState, Dismissed, DrawingFailed, Judged, LifeKnown, Loaded, NewSession, Tick
 from daq_app.window.view import derive_view
 from drivers.transducer import Health
 from sessions.plan.plan import Frame, Shown
@@ -182,7 +181,7 @@ def test_a_session_that_has_ended_shows_no_recording():
             Dismissed(),
         ),
         (
-            (m.Device(INFO, None), Loaded(Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0), 0.9))),
+            (m.Device(INFO, None), Loaded(Load((0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.9)))),
             "wrong",
             "Fz",
             m.AcknowledgeOverloads(),
@@ -236,7 +235,7 @@ def test_the_health_lamp_names_what_was_lost():
 
 def test_an_overload_stays_until_somebody_acknowledges_it():
     state = after(
-        m.Device(INFO, None), Loaded(Load((0.0, 0.0, 0.4, 0.0, 0.0, 0.9), 1.3)), Loaded(Load((0.1,) * 6, 0.2))
+        m.Device(INFO, None), Loaded(Load((0.0, 0.0, 0.4, 0.0, 0.0, 0.9, 1.3))), Loaded(Load((0.1,) * 6 + (0.2,)))
     )
     bench = derive_view(state).bench
     [combined] = [bar for bar in bench.bars if bar.name == "combined"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.state import AnalystState
 from daq_app.qt.analyst_window import AnalystWindow
 from daq_app.qt.tokens import LIGHT

@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QAbstractScrollArea, QComboBox, QLineEdit, QListWidget, QSlider
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import finger_words
 from daq_app.analyst.session_words import condition, lineage, numbers, points
 from daq_app.analyst.state import chosen, rows

@@ -13,7 +13,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from qt_events import wheel
 
-from daq_app.analyst import messages as m
+from daq_app.analyst import state as m
 from daq_app.analyst.frame import FIELD_CHOICES, FIELD_ERRORS, Finger
 from daq_app.analyst.state import chosen, rows
 from daq_app.qt.plots import ALL_TRIALS, FIXED
