@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from solver.arrays import Array
+from solver.arrays import Array, Indices
 from solver.mesh import Mesh
 from solver.mesh.mesher import FingerMesh
 from solver.quantities import NAMES, QUANTITIES, SED
@@ -42,6 +42,15 @@ class Skin:
     pressure: Array  # (k,) [MPa], 0 where the gap is open
     traction: Array  # (k,) tangential, of the surface on the skin along +x [MPa]
     state: tuple[str, ...]  # (k,) "open", "stick", "slip" or "cap"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SkinLine:
+    """m points of the skin's surface, by which values at the nodes that are drawn are read along it."""
+
+    arc: Array  # (m,) along the skin at rest, 0 over the reference ending, towards the tip [mm]
+    nodes: Indices  # (m, 9) that are drawn
+    shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)

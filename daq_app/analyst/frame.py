@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.wording import tr, tr_noop
+from solver.prediction import Skin, SkinLine
 from solver.quantities import FIELDS, SED
 
 Array = NDArray[np.float64]
@@ -15,7 +16,7 @@ Indices = NDArray[np.int64]
 Phase = Literal["pressing", "sticking", "slipping in part", "sliding"]
 
 TOP = 0.97  # of the corners' values lies below the end of the colour scale
-STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 Box = tuple[float, float, float, float]  # left, right, below, above [mm]
 Range = tuple[float, float]
 FIELD_ERRORS = tr_noop(
@@ -31,17 +32,6 @@ OUTSIDE = -1e-9  # least share of a corner: what lies on a side is in both trian
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Contact:
-    """The skin that may touch, from proximal to distal; k points."""
-
-    x: Array  # (k,) along the surface [mm]
-    gap: Array  # (k,) height over the surface [mm]
-    pressure: Array  # (k,) [MPa]
-    traction: Array  # (k,) along +x, on the skin [MPa]
-    state: tuple[str, ...]  # (k,) "open", "stick", "slip" or "cap"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """A finger in the world: the surface is y = 0, the finger above it, lengths true [mm]."""
 
@@ -49,17 +39,8 @@ class Frame:
     values: Mapping[str, Array]  # (n,) each field by its name in `solver.quantities` [MPa or -]; displacement [mm]
     outlines: Mapping[str, Array]  # deformed borders of layers by name, each (m, 2)
     patch: Array  # (m, 2) outline of the ending
-    contact: Contact
+    contact: Skin
     row: Array  # (r,) SED of the receptors along the skin [MPa]; nan where there is none
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SkinLine:
-    """m points of the skin's surface, by which values at the nodes are read along it."""
-
-    arc: Array  # (m,) along the skin at rest, 0 over the receptor, towards the tip [mm]
-    nodes: Indices  # (m, 9)
-    shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +109,7 @@ def step_above(value: float) -> float:
     if not value > 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(value))
-    return float(next((s * power for s in STEPS if s * power >= value * (1.0 - 1e-9)), 10.0 * power))
+    return float(next(step * power for step in STEPS if step * power >= value * (1.0 - 1e-9)))
 
 
 def visible(nodes: Array, triangles: Indices, box: Box) -> Indices:
@@ -147,15 +128,12 @@ def halved(nodes: Array, sed: Array, triangles: Indices) -> tuple[Array, Array, 
     >>> sed[four].mean(axis=1).tolist()
     [1.0, 2.0, 3.0, 2.0]
     """
-    count, first = len(triangles), len(nodes)
-    ends = (triangles, triangles[:, [1, 2, 0]])
-    middles = [
-        (values[ends[0]] + values[ends[1]]).reshape(3 * count, *values.shape[1:]) / 2.0 for values in (nodes, sed)
-    ]
-    ab, bc, ca = (first + np.arange(count) * 3 + side for side in range(3))
+    sides = np.stack([triangles, triangles[:, [1, 2, 0]]], axis=2).reshape(-1, 2)
+    ab, bc, ca = len(nodes) + np.arange(len(sides)).reshape(-1, 3).T
     a, b, c = triangles.T
     four = np.stack([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]).transpose(2, 0, 1).reshape(-1, 3)
-    return np.concatenate([nodes, middles[0]]), np.concatenate([sed, middles[1]]), four
+    nodes, sed = (np.concatenate([values, values[sides].mean(axis=1)]) for values in (nodes, sed))
+    return nodes, sed, four
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,9 +149,9 @@ class View:
     @staticmethod
     def fitted(box: Box, left: float, top: float, width: float, height: float) -> "View":
         """Return the view that shows all of `box` at the foot of a rectangle of the screen [pixel]."""
-        per_mm = min(width / (box[1] - box[0]), height / (box[3] - box[2]))
-        middle = box[2] + height / per_mm / 2.0
-        return View((box[0] + box[1]) / 2.0, middle, left + width / 2.0, top + height / 2.0, per_mm)
+        x0, x1, y0, y1 = box
+        per_mm = min(width / (x1 - x0), height / (y1 - y0))
+        return View((x0 + x1) / 2.0, y0, left + width / 2.0, top + height, per_mm)
 
     def placed(self, points: Array) -> Array:
         """Return where points (n, 2) [mm] lie on the screen (n, 2) [pixel]."""
@@ -268,12 +246,10 @@ def value_at(frame: Frame, parts: Parts, field: FieldChoice, points: Array) -> t
 def probe_words(frame: Frame, parts: Parts, field: FieldChoice, x: float, y: float) -> str:
     """Return what is at a place [mm]: the field with its unit, where it is, and the tissue."""
     where = f"x {x:.3f} mm, y {y:.3f} mm".replace("-", "−")
-    values, triangles = value_at(frame, parts, field, np.array([[x, y]]))
-    triangle = int(triangles[0])
+    (value,), (triangle,) = value_at(frame, parts, field, np.array([[x, y]]))
     if triangle < 0:
         return tr("{where} · no tissue", where=where)
-    tissue = tr(TISSUES[int(parts.region[triangle])])
-    return f"{field.words(float(values[0]))} · {where} · {tissue}"
+    return f"{field.words(value)} · {where} · {tr(TISSUES[parts.region[triangle]])}"
 
 
 def along_skin(frame: Frame, parts: Parts, field: FieldChoice) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from daq_app.analyst.frame import Contact, Film, Finger, Frame, Instant, Parts, SkinLine
+from daq_app.analyst.frame import Film, Finger, Frame, Instant, Parts
 from sessions.prediction.predicting import Way
 from sessions.report.contents import Field
 from solver import Cancelled, Prediction
@@ -71,13 +71,11 @@ def _pairs(points: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
 
 
 def _parts(sketch: Sketch) -> Parts:
-    skin = sketch.skin
-    return Parts(sketch.triangles, sketch.elements, sketch.region, SkinLine(skin.arc, skin.nodes, skin.shape))
+    return Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
 
 
 def _frame(drawn: Fields, skin: Skin, row: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Frame:
-    contact = Contact(skin.x, skin.gap, skin.pressure, skin.traction, skin.state)
-    return Frame(drawn.nodes, dict(drawn.values), dict(drawn.outlines), drawn.patch, contact, row)
+    return Frame(drawn.nodes, dict(drawn.values), dict(drawn.outlines), drawn.patch, skin, row)
 
 
 def _instant(still: Still) -> Instant:

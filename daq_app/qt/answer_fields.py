@@ -21,12 +21,11 @@ from PySide6.QtWidgets import QAbstractSlider, QHBoxLayout, QLineEdit, QPushButt
 from daq_app.qt.parts import button, fill
 from daq_app.qt.tokens import GRID, theme_of
 from daq_app.window.live_trace import CHANNELS, LiveTrace
-from daq_app.window.subject import LEAP, STEP, Answer, Choice, Device, Translate, Which
+from daq_app.window.subject import LEAP, LENGTH, STEP, Answer, Choice, Device, Translate, Which
 from daq_app.window.subject import SubjectText as Text
 from sessions.plan.plan import Hand
 from sessions.run.steps import Event, Scored
 
-LENGTH = 100.0  # of the line [mm]
 REACH = 12.0  # above and below the line that counts as touching it [mm]
 MARK = 10.0  # height of the mark [mm]
 

@@ -9,17 +9,15 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
-from daq_app.qt.answer_fields import LENGTH
 from daq_app.qt.parts import Panel, button, choice, field, fill, hbox, label, regrade, say, vbox
-from daq_app.qt.preferences import name_of
-from daq_app.qt.screens import Millimetres
+from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
 from daq_app.qt.tokens import GRID, missing_glyphs
 from daq_app.recorder.messages import ResumeSession
 from daq_app.window.checklist import Card
 from daq_app.window.new_session import SessionForm, Unfinished, subject_texts, unfinished
 from daq_app.window.state import Message
-from daq_app.window.subject import SubjectText, translator
+from daq_app.window.subject import LENGTH, SubjectText, translator
 from daq_app.window.view import BenchView, bench_summary
 from daq_app.wording import tr
 from sessions.plan.protocols.languages import ENGLISH

@@ -18,9 +18,8 @@ from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
 from daq_app.qt.parts import bare, fill, hbox, scrolled, stacked, vbox
-from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, restore_place, save_place
+from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place
 from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
-from daq_app.qt.screens import millimetres
 from daq_app.qt.subject_picture import open_preview
 from daq_app.qt.subject_side import SubjectSide, TabletScreen
 from daq_app.qt.subject_window import SubjectWindow

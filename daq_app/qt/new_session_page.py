@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QBoxLayout, QComboBox, QCompleter, QFileDialog, QR
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
 from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
-from daq_app.qt.screens import Millimetres
+from daq_app.qt.preferences import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
 from daq_app.window.new_session import AXES, Bench, SessionForm, enrolled, enrolment, offered, place_of

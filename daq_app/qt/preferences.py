@@ -1,14 +1,18 @@
-"""What the window remembers from one start to the next: looks, language, place and recent sessions."""
+"""What the window remembers from one start to the next: looks, language, place, sessions, and the screens' sizes."""
 
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QLocale, QSettings, QSize, Qt
+from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QWidget
 
 from daq_app.qt.tokens import DARK, LIGHT, Tokens, current_tokens, font_scale
+from daq_app.window.subject import LENGTH
 from daq_app.wording import ENGLISH, EXPERIMENTER, VARIABLE, languages, tr_noop
+from sessions.recording import Setting
 
 THEMES = tr_noop(("system", "light", "dark"))
 SCALES = (1.0, 1.25, 1.5, 2.0)  # of the type [-]
@@ -17,6 +21,9 @@ FRAME = QSize(16, 48)  # that a desktop draws around a window, title bar include
 DRAWER = "window/drawer open"
 DRAWER_SIZES = "window/drawer sizes"
 THEME, SCALE, LANGUAGE = "window/theme", "window/type scale", "window/language"
+LEAST, MOST = 40.0, 250.0  # what 100 mm may measure on a screen before it is taken for a slip of the hand [mm]
+PLAUSIBLE = (40.0, 600.0)  # dots an inch; a screen that says otherwise does not know its size
+USUAL_DPI = 96.0
 _GEOMETRY, _RECENT = "window/geometry", "window/recent sessions"
 
 
@@ -104,3 +111,56 @@ def name_of(language: str) -> str:
     """
     own = "English" if language == ENGLISH else QLocale(language).nativeLanguageName()
     return f"{own[:1].upper()}{own[1:]} ({language})" if own else language
+
+
+@dataclass(frozen=True, slots=True)
+class Millimetres:
+    """What is known of a screen's size."""
+
+    pixels: float  # device-independent pixels in a millimetre
+    checked: bool  # somebody held a ruler to it
+
+    @property
+    def words(self) -> str:
+        return "checked with a ruler" if self.checked else "as the screen says, not checked with a ruler"
+
+
+def millimetres(screen: QScreen) -> Millimetres:
+    """Return the size of a millimetre on a screen."""
+    try:
+        factor = float(str(settings().value(_key(screen))))
+    except ValueError:
+        return Millimetres(_said(screen), checked=False)
+    return Millimetres(_said(screen) * factor, checked=True)
+
+
+def checked(screen: QScreen, measured: float) -> Millimetres | None:
+    """Keep what a line that should be 100 mm long measured on the screen [mm]; None where no screen can be so."""
+    if not LEAST <= measured <= MOST:
+        return None
+    pixels = millimetres(screen).pixels * 100.0 / measured
+    settings().setValue(_key(screen), repr(pixels / _said(screen)))
+    return Millimetres(pixels, checked=True)
+
+
+def _said(screen: QScreen) -> float:
+    """Return device-independent pixels in a millimetre as the screen tells, or the usual where it cannot be true."""
+    dots = screen.physicalDotsPerInch() * screen.devicePixelRatio()
+    return (screen.physicalDotsPerInch() if PLAUSIBLE[0] <= dots <= PLAUSIBLE[1] else USUAL_DPI) / 25.4
+
+
+def _key(screen: QScreen) -> str:
+    """Return the name of a screen: of this very one where it has a serial number, at this scaling."""
+    parts = (screen.manufacturer(), screen.model(), screen.serialNumber(), screen.name())
+    name = "-".join(filter(None, parts)) or "screen"
+    safe = "".join(c if c.isalnum() or c == "-" else "_" for c in name)
+    return f"millimetres/{safe}-{screen.devicePixelRatio():g}"
+
+
+def line_settings(shown: Millimetres) -> tuple[Setting, ...]:
+    """Return what a session keeps of the line that is answered on: its length, and how long a millimetre is."""
+    origin = "measured" if shown.checked else "default"
+    return (
+        Setting("answer line length", LENGTH, "mm", origin),
+        Setting("pixels in a millimetre of the answering screen", round(shown.pixels, 4), "1/mm", origin),
+    )

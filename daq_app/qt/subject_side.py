@@ -9,19 +9,18 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMainWindow
 
-from daq_app.qt.answer_fields import FULL, LENGTH, newest_force
+from daq_app.qt.answer_fields import FULL, newest_force
 from daq_app.qt.bridge import Bridge
 from daq_app.qt.course_panel import CoursePanel
 from daq_app.qt.keys import Keyboard
-from daq_app.qt.preferences import direction
-from daq_app.qt.screens import USUAL_DPI, Millimetres, line_settings, millimetres
+from daq_app.qt.preferences import USUAL_DPI, Millimetres, direction, line_settings, millimetres
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.tablet.dialogue import AnswerGiven, Dialogue, Force, FromTablet, Hello, Ruler
 from daq_app.tablet.server import TabletServer, own_address
 from daq_app.window.course_state import SessionState
 from daq_app.window.live_trace import LiveTrace
 from daq_app.window.state import Message
-from daq_app.window.subject import SubjectView, translator
+from daq_app.window.subject import LENGTH, SubjectView, translator
 from daq_app.window.view import View
 from daq_app.wording import tr
 from sessions.recording import Setting

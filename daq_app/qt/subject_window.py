@@ -3,16 +3,16 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QApplication, QLabel, QVBoxLayout, QWidget
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent, QScreen, QShowEvent
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QVBoxLayout, QWidget
 
 from daq_app.qt.answer_fields import ChoiceOfTwo, NumberField, PressBar, ScoreLine
 from daq_app.qt.parts import button, fill, hbox, label, say, stacked, vbox
-from daq_app.qt.preferences import direction
-from daq_app.qt.screens import RulerCheck, millimetres
+from daq_app.qt.preferences import LEAST, MOST, checked, direction, millimetres
 from daq_app.qt.tokens import GRID, font
 from daq_app.window.subject import Kind, SubjectView, translator
 from daq_app.window.subject import SubjectText as Text
+from daq_app.wording import tr
 from sessions.plan.plan import Hand
 from sessions.plan.protocols.languages import ENGLISH
 
@@ -294,6 +294,53 @@ class _Scale(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self.fit()
+
+
+class RulerCheck(QWidget):
+    """Shows a line, and takes what a ruler says of it."""
+
+    done = Signal()
+
+    def __init__(self, scale: float) -> None:
+        super().__init__()
+        self._screen: QScreen | None = None
+        self._line = ScoreLine(lambda: 0.0)  # the very line on which is answered
+        self._line.setEnabled(False)
+        self._line.setAccessibleName(tr("line of 100 millimetres to be measured"))
+        sentence = label(tr("Hold a ruler to the line. How long is it?"), "title", wrap=True)
+        self._measured = QLineEdit()
+        self._measured.setAccessibleName(tr("length of the line in millimetres, as the ruler says"))
+        self._measured.setFixedWidth(round(100 * scale))
+        self._measured.returnPressed.connect(self._keep)
+        self._wrong = label("", "quiet", wrap=True)
+        keep = button(tr("Keep"), tr("keep the measured length"), self._keep)
+        leave = button(tr("Leave as it is"), tr("leave the line as it is"), self.done.emit)
+        row = hbox(self._measured, label("mm"), keep, leave, 1)
+        vbox(sentence, 1, hbox(1, self._line, 1), 1, row, self._wrong, on=self, margins=4 * GRID)
+
+    def begin(self, screen: QScreen) -> None:
+        self._screen = screen
+        self._line.set_pixels_per_mm(millimetres(screen).pixels)
+        self._measured.setText("100")
+        self._measured.selectAll()
+        self._measured.setFocus(Qt.FocusReason.OtherFocusReason)
+        screen_name = screen.name() or tr("without a name")
+        say(self._wrong, tr("Screen: {name}, {words}.", name=screen_name, words=millimetres(screen).words))
+
+    def _keep(self) -> None:
+        text = self._measured.text().strip().replace(",", ".")
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if self._screen is None or checked(self._screen, value) is None:
+            words = tr(
+                "Give the length in millimetres, from {least:.0f} to {most:.0f}: '{it}' is not one.",
+                least=LEAST, most=MOST, it=text,
+            )  # fmt: skip
+            say(self._wrong, words)
+            return
+        self.done.emit()
 
 
 def _set_type(widget: QLabel, size: float, scale: float, *, bold: bool = False) -> None:

@@ -35,6 +35,7 @@ NAMES = {
 }  # fmt: skip
 
 # Of an answer on the line, and of keys:
+LENGTH = 100.0  # of the line [mm]
 MIDDLE = 50.0  # where the first key press puts the mark, whichever key it is
 STEP = 1.0  # an arrow moves the mark by so much ...
 LEAP = 10.0  # ... and Page Up or Page Down by this

@@ -16,7 +16,7 @@ from solver.equilibrium.load_path import SMALL, Instant, follow, way_of
 from solver.failures import SolveFailure
 from solver.mesh import Q2P1, Mesh, local_coordinates
 from solver.mesh.mesher import Outline
-from solver.prediction import Prediction, Skin
+from solver.prediction import Prediction, Skin, SkinLine
 from solver.progress import Progress, report_part
 from solver.quantities import FIELDS, SED
 from solver.response.answer import skin_of
@@ -45,15 +45,6 @@ class Fields:
     def sed(self) -> Array:
         """SED at the nodes (n,) [MPa]."""
         return self.values[SED.name]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SkinLine:
-    """m points of the skin's surface, by which values at the nodes that are drawn are read along it."""
-
-    arc: Array  # (m,) along the skin at rest, 0 over the reference ending, towards the tip [mm]
-    nodes: Indices  # (m, 9) that are drawn
-    shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import compared, finger_words
-from daq_app.analyst.frame import FIELD_ERRORS, Contact, Finger, Frame, Parts
+from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
 from daq_app.analyst.session_words import lineage, numbers, points, progress_words, row_words, session_pictures
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
@@ -24,6 +24,7 @@ from daq_app.analyst.stroke import APART, EDGES, decision_of, edges_of, history,
 from daq_app.analyst.work import Work
 from sessions.recording.derived import set_gain_error
 from sessions.strokes.decisions import Decision, Decisions, read
+from solver.prediction import Skin
 from tests.sessions.report_example import example
 
 undo, redo = partial(reversal, again=False), partial(reversal, again=True)
@@ -32,7 +33,7 @@ SESSION = Path(__file__).parents[1] / "data" / "sessions" / "version-1" / "seale
 NOTHING = np.empty(0)
 FINGER = Finger(
     Parts(np.empty((0, 3), np.int64), np.empty((0, 8), np.int64), np.empty(0, np.int64)),
-    Frame(np.zeros((1, 2)), {"sed": np.zeros(1)}, {}, np.zeros((1, 2)), Contact(*[NOTHING] * 4, ()), NOTHING),
+    Frame(np.zeros((1, 2)), {"sed": np.zeros(1)}, {}, np.zeros((1, 2)), Skin(*[NOTHING] * 4, ()), NOTHING),
     NOTHING,
 )
 

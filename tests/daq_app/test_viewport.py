@@ -5,10 +5,8 @@ import pytest
 
 from daq_app.analyst.frame import (
     FIELD_CHOICES,
-    Contact,
     Frame,
     Parts,
-    SkinLine,
     View,
     along_line,
     along_skin,
@@ -16,6 +14,7 @@ from daq_app.analyst.frame import (
     probe_words,
     value_at,
 )
+from solver.prediction import Skin, SkinLine
 
 NONE = np.empty(0)
 BY_NAME = {field.name: field for field in FIELD_CHOICES}
@@ -30,7 +29,7 @@ PARTS = Parts(TRIANGLES, np.empty((0, 8), np.int64), np.array([0, 1, 2, 2]), SID
 
 
 def frame(**values):
-    return Frame(NODES, {"sed": PLANE, **values}, {}, NODES, Contact(NONE, NONE, NONE, NONE, ()), NONE)
+    return Frame(NODES, {"sed": PLANE, **values}, {}, NODES, Skin(NONE, NONE, NONE, NONE, ()), NONE)
 
 
 def test_all_of_a_box_is_shown_at_the_foot_of_the_picture_and_a_pixel_leads_back_to_its_place():

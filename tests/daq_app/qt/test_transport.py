@@ -1,27 +1,50 @@
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from daq_app.qt.transport_bar import Transport
+from daq_app.qt.transport_bar import SPEEDS, TransportBar
 
 pytestmark = pytest.mark.qt
+TIMES = [1.0, 1.5, 2.0, 4.0]
 
 
-@given(steps=st.lists(st.tuples(st.sampled_from(["play", "pause", "seek", "speed"]), st.floats(0.0, 2.0)), max_size=12))
-def test_a_replay_never_leaves_its_recording_and_stands_still_when_paused(steps):
-    now, transport = 0.0, Transport(1.0, 4.0, 1.0)
+@pytest.mark.usefixtures("application")
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(steps=st.lists(st.tuples(st.sampled_from(["play", "seek", "speed", "on"]), st.integers(0, 3)), max_size=12))
+def test_a_replay_stands_where_it_was_put_whatever_plays_and_however_fast(steps):
+    bar, shown = TransportBar("the replay"), []
+    bar.moved.connect(shown.append)
+    bar.set_times(TIMES, 1)
     for what, by in steps:
-        before = transport.at(now)
+        before = shown[-1]
         match what:
             case "play":
-                transport = transport.played(now)
-            case "pause":
-                transport = transport.paused(now)
-                assert transport.at(now + by) == pytest.approx(before)
+                bar.toggle()
+                assert shown[-1] == (0 if before == len(TIMES) - 1 and bar.playing else before)
             case "seek":
-                transport = transport.sought(by * 3.0, now)
+                bar.seek(by)
+                assert shown[-1] == by
             case "speed":
-                transport = transport.at_speed(0.1 + by, now)
-                assert transport.at(now) == pytest.approx(before)
-        now += by
-        assert 1.0 <= transport.at(now) <= 4.0
+                bar.speed.setCurrentIndex(by)
+                bar.speed.activated.emit(by)
+                assert shown[-1] == before
+            case "on":
+                bar.step(+1)
+                assert (shown[-1], bar.playing) == (min(before + 1, len(TIMES) - 1), False)
+
+
+def test_a_replay_ends_at_its_last_reading_and_begins_anew_from_there(application):
+    bar, shown, ended = TransportBar("the replay"), [], []
+    bar.moved.connect(shown.append)
+    bar.ended.connect(lambda: ended.append(bar.playing))
+    bar.set_times([0.0, 0.1, 0.2])
+    bar.speed.setCurrentIndex(SPEEDS.index(4.0))
+    bar.speed.activated.emit(SPEEDS.index(4.0))
+    bar.toggle()
+    while not ended:
+        application.processEvents()
+    assert (shown[-1], ended, bar.play.text()) == (2, [False], "▶")
+    bar.toggle()
+    assert shown[-1] == 0
+    assert bar.playing
+    bar.toggle()

@@ -22,11 +22,11 @@ from PySide6.QtWidgets import QApplication
 QSettings.setDefaultFormat(QSettings.Format.IniFormat)
 QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, sys.argv[1])
 application = QApplication([])
-from daq_app.qt import screens
+from daq_app.qt import preferences
 from daq_app.qt.subject_window import SubjectWindow
 desk, tablet = application.screens()
-screens.checked(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
-screens.checked(tablet, 125.0)  # and 125 here
+preferences.checked(desk, 80.0)     # a line meant to be 100 mm long measured 80 there
+preferences.checked(tablet, 125.0)  # and 125 here
 subject = SubjectWindow(1.0, lambda: 0.0)
 subject.show()
 told = []

@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from daq_app.qt import answer_fields, preferences, screens, tokens
+from daq_app.qt import answer_fields, preferences, tokens
 from daq_app.qt.answer_fields import FULL, PressBar
 from daq_app.qt.keys import KEYS, act_of
 from daq_app.qt.live_panel import FINITE, LivePanel
@@ -176,7 +176,7 @@ def test_below_1366_pixels_the_bench_folds_and_a_key_unfolds_it(driver):
 def fitted(subject):
     """Let the line fit its screen, and return what is known of that."""
     subject.fit_screen()
-    return screens.millimetres(subject.screen())
+    return preferences.millimetres(subject.screen())
 
 
 def test_a_key_chooses_the_kinematics_of_the_live_model_and_the_choice_is_remembered(driver):
@@ -284,12 +284,12 @@ def test_the_line_is_100_mm_long_by_the_ruler_that_was_held_to_it(driver):
     subject = driver.window.subject
     screen = subject.screen()
     before = fitted(subject).pixels
-    assert screens.checked(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
+    assert preferences.checked(screen, 80.0) is not None  # a line meant to be 100 mm measured 80
     assert fitted(subject).pixels == pytest.approx(before * 100 / 80)
     assert fitted(subject).checked
     length = subject.line.place_of(100.0) - subject.line.place_of(0.0)
     assert QPointF(length).x() == pytest.approx(100 * before * 100 / 80, abs=1e-6)
-    assert screens.checked(screen, 3.0) is None
+    assert preferences.checked(screen, 3.0) is None
     preferences.settings().clear()
     assert fitted(subject).pixels == pytest.approx(before)
 

@@ -7,8 +7,9 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
-from daq_app.analyst.frame import Contact, Film, Frame, Instant, Parts
+from daq_app.analyst.frame import Film, Frame, Instant, Parts
 from daq_app.analyst.stroke import RawReadings
+from solver.prediction import Skin
 
 SESSION = Path(__file__).parents[3] / "data" / "sessions" / "version-1" / "sealed"
 
@@ -39,7 +40,7 @@ def until(application, condition):
 
 def frame(sed):
     square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    contact = Contact(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
+    contact = Skin(np.array([0.0, 1.0]), np.zeros(2), np.ones(2), np.ones(2), ("stick", "slip"))
     return Frame(square, {"sed": np.full(3, sed)}, {"skin": square}, square, contact, np.array([sed, sed]))
 
 
