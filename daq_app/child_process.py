@@ -53,14 +53,29 @@ def fresh_processes() -> "SpawnContext":
     return get_context("spawn")
 
 
-def begin(target: Callable[..., None], *more: object, name: str) -> tuple["BaseProcess", Any]:
-    """Start a process that ends with this one; return it, and our end of the pipe of which `target` gets the other."""
-    context = fresh_processes()
-    ours, theirs = context.Pipe()
-    process = context.Process(target=target, args=(theirs, *more), daemon=True, name=name)
-    process.start()
-    theirs.close()
-    return process, ours
+class Child:
+    """A process that ends with this one, at the other end of a pipe. Nothing here waits for it."""
+
+    def __init__(self, target: Callable[..., None], *more: object, name: str) -> None:
+        """Start it: `target` gets its end of the pipe, and `more`."""
+        context = fresh_processes()
+        self._pipe, theirs = context.Pipe()
+        self.process: BaseProcess = context.Process(target=target, args=(theirs, *more), daemon=True, name=name)
+        self.process.start()
+        theirs.close()
+
+    def send(self, message: object) -> None:
+        """Send a message. Raises OSError where the process is gone."""
+        self._pipe.send(message)
+
+    def receive(self) -> Any:  # noqa: ANN401  whatever the process sends
+        """Return the next message, None where none has come. Raises EOFError or OSError where the process is gone."""
+        return self._pipe.recv() if self._pipe.poll() else None
+
+    def close(self) -> None:
+        """End it."""
+        self._pipe.close()
+        self.process.terminate()
 
 
 def process_pool(workers: int) -> "ProcessPoolExecutor":

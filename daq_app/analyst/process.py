@@ -5,12 +5,11 @@ import sys
 import time
 from collections import deque
 from contextlib import suppress
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
 from daq_app.analyst import state as m
-from daq_app.child_process import begin
+from daq_app.child_process import Child
 from daq_app.wording import tr
 
 Connection = Any  # one end of a pipe; its type is another one on each system
@@ -92,21 +91,19 @@ class Analyst:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
         self._stopped: float | None = None  # when it was asked to stop and has not yet
-        self._start()
+        self._child: Child | None = self._begin()
 
     def poll(self) -> tuple[m.Said, ...]:
         """Return what came since the last call."""
         said: list[m.Said] = []
-        while self._connection is not None:
+        while self._child is not None:
             try:
-                if not self._connection.poll():
+                if (message := self._child.receive()) is None:
                     break
-                said.append(self._connection.recv())
+                said.append(message)
             except (EOFError, OSError):
-                self._gone()
+                self.close()
                 if not said or not isinstance(said[-1], m.Problem):
                     words = tr("The work has stopped without a word; what is asked next begins it anew.")
                     said.append(m.Problem(words))
@@ -121,25 +118,18 @@ class Analyst:
         """Ask for something; where the work was ended before, it begins anew and does that first."""
         if isinstance(request, m.Stop):
             self._stopped = time.monotonic()
-        if self._connection is None:
+        if self._child is None:
             if isinstance(request, m.Stop):
                 return
-            self._start()
-        assert self._connection is not None
+            self._child = self._begin()
         with suppress(OSError):  # `poll` finds that it is gone
-            self._connection.send(request)
+            self._child.send(request)
 
     def close(self) -> None:
         """End the work."""
-        if self._process is not None:
-            self._process.terminate()
-        self._gone()
+        if self._child is not None:
+            self._child.close()
+        self._child = self._stopped = None
 
-    def _start(self) -> None:
-        self._process, self._connection = begin(run, str(self._folder), name="analyst")
-
-    def _gone(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
-        self._process = self._connection = None
-        self._stopped = None
+    def _begin(self) -> Child:
+        return Child(run, str(self._folder), name="analyst")

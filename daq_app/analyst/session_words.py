@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from daq_app.analyst.state import AnalystState, Row, Step, chosen, rows
-from daq_app.wording import errors_words, tr, tr_noop
+from daq_app.wording import errors_words, quantity, tr, tr_noop
 from sessions.prediction import SED
 from sessions.report.contents import PredictionFinding, Report, StrokeFinding
 from sessions.report.wording import shown_response
@@ -39,7 +39,7 @@ def words_of(row: Row) -> str:
     if row.stroke is None:
         assert row.prediction is not None  # a row has at least one of them
         return _named(row.prediction) + tr("  no stroke")
-    mu = "µ –" if row.stroke.mu_dynamic is None else f"µ {row.stroke.mu_dynamic:.2f}"
+    mu = f"µ {quantity(row.stroke.mu_dynamic, 2)}"
     mark = ("  !" if row.stroke.flaws else "") + ("  ✎" if row.stroke.decided else "")
     failed = "  ✗" if row.prediction is not None and row.prediction.sed is None else ""
     return f"{_named(row.stroke)}  {mu}{mark}{failed}"
@@ -47,14 +47,10 @@ def words_of(row: Row) -> str:
 
 def marks_of(row: Row) -> str:
     """Return what the marks of a line mean, for who hovers and for screen readers."""
-    remarks: list[str] = []
-    if row.stroke is not None and row.stroke.flaws:
-        remarks.append(tr("! has flaws: ") + _flaws(row.stroke))
-    if row.stroke is not None and row.stroke.decided:
-        remarks.append(tr("✎ somebody decided something about it"))
-    if row.prediction is not None and row.prediction.sed is None:
-        remarks.append(tr("✗ the model has no SED for it"))
-    return "; ".join(remarks)
+    stroke, failed = row.stroke, row.prediction is not None and row.prediction.sed is None
+    flaws = tr("! has flaws: ") + _flaws(stroke) if stroke is not None and stroke.flaws else ""
+    decided = tr("✎ somebody decided something about it") if stroke is not None and stroke.decided else ""
+    return "; ".join(filter(None, (flaws, decided, tr("✗ the model has no SED for it") if failed else "")))
 
 
 def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
@@ -147,8 +143,7 @@ def condition(report: Report | None, said: PredictionFinding) -> str:
     The window shows another number while a session runs: that at the measured force.
     """
     depth = "" if said.indentation is None else tr("at {depth:.3g} mm", depth=said.indentation)
-    strain = "" if report is None else tr(report.model.split(",")[0])
-    return ", ".join(part for part in (depth, strain) if part)
+    return ", ".join(filter(None, (depth, "" if report is None else tr(report.model.split(",")[0]))))
 
 
 def friction_table(report: Report | None) -> tuple[tuple[str, ...], ...]:
@@ -174,11 +169,6 @@ def scene_table(state: AnalystState) -> tuple[tuple[str, str, str], ...]:
     return tuple(facts)
 
 
-def row_words(state: AnalystState) -> tuple[str, ...]:
-    """Return every line of the list."""
-    return tuple(words_of(row) for row in rows(state))
-
-
 def session_pictures(report: Report | None) -> tuple[tuple[str, str], ...]:
     """Return names and words of the pictures of a whole session, whether or not there are numbers for them."""
     if report is None:
@@ -195,16 +185,15 @@ def points(state: AnalystState) -> tuple[Point, ...]:
     report = state.report
     if report is None:
         return ()
-    listed, shown = rows(state), shown_response(state.response)
+    shown = shown_response(state.response)
+    scores = {(one.name, score.index): score.mean for one in report.experiments for score in one.scores}
     points: list[Point] = []
-    for experiment in report.experiments:
-        scores = {score.index: score.mean for score in experiment.scores}
-        for number, row in enumerate(listed):
-            said = row.prediction
-            response = None if said is None else shown.of(said)
-            if said is None or not response or said.experiment != experiment.name or said.index not in scores:
-                continue
-            points.append(Point(experiment.name, said.index, scores[said.index], shown.factor * response[0], number))
+    for number, row in enumerate(rows(state)):
+        said = row.prediction
+        response = None if said is None else shown.of(said)
+        if said is not None and said.index is not None and response and (said.experiment, said.index) in scores:
+            score = scores[said.experiment, said.index]
+            points.append(Point(said.experiment, said.index, score, shown.factor * response[0], number))
     return tuple(points)
 
 
@@ -219,9 +208,8 @@ def progress_words(step: Step | None) -> str:
     if step is None:
         return ""
     left = "" if step.left is None else tr(", about {seconds} s left", seconds=int(step.left) + 1)
-    done = f"{100 * step.part:.0f} %"
-    if steps := step.load_steps:
-        done = tr("load step {step} of {steps}", step=round(step.part * steps), steps=steps)
+    at, steps = round(step.part * step.load_steps), step.load_steps
+    done = tr("load step {step} of {steps}", step=at, steps=steps) if steps else f"{100 * step.part:.0f} %"
     return f"{tr(step.words)}  {done}{left}"
 
 
@@ -242,16 +230,14 @@ def _value(of: StrokeFinding | PredictionFinding, name: str, form: str, factor: 
 
 
 def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
-    stimulus = f"{s.experiment} {s.code if s.index is None else s.index}".strip()
     low, high = s.mu_interval or (None, None)
     tau = None if s.tau_max is None else 1000.0 * s.tau_max
-    forms = (s.mu_max, 3), (tau, 1), (s.speed, 1), (s.normal_force, 2)
     return (
         tr("stroke {number}", number=s.number) if s.trial is None else str(s.trial),
-        stimulus or "–",
-        "–" if s.mu_dynamic is None else f"{s.mu_dynamic:.3f}",
+        f"{s.experiment} {s.code if s.index is None else s.index}".strip() or "–",
+        quantity(s.mu_dynamic, 3),
         "–" if low is None else tr("{low:.3f} to {high:.3f}", low=low, high=high),
-        *("–" if value is None else f"{value:.{digits}f}" for value, digits in forms),
+        *(quantity(*pair) for pair in ((s.mu_max, 3), (tau, 1), (s.speed, 1), (s.normal_force, 2))),
         "–" if s.direction is None else tr(WAYS[s.direction]),
         _flaws(s),
     )
@@ -283,13 +269,10 @@ def lineage(state: AnalystState) -> tuple[Link, ...]:
     if stroke.steady is not None:
         words = tr("steady window {begin:.3f} to {end:.3f} s", begin=stroke.steady[0], end=stroke.steady[1])
         links.append(Link(words, "window", tr("of stroke {number}, device's clock", number=stroke.number)))
-    read = state.read
-    if read is not None and read.stroke == stroke.number:
-        links.append(Link(tr("readings: {count}", count=len(read.readings)), "readings", read.readings.place))
-    else:
-        more = tr("counts, sequence and device counter, as they were recorded")
-        links.append(Link(tr("raw readings"), "readings", more))
-    return tuple(links)
+    words, more = tr("raw readings"), tr("counts, sequence and device counter, as they were recorded")
+    if state.read is not None and state.read.stroke == stroke.number:
+        words, more = tr("readings: {count}", count=len(state.read.readings)), state.read.readings.place
+    return (*links, Link(words, "readings", more))
 
 
 def _friction(stroke: StrokeFinding, said: PredictionFinding | None) -> Link:
@@ -297,6 +280,5 @@ def _friction(stroke: StrokeFinding, said: PredictionFinding | None) -> Link:
         tau = "" if stroke.tau_max is None else tr(", τ max {tau_max:.1f} kPa", tau_max=1000.0 * stroke.tau_max)
         rule = tr("the model was given the {rule}", rule=tr(said.mu_rule))
         return Link(f"µ {said.mu:.3f}{tau}", "friction", rule)
-    if stroke.mu_dynamic is None:
-        return Link("µ –", "friction", stroke.reasons.get("mu_dynamic", ""))
-    return Link(f"µ {stroke.mu_dynamic:.3f}", "friction", tr("mean over the steady window"))
+    why = stroke.reasons.get("mu_dynamic", "") if stroke.mu_dynamic is None else tr("mean over the steady window")
+    return Link(f"µ {quantity(stroke.mu_dynamic, 3)}", "friction", why)

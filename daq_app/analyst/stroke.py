@@ -22,6 +22,7 @@ AROUND = 1.0  # before and after a stroke of a recording without trials [s]
 MOST_FOR_ZERO = 0.3  # of the readings before contact that give the zero of a replay [s]
 Edge = Literal["onset", "lift", "steady begin", "steady end"]
 EDGES: tuple[Edge, ...] = tr_noop(("onset", "steady begin", "steady end", "lift"))
+PLACES = tr_noop(("{name}/{file}, table blocks{rows}", "{name}/{file}, data sets readings/…{rows}"))  # live, sealed
 APART = 0.02  # edges keep so far from each other [s]
 STEP, LEAP = 0.005, 0.05  # a key moves an edge by so much [s]
 WHAT: dict[Edge, str] = {"onset": "onset", "lift": "lift", "steady begin": "steady", "steady end": "steady"}
@@ -77,9 +78,8 @@ class RawFile:
             return tr("{name}: no readings", name=folder.name)
         first = self._row(int(block.sequence[0]), int(block.received_ns[0]))
         rows = "" if first is None else tr(", rows {first} to {last}", first=first, last=first + len(block) - 1)
-        if (folder / SEALED_FILE).is_file():
-            return tr("{name}/{file}, data sets readings/…{rows}", name=folder.name, file=SEALED_FILE, rows=rows)
-        return tr("{name}/{file}, table blocks{rows}", name=folder.name, file=LIVE_FILE, rows=rows)
+        sealed = (folder / SEALED_FILE).is_file()
+        return tr(PLACES[sealed], name=folder.name, file=SEALED_FILE if sealed else LIVE_FILE, rows=rows)
 
     def _row(self, sequence: int, received_ns: int) -> int | None:
         """Return the row of a reading; None where its block is damaged or gone."""
@@ -128,12 +128,11 @@ class Placed:
 
 def edges_of(stroke: StrokeFinding) -> tuple[Placed, ...]:
     """Return the edges in order of time; of a stroke without a steady window where one could lie."""
-    if stroke.onset is None and stroke.trace is None:
+    trace = stroke.trace
+    if stroke.onset is None and trace is None:
         return ()
-    begin = stroke.onset if stroke.onset is not None else 0.0 if stroke.trace is None else stroke.trace.origin
-    end = stroke.lift
-    if end is None:
-        end = begin if stroke.trace is None or not stroke.trace.time else begin + stroke.trace.time[-1]
+    begin = stroke.onset if stroke.onset is not None else 0.0 if trace is None else trace.origin
+    end = stroke.lift if stroke.lift is not None else begin + (trace.time[-1] if trace and trace.time else 0.0)
     steady = stroke.steady or (begin + 0.35 * (end - begin), begin + 0.75 * (end - begin))
     times = dict(zip(EDGES, (begin, *steady, end), strict=True))
     there = {"onset": stroke.onset is not None, "lift": stroke.lift is not None, "steady": stroke.steady is not None}
@@ -152,13 +151,10 @@ def within(stroke: StrokeFinding, edge: Edge, time: float) -> float:
 def decision_of(stroke: StrokeFinding, edge: Edge, time: float, by: str, why: str) -> Decision:
     """Return the decision that moves an edge."""
     what, new = WHAT[edge], within(stroke, edge, time)
-    old: object = getattr(stroke, what)
-    if what == "steady":
-        times = {placed.edge: placed.time for placed in edges_of(stroke)} | {edge: new}
-        span = (times["steady begin"], times["steady end"])
-        return Decision(by, why, what, stroke.trial, stroke.within, stroke.steady, span)
-    assert old is None or isinstance(old, float)
-    return Decision(by, why, what, stroke.trial, stroke.within, old, new)
+    old = {"onset": stroke.onset, "lift": stroke.lift, "steady": stroke.steady}[what]
+    times = {placed.edge: placed.time for placed in edges_of(stroke)} | {edge: new}
+    value = (times["steady begin"], times["steady end"]) if what == "steady" else new
+    return Decision(by, why, what, stroke.trial, stroke.within, old, value)
 
 
 def reversal(decisions: Decisions, by: str, *, again: bool) -> Decision | None:

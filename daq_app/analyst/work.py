@@ -166,15 +166,14 @@ class Work:
         from sessions.report.figures.style import in_pixels, look
 
         what, _, of = name.partition(" ")
-        report = self._report
+        report, panel = self._report, None
         with in_pixels(note) as pixels:
             if what in ("finger", "contact"):
                 every = self._fields()
-                field = self._field(of, every)
-                with look():
-                    levels = common_levels(tuple(every.values()) or (field,)) if field is not None else ()
-                    pair = None if field is None else finger_panels(field, levels, simulated=report.simulated)
-                panel = None if pair is None else pair[what == "contact"]
+                if (field := self._field(of, every)) is not None:
+                    with look():
+                        levels = common_levels(tuple(every.values()) or (field,))
+                        panel = finger_panels(field, levels, simulated=report.simulated)[what == "contact"]
             elif what == "compared":
                 panel = self._compared_panel()
             elif what == "stroke":
@@ -222,12 +221,8 @@ class Work:
 
     def _fields(self) -> dict[int, Field]:
         """Return the finger of every trial that was answered, by the number of its stroke."""
-        fields: dict[int, Field] = {}
-        for (_, stroke), (row, _) in self._ways.items():
-            field = field_of(row.block or "", row)
-            if field is not None and stroke is not None:
-                fields[stroke] = field
-        return fields
+        drawn = ((stroke, field_of(row.block or "", row)) for (_, stroke), (row, _) in self._ways.items())
+        return {stroke: field for stroke, field in drawn if field is not None and stroke is not None}
 
     def _film(self, key: m.Key) -> None:
         kept = self._ways.get(key)
@@ -236,18 +231,16 @@ class Work:
         prediction, way = kept
         if way is None:
             raise NothingToShow(prediction.reasons.get("sed") or tr("A history is drawn at small strain only."))
-        sketch = self._sketch(way.finger.geometry.mesh, way.scene)
-        if way.march is not None:
-            progress = self.timed(tr("drawing the history"), len(way.march))
-            self._filmed = m.Filmed(key, film_of(way, way.march, sketch, progress))
-            self._say(self._filmed)
-            return
-        if prediction.prediction is not None or way.scene.materials.relax:
+        if way.march is None and (prediction.prediction is not None or way.scene.materials.relax):
             raise NothingToShow(tr("The way of tissues that relax is not kept as states that can be drawn."))
-        film, stop = lost_film(way, sketch, self.timed(tr("drawing the history")))
-        why = prediction.reasons.get("sed", "")
-        if stop:
-            why = tr("{first} Followed from first touch: {why}", first=why, why=stop)
+        sketch, why = self._sketch(way.finger.geometry.mesh, way.scene), ""
+        progress = self.timed(tr("drawing the history"), len(way.march or ()))
+        if way.march is not None:
+            film = film_of(way, way.march, sketch, progress)
+        else:
+            film, stop = lost_film(way, sketch, progress)
+            why = prediction.reasons.get("sed", "")
+            why = tr("{first} Followed from first touch: {why}", first=why, why=stop) if stop else why
         self._filmed = m.Filmed(key, film, why)
         self._say(self._filmed)
 
@@ -259,8 +252,7 @@ class Work:
         fingers: dict[m.Key, Finger] = {}
 
         def answered(_number: int, row: TrialPrediction, _way: Way | None) -> None:
-            finger = self._finger(row.prediction)
-            if finger is not None:
+            if (finger := self._finger(row.prediction)) is not None:
                 finding = finding_of(row)
                 fingers[finding.trial, finding.stroke] = finger
 
@@ -305,13 +297,11 @@ class Work:
         panel, png = self._panel(name, note)
         if panel is None:
             raise NothingToShow(tr("There are no numbers for this picture."))
-        match path.suffix.lower():
-            case ".svg":
-                swap_in(path, panel.svg)
-            case ".csv":
-                swap_in(path, panel_csv(panel, " · ".join(filter(None, (self._report.head, note)))))
-            case _:
-                write_whole(path, png)
+        if (suffix := path.suffix.lower()) in (".svg", ".csv"):
+            head = " · ".join(filter(None, (self._report.head, note)))
+            swap_in(path, panel.svg if suffix == ".svg" else panel_csv(panel, head))
+        else:
+            write_whole(path, png)
         return str(path)
 
 

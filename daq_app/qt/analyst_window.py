@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 
 from daq_app.analyst import state as m
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_words, row_words
+from daq_app.analyst.session_words import Link, greatest_errors, lineage, marks_of, points, progress_words, words_of
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.qt.keys import ANALYST_KEYS, KeysPage
 from daq_app.qt.model_column import FINGER, SESSION, ModelColumn
@@ -294,7 +294,7 @@ class TrialsColumn(QWidget):
         vbox(head, (self.list, 3), below, self.responses, self.errors, (self.relation, 2), on=self)
 
     def show_state(self, state: AnalystState) -> None:
-        listed = row_words(state)
+        listed = tuple(words_of(row) for row in rows(state))
         self.list.blockSignals(True)
         if len(listed) != self.list.count():
             self.list.clear()

@@ -4,10 +4,9 @@ import signal
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing.process import BaseProcess
 from typing import Any
 
-from daq_app.child_process import begin, give_way
+from daq_app.child_process import Child, give_way
 from daq_app.recorder.messages import Live
 from daq_app.window.live_model import Forces, Kinematics, Provisional, Ready, Settle, Settled, Use, forces_of, joined
 from daq_app.wording import tr
@@ -65,8 +64,7 @@ class LiveModel:
         self.problem = ""  # why nothing is said; empty where all is well
         self.predictions = 0  # that came so far
         self._news: list[Provisional] = []
-        self._process: BaseProcess | None = None
-        self._connection: Connection | None = None
+        self._child: Child | None = None
         self._under_way = 0
         self._waiting: list[Forces] = []
         self._requests: list[Use | Settle] = []
@@ -75,38 +73,34 @@ class LiveModel:
 
     def prepare(self) -> None:
         """Start the process; it follows the published finger until a plan tells of another."""
-        if self._process is not None:
-            return
-        self._process, self._connection = begin(run, name="live model")
-        self._under_way, self.problem = 0, ""
-        self._use()
+        if self._child is None:
+            self._child = Child(run, name="live model")
+            self._under_way, self.problem = 0, ""
+            self._use()
 
     def close(self) -> None:
         """Let it end."""
-        if self._connection is not None:
-            self._connection.close()
-        if self._process is not None:
-            self._process.terminate()
-        self._process = self._connection = None
+        if self._child is not None:
+            self._child.close()
+        self._child = None
 
     def follow(self, plan: SessionPlan | None) -> None:
         """Follow the finger of another plan."""
         self._plan, self.settled = plan, None
-        if self._process is None and self.problem:
+        if self._child is None and self.problem:
             self.prepare()  # one that has ended gets another chance with the next session
-        elif self._process is not None:
+        else:
             self._use()
 
     def follow_at(self, kinematics: Kinematics) -> None:
         """Follow the same finger in this kinematics."""
         if kinematics != self.kinematics:
             self.kinematics = kinematics
-            if self._process is not None:
-                self._use()
+            self._use()
 
     def add(self, live: Live, frame: Frame) -> None:
         """Take readings."""
-        forces = None if self._connection is None else forces_of(live, frame)
+        forces = None if self._child is None else forces_of(live, frame)
         if forces is None:
             return
         if self._waiting and self._waiting[-1].stream != forces.stream:
@@ -117,21 +111,20 @@ class LiveModel:
 
     def settle(self, request: Settle) -> None:
         """Ask for the full solve of a stroke."""
-        if self._connection is not None:
+        if self._child is not None:
             self._requests.append(request)
 
     def poll(self) -> tuple[Provisional, ...]:
         """Take what came, and send what waits; return the predictions that are new."""
-        if self._connection is None:
+        if self._child is None:
             return ()
         self._news = []
         try:
-            while self._connection.poll():
-                message = self._connection.recv()
+            while (message := self._child.receive()) is not None:
                 self._under_way -= not isinstance(message, Settled)  # it comes when it comes
                 self._heard(message)
             if not self._under_way:
-                self._send(self._connection)
+                self._send(self._child)
         except (EOFError, OSError):
             self.close()
             self.problem = tr("the live model has stopped; it starts again with the next session")
@@ -150,14 +143,14 @@ class LiveModel:
             case Settled():
                 self.settled = message
 
-    def _send(self, connection: Connection) -> None:
+    def _send(self, child: Child) -> None:
         if self._requests:
             request = self._requests.pop(0)
-            connection.send(request)
+            child.send(request)
             if isinstance(request, Settle):
                 return
         elif self._waiting and not self.problem:
-            connection.send(joined(self._waiting))
+            child.send(joined(self._waiting))
             self._waiting = []
         else:
             return

@@ -18,7 +18,7 @@ from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import compared, finger_words
 from daq_app.analyst.frame import FIELD_ERRORS, Finger, Frame, Parts
 from daq_app.analyst.process import Analyst
-from daq_app.analyst.session_words import lineage, numbers, points, progress_words, row_words, session_pictures
+from daq_app.analyst.session_words import lineage, numbers, points, progress_words, session_pictures, words_of
 from daq_app.analyst.state import AnalystState, chosen, fold, rows
 from daq_app.analyst.stroke import APART, EDGES, decision_of, edges_of, history, reversal, within
 from daq_app.analyst.work import Work
@@ -51,7 +51,7 @@ def steady(state):
 def test_every_stroke_has_a_line_that_names_its_trial(state):
     listed = rows(state)
     assert [row.stroke for row in listed if row.stroke] == list(state.report.strokes)
-    for row, words in zip(listed, row_words(state), strict=True):
+    for row, words in zip(listed, [words_of(row) for row in rows(state)], strict=True):
         assert row.prediction is None or row.stroke is None or row.prediction.stroke == row.stroke.number
         assert row.trial is None or words.startswith(str(row.trial))
 

@@ -64,7 +64,7 @@ def test_the_recorder_runs_nothing_that_lies_in_the_current_folder():
 def test_the_live_model_runs_nothing_that_lies_in_the_current_folder():
     model = LiveModel()
     model.prepare()
-    process = model._process
+    process = model._child.process
     try:
 
         def ready():
@@ -91,7 +91,7 @@ def test_the_watch_over_takes_runs_nothing_that_lies_in_the_current_folder():
 @pytest.mark.usefixtures("malicious")
 def test_the_analysts_work_runs_nothing_that_lies_in_the_current_folder(tmp_path):
     analyst = Analyst(tmp_path / "no session")
-    process = analyst._process
+    process = analyst._child.process
     try:
         said = wait_for(lambda: next((one for one in analyst.poll() if isinstance(one, Problem)), None))
         assert "holds no recording" in said.sentence

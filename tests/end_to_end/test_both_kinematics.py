@@ -70,7 +70,7 @@ def test_the_window_shows_the_kept_prediction_and_draws_every_surface(predicted)
     strain, said = document["options"]["kinematics"], []
     work = Work(folder, said.append)
     work.go_on()
-    report = next(one.report for one in said if isinstance(one, m.Found) and one.stage == "predicted")
+    report = next(one.report for one in said if isinstance(one, m.ReportReady) and one.stage == "predicted")
     answered = [one for one in said if isinstance(one, m.Answered)]
     assert len(answered) == 10
     assert report.model.startswith(f"{strain} strain")

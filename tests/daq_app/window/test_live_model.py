@@ -240,7 +240,7 @@ def test_a_process_of_its_own_answers_batches_and_the_full_solve_beside_them():
         said = model.predictions
         until(lambda: (model.poll(), model.settled is not None and model.predictions > said)[1])
         assert abs(model.settled.difference) < 0.02
-        model._process.terminate()
+        model._child.process.terminate()
         until(lambda: model.poll() or model.problem)
         assert "next session" in model.problem
     finally:
