@@ -122,14 +122,17 @@ class Finger(ABC, Generic[Placed]):
         They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
         quantity at the ending.
         """
-        displacement = self.recovered(states, self.ending, self.point)
+        return self._numbers(states, self.recovered(states, self.ending, self.point))
+
+    def _numbers(self, states: Sequence[EquilibriumState], displacement: Array) -> Array:
         responses = self.ending.responses(displacement)[:, 0].T
         rest = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
         return np.column_stack([responses[:, 0], rest, self.point.average(displacement)[0], responses])
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
         """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
-        return np.hstack([self.all_numbers(states), self.row.average(self.recovered(states, self.row)).T])
+        displacement = self.recovered(states, self.ending, self.point, self.row)
+        return np.hstack([self._numbers(states, displacement), self.row.average(displacement).T])
 
     def responses(self, states: Sequence[EquilibriumState]) -> Array:
         """Return every quantity at the reference ending of several states (c, q)."""
