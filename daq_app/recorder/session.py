@@ -17,7 +17,7 @@ from daq_app.recorder.bench import Bench, NotNow
 from daq_app.recorder.device_history import remember_zero
 from daq_app.recorder.display import Display
 from daq_app.recorder.pipes import Inbox
-from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, itself
+from daq_app.simulation.wiring import SimulatedHand, SimulatedPeople, SimulatedSubject, planted_surface
 from drivers.clock import Clock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
@@ -290,27 +290,29 @@ def _helper(prepared: Prepared, bench: Bench) -> Operator | None:
     connected = bench.connected if prepared.plan.forces else None
     if people.kind == "people":
         return None
-    known = _knowing(prepared.plan, prepared.writer.folder)
+    subject, known = SimulatedSubject(people.seed), _index_of(prepared.plan, prepared.writer.folder)
     if people.kind == "simulated people":
-        return SimulatedPeople(people.seed, prepared.clock, connected, known, people.planted)
-    return None if connected is None else SimulatedHand(people.seed, connected, known, people.planted)
+        return SimulatedPeople(
+            subject, prepared.clock, connected, lambda trial: planted_surface(known(trial), people.planted)
+        )
+    return SimulatedHand(subject, connected, lambda trial: planted_surface(known(trial), people.planted))
 
 
-def _knowing(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
-    """Return how a simulated bench knows what is on it: where codes are blinded, from the study's key."""
+def _index_of(plan: SessionPlan, folder: Path) -> Callable[[Trial], Trial]:
+    """Return what tells a simulated bench the index of a trial's stimulus: where codes are blinded, the study's key."""
     if not plan.blinded:
-        return itself
+        return lambda trial: trial
     try:
         key = study_key(folder.parent)
     except StudyError as error:
         raise NotNow(f"simulated people must know which stimulus is which: {error}") from error
-    return itself if key is None else key.of
+    return (lambda trial: trial) if key is None else key.of
 
 
 def _check_people(people: m.People, plan: SessionPlan, bench: Bench, folder: Path) -> None:
     """Raise NotNow where simulated people would have to stroke a real bench, or cannot tell stimuli apart."""
     if people.kind != "people":
-        _knowing(plan, folder)
+        _index_of(plan, folder)
     simulated_bench = bench.connected is not None and bench.connected.bench is not None
     if people.kind == "simulated people" and plan.forces and not simulated_bench:
         raise NotNow("simulated people stroke the simulated bench only: connect sim:")

@@ -3,32 +3,39 @@
 Ten subjects stroke and score the ten surfaces of the paper. Fingers differ in friction, transducers in calibration,
 people in how they use the scale; scores follow the maker's index and the friction that a subject's own finger feels,
 drift within a block and carry over from one trial to the next. Nobody here knows of a model of the finger.
+
+The people of one study are ten of very many, and its intervals are for the others too, on the same ten surfaces. So
+very many more, each with a finger of its own, judge these surfaces in orders of their own (`relations`).
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from daq_app.console import Console
-from daq_app.simulation.wiring import Connected, DueEvents, SimulatedPeople, connected, planted_surface
+from daq_app.simulation.wiring import INPUT, Connected, SimulatedPeople, connected, planted_surface
 from drivers.clock import Clock, SimulatedClock
-from drivers.transducer import Transducer
 from sessions.file_access import write_json
 from sessions.plan.plan import Block, Frame, SessionPlan, Trial
 from sessions.plan.protocols import VisitSetting, plan, protocol
-from sessions.recording import FleetingWriter, Recording, RecordingError, SessionWriter, Setting, provenance
+from sessions.prediction import PredictionOptions
+from sessions.prediction.scenes import seds_at
+from sessions.recording import FleetingWriter, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.archive import seal
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Planted
 from sessions.run import steps
 from sessions.run.resuming import RESUMABLE
-from sessions.run.runner import Operator, RunnerSettings, SessionEnd, Status, run_session
+from sessions.run.runner import RunnerSettings, SessionEnd, Status, run_session
 from sessions.statistics.findings import Spoilt
 from sessions.statistics.visit import EXCLUSIONS
-from simulators.bench import Bench, BenchSettings, DirectTransducer, Hurt, PlantedStroke
+from sessions.strokes.stroke import FIXED, AreaLaw
+from simulators.bench import Bench, BenchSettings, DirectTransducer, Hurt
 from simulators.stroke import Surface
 from simulators.subject import SimulatedSubject, SubjectSettings
 
@@ -37,41 +44,32 @@ SUBJECTS = 10
 STROKING = 3  # the subject who strokes on the transducer
 
 
-class Participants(NamedTuple):
-    """Who and what takes part in a session: whoever strokes and scores, the transducer, and the clock of both."""
-
-    operator: Operator
-    transducer: Transducer | None  # None for a visit that only scores
-    clock: Clock
-
-
 def conduct(
     plan: SessionPlan,
     folder: Path,
-    taking_part: Participants,
+    people: SimulatedPeople,
     console: Console,
     *,
     settings: Sequence[Setting] = (),
     run: RunnerSettings | None = None,
     durable: bool = True,
 ) -> SessionEnd:
-    """Run the session into `folder` and seal it, however it ended, unless it can be resumed.
+    """Run the session of these people into `folder` and seal it, however it ended, unless it can be resumed.
 
-    With `durable` False nothing waits for the disk.
-
-    Raises RecordingError when the folder cannot be used or the disk takes no more.
+    With `durable` False nothing waits for the disk. Raises RecordingError when the folder cannot be used or the disk
+    takes no more.
     """
-    operator, transducer, clock = taking_part
+    transducer = None if people.connected is None else people.connected.transducer
     info = None if transducer is None else transducer.info
-    came_from = provenance(clock, settings)
+    came_from = provenance(people.clock, settings)
     kind = SessionWriter if durable else FleetingWriter
-    writer = kind.create(folder, plan, info, came_from, subject_simulated=True, clock=clock)
+    writer = kind.create(folder, plan, info, came_from, subject_simulated=True, clock=people.clock)
 
     def show(status: Status) -> None:
         done = 0.0 if status.trial is None else (status.trial - 1) / status.trials
         console.progress(done, f"{plan.subject}: {status.state}, {status.safe.readings} readings safe")
 
-    end = run_session(plan, writer, operator, transducer, settings=run, progress=show)
+    end = run_session(plan, writer, people, transducer, settings=run, progress=show)
     if end.cause not in RESUMABLE:
         seal(writer.folder)
     return end
@@ -98,30 +96,28 @@ def simulated_study(out: Path, seed: int, clock: Clock, console: Console) -> Stu
     Raises RecordingError where `out` cannot be used, StudyCutShort where a visit did not come to its end.
     """
     chosen = protocol(PROTOCOL)
+
+    def visit(planned: SessionPlan, folder: Path, people: SimulatedPeople) -> SessionEnd:
+        end = conduct(planned, folder, people, console, settings=[_study_seed(seed)])
+        if not end.complete:
+            raise StudyCutShort(f"{end.reason}; what was recorded is in {folder.parent}")
+        return end
+
     scored: list[Path] = []
     for number in range(1, SUBJECTS + 1):
-        subject = f"S{number:02d}"
-        folder = out / f"{subject}-scores"
-        people = SimulatedPeople(_seed(seed, number), clock)
-        planned = plan(chosen, subject, _seed(seed, number), forces=False)
-        end = conduct(planned, folder, Participants(people, None, clock), console, settings=[_study_seed(seed)])
-        _check(end, folder)
-        scored.append(folder)
-    subject = f"S{STROKING:02d}"
+        subject, own = f"S{number:02d}", _seed(seed, number)
+        scored.append(out / f"{subject}-scores")
+        visit(plan(chosen, subject, own, forces=False), scored[-1], SimulatedPeople(SimulatedSubject(own), clock))
+    subject, own = f"S{STROKING:02d}", _seed(seed, STROKING)
     folder = out / f"{subject}-forces"
     with connected(f"sim:?seed={seed}&rate=200", clock) as bench:
-        people = SimulatedPeople(_seed(seed, STROKING), clock, bench)
-        planned = plan(chosen, subject, _seed(seed, STROKING) + 1, setting=VisitSetting(frame=bench.frame))
-        taking_part = Participants(people, bench.transducer, clock)
-        end = conduct(planned, folder, taking_part, console, settings=[_study_seed(seed)])
-        _check(end, folder)
-        planted = _planted(bench, Recording.open(folder))
+        people = SimulatedPeople(SimulatedSubject(own), clock, bench)
+        end = visit(plan(chosen, subject, own + 1, setting=VisitSetting(frame=bench.frame)), folder, people)
+        planted = tuple(
+            Planted(trial, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction)
+            for trial, stroke in people.strokes.items()
+        )
     return Study(tuple(scored), folder, planted, end.readings, end.health.lost)
-
-
-def _check(end: SessionEnd, folder: Path) -> None:
-    if not end.complete:
-        raise StudyCutShort(f"{end.reason}; what was recorded is in {folder.parent}")
 
 
 def _seed(study: int, subject: int) -> int:
@@ -131,18 +127,6 @@ def _seed(study: int, subject: int) -> int:
 
 def _study_seed(seed: int) -> Setting:
     return Setting("study seed", seed, "", "set")
-
-
-def _planted(bench: Connected, recording: Recording) -> tuple[Planted, ...]:
-    """Return what the bench planted, trial by trial."""
-    strokes = {} if bench.bench is None else {(s.surface.descriptor, s.surface.index): s for s in bench.bench.planted()}
-    rows: list[Planted] = []
-    for record in recording.trials:
-        stimulus = record.trial.stimulus
-        stroke = strokes.get((stimulus.descriptor, stimulus.known_index))
-        if stroke is not None:
-            rows.append(Planted(record.trial.number, stroke.mu, stroke.tau_max, stroke.speed, stroke.direction))
-    return tuple(rows)
 
 
 PLANTED = "planted.json"
@@ -159,7 +143,6 @@ PEOPLE = SubjectSettings(
 )
 CALIBRATION = 0.01  # standard deviation of each axis' gain about 1 [-]
 LIGHT = 0.15  # peak normal force of a stroke that presses too lightly [N]
-JUDGING = 0.8  # from lift to score [s]
 TICK = 0.1  # between two looks at the transducer [s of the session's clock]: five times as seldom as with people
 
 
@@ -218,87 +201,73 @@ def _decisions() -> str:
 
 def _visit(out: Path, seed: int, number: int, console: Console) -> list[dict[str, Any]]:
     """Record one subject's visit and return what was planted in it, a row a stroke."""
-    subject, own = f"S{number:02d}", seed * 100 + number
+    subject, own = f"S{number:02d}", _seed(seed, number)
     spoilt = SPOILT.get(subject, Spoilt(expected=""))
     gains = np.random.default_rng([own, 7]).normal(1.0, CALIBRATION, 6)
     a, b, c, d, e, f = gains.tolist()
     bench = Bench(own, BenchSettings(gains=(a, b, c, d, e, f)))
     clock = SimulatedClock()
-    transducer = DirectTransducer(bench, clock, Hurt(_one(spoilt.lost), _one(spoilt.frozen)))
+    hurt = Hurt(frozenset({spoilt.lost} - {0}), frozenset({spoilt.frozen} - {0}))  # 0: no trial
+    transducer = DirectTransducer(bench, clock, hurt)
     settings = replace(PEOPLE, gain=-PEOPLE.gain) if spoilt.reversed else PEOPLE
     setting = VisitSetting(frame=Frame("-z", "set", bench.settings.height, "set"))
     planned = plan(protocol(PROTOCOL), subject, own, setting=setting)
-    people = SyntheticPeople(SimulatedSubject(own, settings), bench, transducer, clock, planned, spoilt)
-    provenance = [Setting("study seed", seed, "", "set")]
-    taking_part = Participants(people, transducer, clock)
+    people = SyntheticPeople(
+        SimulatedSubject(own, settings), clock, Connected(transducer, bench, transducer.now), planned, spoilt
+    )
     conduct(
-        planned, out / subject, taking_part, console, settings=provenance, run=RunnerSettings(tick=TICK), durable=False
+        planned,
+        out / subject,
+        people,
+        console,
+        settings=[_study_seed(seed)],
+        run=RunnerSettings(tick=TICK),
+        durable=False,
     )
     return [
-        {**_row(subject, trial, stroke), **people.meant(trial)}
+        {
+            "subject": subject,
+            "trial": trial.number,
+            "descriptor": trial.stimulus.descriptor,
+            "index": trial.stimulus.index,
+            "mu": stroke.mu,
+            "tau_max": stroke.tau_max,
+            "speed": stroke.speed,
+            "direction": stroke.direction,
+            **people.meant(trial),
+        }
         for trial, stroke in zip(people.stroked, bench.planted(), strict=True)
     ]
 
 
-def _one(number: int) -> frozenset[int]:
-    return frozenset((number,)) if number else frozenset()
-
-
-def _row(subject: str, trial: Trial, stroke: PlantedStroke) -> dict[str, Any]:
-    return {
-        "subject": subject,
-        "trial": trial.number,
-        "descriptor": trial.stimulus.descriptor,
-        "index": trial.stimulus.index,
-        "mu": stroke.mu,
-        "tau_max": stroke.tau_max,
-        "speed": stroke.speed,
-        "direction": stroke.direction,
-    }
-
-
-class SyntheticPeople(DueEvents):
-    """Experimenter and subject in one, on a bench in simulated time."""
+class SyntheticPeople(SimulatedPeople):
+    """Simulated people whose finger, calibration and visit are their own, and what goes wrong in it."""
 
     def __init__(
-        self,
-        subject: SimulatedSubject,
-        bench: Bench,
-        transducer: DirectTransducer,
-        clock: Clock,
-        planned: SessionPlan,
-        spoilt: Spoilt,
+        self, subject: SimulatedSubject, clock: Clock, bench: Connected, planned: SessionPlan, spoilt: Spoilt
     ) -> None:
-        super().__init__(clock)
-        self._subject, self._bench, self._transducer = subject, bench, transducer
+        super().__init__(subject, clock, bench, self._perceived)
         self._plan, self._spoilt = planned, spoilt
-        self.stroked: list[Trial] = []
 
     def show(self, command: steps.Command) -> None:
-        """Do what the command asks for."""
+        """Do what the command asks for, but for what is spoilt."""
         match command:
-            case steps.AskBegin():
-                self.put(steps.Begin())
             case steps.AskMount(trial) if trial.number == self._spoilt.aborted:
                 self.put(steps.Abort("the subject had to leave"))
-            case steps.AskMount(trial):
-                self._bench.mount(self._perceived(trial))
-                self.put(steps.StimulusMounted(trial.stimulus.code))
-            case steps.AskStroke(trial):
-                stroke = self._subject.stroke(self._perceived(trial))
-                self._bench.begin_stroke(stroke, self._transducer.now())
-                self.stroked.append(trial)
-            case steps.AskScore(trial):
-                self.put(self._scored(trial), JUDGING)
-            case steps.AskFinish():
-                self.put(steps.Finish())
+            case steps.AskScore(trial) if trial.number == self._spoilt.unanswered:
+                self.put(steps.Scored(None, (), None, 0, None, INPUT), self.judging)
             case _:
-                pass
+                super().show(command)
+
+    def score(self, trial: Trial) -> float:
+        """Return the score of a trial, with drift within its block and what is carried over from the trial before."""
+        _, place, before = self._order(trial)
+        return self.subject.score(self.surface(trial), 1, place, before)
 
     def meant(self, trial: Trial) -> dict[str, Any]:
         """Return a trial's depth, its place, what was stroked before, and the score without noise."""
         block, place, before = self._order(trial)
-        score = self._subject.meant(self._subject.perceived(planted_surface(trial)), place, before)
+        score = self.subject.meant(self.surface(trial), place, before)
         return {"indentation": block.indentation, "place": place, "before": before, "score": score}
 
     def _order(self, trial: Trial) -> tuple[Block, int, int | None]:
@@ -308,14 +277,91 @@ class SyntheticPeople(DueEvents):
         return block, place, block.trials[place - 1].stimulus.known_index if place else None
 
     def _perceived(self, trial: Trial) -> Surface:
-        surface = self._subject.perceived(planted_surface(trial))
+        surface = self.subject.perceived(planted_surface(trial))
         light = LIGHT / surface.peak_normal_force if trial.number == self._spoilt.light else 1.0
         return replace(surface, tau_max=surface.tau_max * light)
 
-    def _scored(self, trial: Trial) -> steps.Scored:
-        _, place, before = self._order(trial)
-        at = self.clock.now_ns() * 1e-9 + JUDGING
-        if trial.number == self._spoilt.unanswered:
-            return steps.Scored(None, (), None, 0, None, "simulated")
-        score = self._subject.score(self._subject.perceived(planted_surface(trial)), 1, place, before)
-        return steps.Scored(score, ((at, score),), at, 0, None, "simulated")
+
+# ---- how scores go with the model's SEDs among people at large: the truth of the study's headline
+
+Load = tuple[float, float, float, int, float]  # mu [-], tau_max [MPa], depth [mm], direction, speed [mm/s]
+SedsAt = Callable[[Sequence[Load]], Sequence[float | None]]
+
+DRAWN = 2000  # people
+_FIRST = 1_000_000  # seed: nobody of a study's
+_FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its standard deviations between people
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedRelation:
+    """How single scores go with SEDs within people at large."""
+
+    r: float  # the noise of judgement in it
+    slope: float  # drift and carry-over beside it [points per kPa]
+
+
+def planted_relations(
+    people: Mapping[str, float], options: PredictionOptions, area: AreaLaw
+) -> dict[str, dict[str, float]]:
+    """Return the relation for each descriptor with the SEDs of the published finger, which simulated people have.
+
+    None where a law of the area tells another tau_max than the planted one, and none at finite strain, where most
+    sticky surfaces have no settled slide.
+    """
+    if options.kinematics == "finite" or area != FIXED:
+        return {}
+    planted = relations(SubjectSettings(**people), lambda loads: seds_at(loads, options))
+    return {descriptor: asdict(relation) for descriptor, relation in planted.items()}
+
+
+def relations(people: SubjectSettings, seds: SedsAt) -> Mapping[str, PlantedRelation]:
+    """Return the relation for each descriptor; none where a surface has no settled slide."""
+    by_descriptor: dict[str, PlantedRelation] = {}
+    for block in plan(protocol(PROTOCOL), "S00", 0).blocks:
+        surfaces = [planted_surface(trial) for trial in block.trials]
+        at = _seds_of_fingers(surfaces, block, people.moisture, seds)
+        if at is not None:
+            by_descriptor[surfaces[0].descriptor] = _relation(people, surfaces, at)
+    return by_descriptor
+
+
+def _seds_of_fingers(
+    surfaces: Sequence[Surface], block: Block, moisture: float, seds: SedsAt
+) -> Callable[[float], Sequence[float]] | None:
+    """Return what gives the SED [kPa] of each surface under a finger whose friction is so many times the usual."""
+    times = np.exp(moisture * _FINGERS) if moisture else np.ones(1)
+    loads = [
+        (s.mu * m, s.tau_max * m, block.indentation, s.direction, s.speed) for m in times.tolist() for s in surfaces
+    ]
+    solved = [sed for sed in seds(loads) if sed is not None]
+    if len(solved) < len(loads):
+        return None
+    table = 1e3 * np.array(solved).reshape(len(times), len(surfaces))
+    if not moisture:
+        return lambda _: table[0].tolist()
+    spline = CubicSpline(np.log(times), table)
+    return lambda m: np.asarray(spline(math.log(m))).tolist()
+
+
+def _relation(
+    people: SubjectSettings, surfaces: Sequence[Surface], seds: Callable[[float], Sequence[float]]
+) -> PlantedRelation:
+    products = np.zeros((4, 4))  # of SED, place, index before, and score, each without the person's own mean
+    draw, indices = np.random.default_rng(0), [surface.index for surface in surfaces]
+    for seed in range(_FIRST, _FIRST + DRAWN):
+        person, order = SimulatedSubject(seed, people), [int(one) for one in draw.permutation(len(surfaces))]
+        perceived = [person.perceived(surface) for surface in surfaces]
+        own = seds(perceived[0].mu / surfaces[0].mu)
+        before: list[int | None] = [None, *(indices[one] for one in order[:-1])]
+        rows = np.array(
+            [
+                (own[one], place, 0 if last is None else last - 50, person.meant(perceived[one], place, last))
+                for place, (one, last) in enumerate(zip(order, before, strict=True))
+            ]
+        )
+        rows -= rows.mean(axis=0)
+        products += rows.T @ rows
+    noise = people.judgement_noise**2 * DRAWN * (len(surfaces) - 1)
+    r = products[0, 3] / math.sqrt(products[0, 0] * (products[3, 3] + noise))
+    slope = np.linalg.solve(products[:3, :3], products[:3, 3])[0]
+    return PlantedRelation(float(r), float(slope))

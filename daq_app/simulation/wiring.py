@@ -13,20 +13,18 @@ from sessions.plan.plan import Frame, Trial
 from sessions.recording import Recording
 from sessions.recording.replay import ReplayTransducer
 from sessions.run import steps
-from simulators.bench import Bench
+from simulators.bench import Bench, PlantedStroke
 from simulators.net_ft_box import NetFtBox
-from simulators.serving import TimetableError, serve_digital_ft, serve_net_ft, serve_serial_ft
+from simulators.serving import serve_digital_ft, serve_net_ft, serve_serial_ft
 from simulators.stroke import Surface, paper_surfaces
 from simulators.subject import SimulatedSubject
 
 __all__ = [
     "Connected",
-    "DueEvents",
     "SimulatedHand",
     "SimulatedPeople",
-    "TimetableError",
+    "SimulatedSubject",
     "connected",
-    "itself",
     "planted_surface",
     "serve_digital_ft",
     "serve_net_ft",
@@ -46,7 +44,7 @@ class Connected:
 
     transducer: Transducer
     bench: Bench | None = None
-    bench_now: Callable[[], float] | None = None  # the bench's time [s]
+    bench_now: Callable[[], float] = lambda: 0.0  # the bench's time [s]
     recorded_frame: Frame | None = None  # of a recording that is replayed
 
     @property
@@ -94,154 +92,12 @@ def connected(uri: str, clock: Clock) -> Generator[Connected]:
         box.close()
 
 
-Planted = Sequence[tuple[str, int, float]]  # descriptor, index and friction of surfaces that a protocol plants [-]
-Known = Callable[[Trial], Trial]  # a trial with the index of its stimulus
-
-
-def itself(trial: Trial) -> Trial:
-    """Return the trial: its stimulus is known."""
-    return trial
-
-
-class SimulatedHand:
-    """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
-
-    def __init__(self, subject_seed: int, bench: Connected, known: Known = itself, planted: Planted = ()) -> None:
-        """Let the subject of that seed stroke; `known` tells a blinded stimulus, `planted` the friction of some.
-
-        Raises SetupError where the bench is not simulated in this process.
-        """
-        if bench.bench is None or bench.bench_now is None:
-            raise SetupError("a simulated hand strokes the simulated bench only: connect sim:")
-        self._subject = SimulatedSubject(subject_seed)
-        self._bench = bench.bench
-        self._now = bench.bench_now
-        self._known, self._planted = known, planted
-        self._takes: dict[int, int] = {}  # by trial number
-
-    def show(self, command: steps.Command) -> None:
-        """Do what the command asks a hand for."""
-        match command:
-            case steps.AskMount(trial):
-                self._bench.mount(self._surface(trial))
-            case steps.AskStroke(trial):
-                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
-                stroke = self._subject.stroke(self._surface(trial), self._takes[trial.number])
-                self._bench.begin_stroke(stroke, self._now())
-            case _:
-                pass
-
-    def poll(self) -> tuple[steps.Event, ...]:
-        """Return nothing: the transducer measures what a hand does."""
-        return ()
-
-    def _surface(self, trial: Trial) -> Surface:
-        return planted_surface(self._known(trial), self._planted)
-
-
-class DueEvents:
-    """Events that come up when their time has come, in the order they were put in."""
-
-    def __init__(self, clock: Clock) -> None:
-        """Tell time by `clock`."""
-        self.clock = clock
-        self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
-
-    def put(self, event: steps.Event, after: float = 0.0) -> None:
-        """Let an event come up in `after` seconds of the clock."""
-        self._due.append((self.clock.now_ns() + int(after * 1e9), event))
-
-    def poll(self) -> tuple[steps.Event, ...]:
-        """Return what has come up by now, once."""
-        now_ns = self.clock.now_ns()
-        done = tuple(event for due, event in self._due if due <= now_ns)
-        self._due = [(due, event) for due, event in self._due if due > now_ns]
-        return done
-
-
-class SimulatedPeople(DueEvents):
-    """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
-
-    With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
-    """
-
-    def __init__(
-        self,
-        subject_seed: int,
-        clock: Clock,
-        bench: Connected | None = None,
-        known: Known = itself,
-        planted: Planted = (),
-    ) -> None:
-        """Let the subject of that seed stroke the bench, where there is one; for the others see `SimulatedHand`."""
-        super().__init__(clock)
-        self._subject = SimulatedSubject(subject_seed)
-        self._hand = (
-            None if bench is None or bench.bench is None else SimulatedHand(subject_seed, bench, known, planted)
-        )
-        self._known, self._planted = known, planted
-        self._takes: dict[int, int] = {}  # by trial number
-
-    def show(self, command: steps.Command) -> None:
-        """Do what the command asks for."""
-        if self._hand is not None:
-            self._hand.show(command)
-        match command:
-            case steps.AskBegin():
-                self.put(steps.Begin())
-            case steps.AskMount(trial):
-                self.put(steps.StimulusMounted(trial.stimulus.code))
-            case steps.AskStroke(trial):
-                self._takes[trial.number] = self._takes.get(trial.number, 0) + 1
-                if self._hand is None:
-                    self.put(steps.StrokeDone())
-            case steps.AskScore() | steps.AskNumber() | steps.AskChoice():
-                self.put(self._judgement(command), after=self._judging)
-            case steps.AskRest(None):
-                self.put(steps.Resume())
-            case steps.AskFinish():
-                self.put(steps.Finish())
-            case _:
-                pass
-
-    def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
-        """Return what the subject answers."""
-        at = self.clock.now_ns() * 1e-9 + self._judging
-        match command:
-            case steps.AskScore(trial):
-                score = self._judged(trial)
-                return steps.Scored(score, ((at, score),), at, 0, None, INPUT)
-            case steps.AskNumber(trial):
-                number = self._subject.number(self._surface(trial), self._takes[trial.number])
-                return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
-            case steps.AskChoice(first, second):
-                more = self._more(first, second)
-                return steps.PairedChoice("first" if more else "second", at, 0, None, INPUT)
-
-    def _more(self, first: Trial, second: Trial) -> bool:
-        """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""
-        if first.standard or second.standard:
-            take = self._takes[second.number]
-            return self._subject.more_friction(self._surface(first), self._surface(second), second.number, take)
-        return self._judged(first) > self._judged(second)
-
-    @property
-    def _judging(self) -> float:
-        return JUDGING if self._hand else 0.0
-
-    def _judged(self, trial: Trial) -> float:
-        return self._subject.score(self._surface(trial), self._takes[trial.number])
-
-    def _surface(self, trial: Trial) -> Surface:
-        return planted_surface(self._known(trial), self._planted)
-
-
-def planted_surface(trial: Trial, planted: Planted = ()) -> Surface:
+def planted_surface(trial: Trial, planted: Sequence[tuple[str, int, float]] = ()) -> Surface:
     """Return the simulated surface of a trial, stroked as the trial asks.
 
     The simulated bench holds the ten surfaces of sensotact-friction. For any other stimulus the one with the nearest
-    index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed. Where a
-    protocol has planted friction of its own, that surface is as slippery as it says, and pressed as hard.
+    index stands in, of the same descriptor where there is one, so that every protocol can be rehearsed. A protocol
+    may plant friction of its own, as descriptor, index and mu [-]: such a surface is pressed as hard as its stand-in.
     """
     stimulus = trial.stimulus
     surfaces = paper_surfaces().values()
@@ -252,3 +108,128 @@ def planted_surface(trial: Trial, planted: Planted = ()) -> Surface:
         if (descriptor, index) == (stimulus.descriptor, stimulus.known_index):
             return replace(surface, mu=mu, tau_max=surface.tau_max * mu / surface.mu, index=index)
     return surface
+
+
+SurfaceOf = Callable[[Trial], Surface]
+
+
+class SimulatedHand:
+    """Mounts and strokes the simulated bench when a session asks for it, and does nothing else: people do the rest."""
+
+    def __init__(
+        self, subject: SimulatedSubject, bench: Connected | None, surface: SurfaceOf = planted_surface
+    ) -> None:
+        """Let the subject stroke the `surface` of each trial, unseen where there is no bench.
+
+        Raises SetupError where the bench is not simulated in this process.
+        """
+        if bench is not None and bench.bench is None:
+            raise SetupError("a simulated hand strokes the simulated bench only: connect sim:")
+        self.subject, self.surface = subject, surface
+        self.connected = bench
+        self.stroked: list[Trial] = []  # in order, a trial once for each take
+
+    @property
+    def strokes(self) -> dict[int, PlantedStroke]:
+        """Return what the bench planted in the last stroke of each trial, by its number."""
+        assert self.connected is not None
+        assert self.connected.bench is not None
+        planted = self.connected.bench.planted()
+        return {trial.number: stroke for trial, stroke in zip(self.stroked, planted, strict=True)}
+
+    def show(self, command: steps.Command) -> None:
+        """Do what the command asks a hand for."""
+        bench = None if self.connected is None else self.connected.bench
+        match command:
+            case steps.AskMount(trial) if bench is not None:
+                bench.mount(self.surface(trial))
+            case steps.AskStroke(trial):
+                self.stroked.append(trial)
+                if bench is not None and self.connected is not None:
+                    stroke = self.subject.stroke(self.surface(trial), self.take(trial))
+                    bench.begin_stroke(stroke, self.connected.bench_now())
+            case _:
+                pass
+
+    def take(self, trial: Trial) -> int:
+        """Return how often a trial was stroked."""
+        return sum(one.number == trial.number for one in self.stroked)
+
+    def poll(self) -> tuple[steps.Event, ...]:
+        """Return nothing: the transducer measures what a hand does."""
+        return ()
+
+
+class SimulatedPeople(SimulatedHand):
+    """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
+
+    With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
+    """
+
+    def __init__(
+        self,
+        subject: SimulatedSubject,
+        clock: Clock,
+        bench: Connected | None = None,
+        surface: SurfaceOf = planted_surface,
+    ) -> None:
+        """Let the subject answer on the session's clock; for the rest see `SimulatedHand`."""
+        super().__init__(subject, bench, surface)
+        self.clock = clock
+        self.judging = JUDGING if bench else 0.0  # from lift to judgement [s]
+        self._due: list[tuple[int, steps.Event]] = []  # session clock [ns]
+
+    def put(self, event: steps.Event, after: float = 0.0) -> None:
+        """Let an event come up in `after` seconds of the clock."""
+        self._due.append((self.clock.now_ns() + int(after * 1e9), event))
+
+    def poll(self) -> tuple[steps.Event, ...]:
+        """Return what has come up by now, once, in the order it was put in."""
+        now_ns = self.clock.now_ns()
+        done = tuple(event for due, event in self._due if due <= now_ns)
+        self._due = [(due, event) for due, event in self._due if due > now_ns]
+        return done
+
+    def show(self, command: steps.Command) -> None:
+        """Do what the command asks for."""
+        super().show(command)
+        match command:
+            case steps.AskBegin():
+                self.put(steps.Begin())
+            case steps.AskMount(trial):
+                self.put(steps.StimulusMounted(trial.stimulus.code))
+            case steps.AskStroke(trial) if self.connected is None:
+                self.put(steps.StrokeDone())
+            case steps.AskScore() | steps.AskNumber() | steps.AskChoice():
+                self.put(self._judgement(command), after=self.judging)
+            case steps.AskRest(None):
+                self.put(steps.Resume())
+            case steps.AskFinish():
+                self.put(steps.Finish())
+            case _:
+                pass
+
+    def score(self, trial: Trial) -> float:
+        """Return the score of a trial, whose last take is judged."""
+        return self.subject.score(self.surface(trial), self.take(trial))
+
+    def _judgement(self, command: steps.AskScore | steps.AskNumber | steps.AskChoice) -> steps.Event:
+        """Return what the subject answers."""
+        at = self.clock.now_ns() * 1e-9 + self.judging
+        match command:
+            case steps.AskScore(trial):
+                score = self.score(trial)
+                return steps.Scored(score, ((at, score),), at, 0, None, INPUT)
+            case steps.AskNumber(trial):
+                number = self.subject.number(self.surface(trial), self.take(trial))
+                return steps.MagnitudeEstimate(number, at, 0, None, INPUT)
+            case steps.AskChoice(first, second):
+                more = self._more(first, second)
+                return steps.PairedChoice("first" if more else "second", at, 0, None, INPUT)
+
+    def _more(self, first: Trial, second: Trial) -> bool:
+        """Say whether the first of two has more: of friction where one is a standard, else of its descriptor."""
+        if first.standard or second.standard:
+            surfaces = self.surface(first), self.surface(second)
+            return self.subject.more_friction(*surfaces, second.number, self.take(second))
+        return self.score(first) > self.score(second)

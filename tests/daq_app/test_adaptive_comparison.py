@@ -1,14 +1,15 @@
 """Adaptive comparisons from protocol to psychometric function: answers choose what is compared next."""
 
 import math
+from functools import partial
 from itertools import product
 
 import pytest
 from test_constant_stimuli import felt
 
 from daq_app.console import Console
-from daq_app.simulation.synthetic import Participants, conduct
-from daq_app.simulation.wiring import SimulatedPeople
+from daq_app.simulation.synthetic import conduct
+from daq_app.simulation.wiring import SimulatedPeople, planted_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.orders import next_comparison
 from sessions.plan.plan import Stimulus
@@ -22,7 +23,7 @@ from sessions.run.resuming import resumption
 from sessions.run.states import Mounting
 from sessions.statistics.psychometric import QUARTILE
 from sessions.strokes.stroke import FIXED
-from simulators.subject import SubjectSettings
+from simulators.subject import SimulatedSubject, SubjectSettings
 
 ADAPTIVE = protocol("adaptive-comparison")
 
@@ -30,9 +31,11 @@ ADAPTIVE = protocol("adaptive-comparison")
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
     folder, clock = tmp_path_factory.mktemp("adaptive") / "S03", SimulatedClock()
-    people = SimulatedPeople(3, clock, planted=ADAPTIVE.planted_friction)
+    people = SimulatedPeople(
+        SimulatedSubject(3), clock, None, partial(planted_surface, planted=ADAPTIVE.planted_friction)
+    )
     planned = plan(ADAPTIVE, "S03", 3, forces=False)
-    conduct(planned, folder, Participants(people, None, clock), Console(as_json=True), durable=False)
+    conduct(planned, folder, people, Console(as_json=True), durable=False)
     return Recording.open(folder)
 
 

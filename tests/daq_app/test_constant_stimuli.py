@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from daq_app.console import Console
-from daq_app.simulation.synthetic import Participants, conduct
+from daq_app.simulation.synthetic import conduct
 from daq_app.simulation.wiring import SimulatedPeople, planted_surface
 from drivers.clock import SimulatedClock
 from sessions.plan.protocols import plan, protocol
@@ -22,15 +22,15 @@ from sessions.statistics.pooled import constant_stimuli
 from sessions.statistics.psychometric import QUARTILE
 from sessions.statistics.visit import VisitOptions, visit_of
 from sessions.strokes.stroke import FIXED
-from simulators.subject import SubjectSettings
+from simulators.subject import SimulatedSubject, SubjectSettings
 
 
 def session(folder, seed):
     """Return a visit that only compares, run and read again."""
     clock = SimulatedClock()
-    people = SimulatedPeople(seed, clock)
+    people = SimulatedPeople(SimulatedSubject(seed), clock)
     planned = plan(protocol("constant-stimuli"), f"S{seed:02d}", seed, forces=False)
-    conduct(planned, folder, Participants(people, None, clock), Console(as_json=True), durable=False)
+    conduct(planned, folder, people, Console(as_json=True), durable=False)
     return Recording.open(folder)
 
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from daq_app.simulation import ground_truth as planted_seds
-from daq_app.simulation.ground_truth import relations
+from daq_app.simulation import synthetic
+from daq_app.simulation.synthetic import relations
 from simulators.stroke import paper_surfaces
 from simulators.subject import SLIPPERIEST, STICKIEST, SubjectSettings
 
@@ -15,7 +15,7 @@ GAIN, NOISE, RISE = 0.75, 4.0, 2.0  # of a score per index, points, kPa per unit
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    monkeypatch.setattr(planted_seds, "DRAWN", 400)
+    monkeypatch.setattr(synthetic, "DRAWN", 400)
 
 
 def straight(loads):

@@ -14,8 +14,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from daq_app.simulation.ground_truth import relations
-from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes
+from daq_app.simulation.synthetic import CALIBRATION, PEOPLE, PROTOCOL, SUBJECTS, planted_slopes, relations
 from daq_app.simulation.wiring import planted_surface
 from sessions.plan.protocols import plan, protocol
 from sessions.statistics.findings import CARRY_OVER, DRIFT, SED_TERM

@@ -209,9 +209,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     shelf = Shelf(out / "results", visit_options)
     done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
     if truth is not None and options.quantity == SED.name:
-        from daq_app.simulation.ground_truth import (
-            planted_relations,  # simulators are loaded only where they are asked for
-        )
+        from daq_app.simulation.synthetic import planted_relations  # loaded only where it is needed
 
         truth["relation"] = planted_relations(truth["people"], visit_options.prediction, visit_options.area)
     study = pooled(done, failed, exclusions, truth, visit_options, BY_NAME[options.quantity])
