@@ -3,7 +3,8 @@
 # pyright: reportUnknownMemberType=false
 # matplotlib does not type the keyword arguments it passes on.
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,35 +22,47 @@ from solver.verification.truth import JUDGED, NUMBERS, Truth
 COLOURS = {"small": style.GREEN, "finite": style.VERMILLION}
 MARKS = {"small": "o", "finite": "s"}
 WIDE, SQUARE = (900, 320), (328, 300)  # [CSS px]
+PARTS = (
+    style.GREEN, style.VERMILLION, style.SKY, style.PURPLE, "#E69F00", "#0072B2", "#F0E442", style.GREY, style.PALE,
+    "#8C564B", style.INK,
+)  # of a solve  # fmt: skip
 
 
 def plates(measured: RunResults) -> dict[str, style.Plate]:
     """Return the figures that there are numbers for, by name."""
-    drawings: tuple[Callable[[RunResults], style.Plate], ...] = (
-        speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate
-    )  # fmt: skip
+    drawings = (speed_plate, benchmark_plate, estimate_plate, order_plate, cost_plate, growth_plate)
     with style.look():
         drawn = [make(measured) for make in drawings]
     return {plate.name: plate for plate in drawn if plate.panels}
 
 
+def _plate(name: str, caption: str, *panels: style.Panel | None) -> style.Plate:
+    return style.Plate(name, caption, tuple(panel for panel in panels if panel is not None))
+
+
+def _panel(
+    drawn: style.Sheet, name: str, title: str, header: tuple[str, ...], rows: Sequence[tuple[style.Cell, ...]]
+) -> style.Panel:
+    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, tuple(rows))
+
+
 def speed_plate(measured: RunResults) -> style.Plate:
     """Draw time against true error, one curve a way of solving."""
-    rows: list[Speed] = measured.of(Speed)
-    truths: list[Truth] = [truth for truth in measured.of(Truth) if truth.case in JUDGED]
+    rows, truths = measured.of(Speed), [truth for truth in measured.of(Truth) if truth.case in JUDGED]
     doubt = {kind: max((t.doubt[0] for t in truths if t.kinematics == kind), default=0.0) for kind in COLOURS}
-    panels = [
-        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
-        _speed_panel(rows, doubt, "next_s", "each further surface"),
-        _guaranteed_panel(measured.of(GuaranteedCost)),
-    ]
     caption = (
         f"Time against true error: largest error of the SED on {len(JUDGED)} surfaces (slipperiness 0 to 100, "
         "stickiness 0), median time of a solve, mesh and estimate not included. One point a mesh; hollow where the "
         "error is below three times the doubt of the truth. Last, surfaces solved together to a tolerance, every mesh "
         "and estimate included: filled by the largest estimate, hollow by the largest true error."
     )
-    return style.Plate("speed", caption, tuple(panel for panel in panels if panel is not None))
+    return _plate(
+        "speed",
+        caption,
+        _speed_panel(rows, doubt, "first_s", "one surface from undeformed"),
+        _speed_panel(rows, doubt, "next_s", "each further surface"),
+        _guaranteed_panel(measured.of(GuaranteedCost)),
+    )
 
 
 def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, title: str) -> style.Panel | None:
@@ -77,11 +90,8 @@ def _speed_panel(rows: Sequence[Speed], doubt: Mapping[str, float], time: str, t
         return None
     _logarithmic(axes)
     axes.set(xlabel="true error of the SED [%]", ylabel="time [ms]", title=title)
-    name = f"speed-{time.removesuffix('_s')}"
     header = ("kinematics", "unknowns", "largest true error [-]", "median time [s]")
-    return style.Panel(
-        name, f"Time against true error, {title}", style.svg(drawn, name, title, simulated=False), header, tuple(table)
-    )
+    return _panel(drawn, f"speed-{time.removesuffix('_s')}", f"Time against true error, {title}", header, table)
 
 
 def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
@@ -104,46 +114,41 @@ def _guaranteed_panel(rows: Sequence[GuaranteedCost]) -> style.Panel | None:
         axes.plot([], [], mark, color=colour, markersize=4, label=f"{kinematics} strain")
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper right")
-    axes.set(xlabel="guaranteed, and true, error of the SED [%]", ylabel="time for a surface [ms]")
     title = "surfaces solved to a tolerance"
-    axes.set_title(title)
+    axes.set(xlabel="guaranteed, and true, error of the SED [%]", ylabel="time for a surface [ms]", title=title)
     header = (
         "kinematics", "tolerance [-]", "surfaces", "unknowns", "guaranteed error [-]", "largest true error [-]",
         "time for a surface [s]",
     )  # fmt: skip
-    table = tuple(
+    table = [
         (r.kinematics, r.tolerance, r.surfaces, r.dofs, r.worst_estimate,
          "not known" if r.worst_error is None else r.worst_error, r.took_s / r.surfaces)
         for r in rows
-    )  # fmt: skip
-    name = "speed-guaranteed"
-    words = f"Time against guaranteed error, {title}"
-    return style.Panel(name, words, style.svg(drawn, name, words, simulated=False), header, table)
+    ]  # fmt: skip
+    return _panel(drawn, "speed-guaranteed", f"Time against guaranteed error, {title}", header, table)
 
 
 def benchmark_plate(measured: RunResults) -> style.Plate:
     """Draw time against true error on the published problems."""
-    panel = _order_panel(measured.of(Order), "benchmarks", "time of a solve [s]", lambda row: row.took_s)
     caption = (
         "Time against true error on problems with a known answer, mesh included: thick cylinder, Cook's membrane, "
         "half-plane under a round body, and the finger at its ending. The table of orders names every point."
     )
-    return style.Plate("benchmarks", caption, () if panel is None else (panel,))
+    title = "Time against true error on published problems"
+    return _plate("benchmarks", caption, _order_panel(measured.of(Order), "benchmarks", title, timed=True))
 
 
 def order_plate(measured: RunResults) -> style.Plate:
     """Draw errors against element size."""
-    panel = _order_panel(measured.of(Order), "orders", "error [–]", None)
     caption = (
         "Errors of sequences of meshes against the size of their elements; the slope is the order of convergence, "
         "which the table gives. Where contact is involved, the root mean square over meshes of nearly one size."
     )
-    return style.Plate("orders", caption, () if panel is None else (panel,))
+    title = "Error against element size"
+    return _plate("orders", caption, _order_panel(measured.of(Order), "orders", title, timed=False))
 
 
-def _order_panel(
-    rows: Sequence[Order], name: str, label: str, time: Callable[[Order], tuple[float, ...]] | None
-) -> style.Panel | None:
+def _order_panel(rows: Sequence[Order], name: str, title: str, *, timed: bool) -> style.Panel | None:
     if not rows:
         return None
     drawn = style.sheet(*WIDE)
@@ -151,8 +156,7 @@ def _order_panel(
     table: list[tuple[str | float, ...]] = []
     shown = {"displacement": style.SKY, "stress": style.PURPLE, "energy": style.GREY, "force": style.VERMILLION}
     for row in rows:
-        across = row.errors if time is not None else row.sizes
-        up = time(row) if time is not None else row.errors
+        across, up = (row.errors, row.took_s) if timed else (row.sizes, row.errors)
         words = f"{row.problem}, {row.quantity}: order {row.order:.2f}"
         dashes = "--" if row.kinematics == "finite" else "-"
         axes.plot(
@@ -171,10 +175,14 @@ def _order_panel(
         axes.plot([], [], "--", color=style.GREY, label="finite strain")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     _logarithmic(axes)
-    axes.set(xlabel="error [–]" if time is not None else "element size, by the unit of each problem [–]", ylabel=label)
+    labels = (
+        ("error [–]", "time of a solve [s]")
+        if timed
+        else ("element size, by the unit of each problem [–]", "error [–]")
+    )
+    axes.set(xlabel=labels[0], ylabel=labels[1])
     header = ("problem", "quantity", "kinematics", "element size", "error [-]", "time of a solve [s]")
-    title = "Time against true error on published problems" if time is not None else "Error against element size"
-    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, tuple(table))
+    return _panel(drawn, name, title, header, table)
 
 
 def _mark(problem: str) -> str:
@@ -185,14 +193,14 @@ def _mark(problem: str) -> str:
 
 def estimate_plate(measured: RunResults) -> style.Plate:
     """Draw estimates against true errors, a panel a number."""
-    rows: list[Estimate] = measured.of(Estimate)
-    panels = [_estimate_panel([r for r in rows if r.number == number], number) for number in NUMBERS]
+    rows = measured.of(Estimate)
     caption = (
         "Estimated against true error, of every answer that was asked for with a tolerance. Above the line the "
         "estimate is safe; below the dashed line (ten times the larger of true error and 0.02 %) it is near. Hollow: "
         "the truth is too doubtful to tell."
     )
-    return style.Plate("estimates", caption, tuple(panel for panel in panels if panel is not None))
+    panels = (_estimate_panel([row for row in rows if row.number == number], number) for number in NUMBERS)
+    return _plate("estimates", caption, *panels)
 
 
 def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None:
@@ -217,23 +225,25 @@ def _estimate_panel(rows: Sequence[Estimate], number: str) -> style.Panel | None
         axes.plot([], [], MARKS[kinematics], color=COLOURS[kinematics], markersize=4, label=f"{kinematics} strain")
     axes.legend(frameon=False, loc="lower right")
     axes.set(xlabel="true error [%]", ylabel="estimated error [%]", title=number)
-    name = "estimate-" + number.split()[0].lower()
     header = ("kinematics", "case", "tolerance", "unknowns", "estimate [-]", "true error [-]", "doubt of the truth [-]")
-    table = tuple((r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows)
-    title = f"Estimated against true error of the {number}"
-    return style.Panel(name, title, style.svg(drawn, name, title, simulated=False), header, table)
+    table = [(r.kinematics, r.case, r.tolerance, r.dofs, r.estimate, r.error, r.doubt) for r in rows]
+    name = "estimate-" + number.split()[0].lower()
+    return _panel(drawn, name, f"Estimated against true error of the {number}", header, table)
 
 
 def cost_plate(measured: RunResults) -> style.Plate:
     """Draw where the time of one solve goes."""
-    rows: list[Cost] = measured.of(Cost)
     caption = "Where the time of one solve through the front door goes, mesh and error estimate included."
+    return _plate("costs", caption, _cost_panel(measured.of(Cost)))
+
+
+def _cost_panel(rows: Sequence[Cost]) -> style.Panel | None:
     if not rows:
-        return style.Plate("costs", caption, ())
+        return None
     drawn = style.sheet(WIDE[0], max(190, 60 + 45 * len(rows)))
     axes = drawn.axes[0]
-    parts = list(dict.fromkeys(name for row in rows for name in row.parts))
-    colours = dict(zip(parts, _distinct(len(parts)), strict=True))
+    parts = dict.fromkeys(name for row in rows for name in row.parts)
+    colours = dict(zip(parts, cycle(PARTS), strict=False))
     table: list[tuple[str | float, ...]] = []
     for number, row in enumerate(rows):
         left = 0.0
@@ -251,37 +261,21 @@ def cost_plate(measured: RunResults) -> style.Plate:
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.05))
     axes.set_xlabel("time [ms]")
     header = ("kinematics", "tolerance", "unknowns", "part", "share [-]", "time [s]")
-    title = "Where the time of a solve goes"
-    panel = style.Panel("costs", title, style.svg(drawn, "costs", title, simulated=False), header, tuple(table))
-    return style.Plate("costs", caption, (panel,))
-
-
-def _distinct(count: int) -> list[str]:
-    base = [
-        style.GREEN,
-        style.VERMILLION,
-        style.SKY,
-        style.PURPLE,
-        "#E69F00",
-        "#0072B2",
-        "#F0E442",
-        style.GREY,
-        style.PALE,
-        "#8C564B",
-        style.INK,
-    ]
-    return [base[n % len(base)] for n in range(count)]
+    return _panel(drawn, "costs", "Where the time of a solve goes", header, table)
 
 
 def growth_plate(measured: RunResults) -> style.Plate:
     """Draw the time of one linear system against its unknowns."""
-    rows: list[Growth] = measured.of(Growth)
     caption = (
         "Time of one assembly, factorisation and solve against the number of unknowns; the exponent is that of the "
         f"meshes from {FEWEST:,} unknowns on. Grey: the power 1.5."
     )
+    return _plate("growth", caption, _growth_panel(measured.of(Growth)))
+
+
+def _growth_panel(rows: Sequence[Growth]) -> style.Panel | None:
     if not rows:
-        return style.Plate("growth", caption, ())
+        return None
     drawn = style.sheet(*SQUARE)
     axes = drawn.axes[0]
     for kinematics in dict.fromkeys(row.kinematics for row in rows):
@@ -292,15 +286,15 @@ def growth_plate(measured: RunResults) -> style.Plate:
             [r.dofs for r in mine], [1e3 * r.floor_s for r in mine], label=words, color=COLOURS[kinematics],
             marker=MARKS[kinematics], markersize=4, linewidth=0.9,
         )  # fmt: skip
-    _power_line(axes, rows)
+    largest = max(rows, key=lambda row: row.dofs)
+    ends = np.array([min(row.dofs for row in rows), largest.dofs])
+    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=style.GREY, linewidth=0.7)
     _logarithmic(axes)
     axes.legend(frameon=False, loc="upper left")
     axes.set(xlabel="unknowns", ylabel="time [ms]")
     header = ("kinematics", "fineness", "unknowns", "set-up [s]", "assembly, factorisation and solve [s]")
-    table = tuple((r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows)
-    title = "Growth of the time with the unknowns"
-    panel = style.Panel("growth", title, style.svg(drawn, "growth", title, simulated=False), header, table)
-    return style.Plate("growth", caption, (panel,))
+    table = [(r.kinematics, r.fineness, r.dofs, r.setup_s, r.floor_s) for r in rows]
+    return _panel(drawn, "growth", "Growth of the time with the unknowns", header, table)
 
 
 def _logarithmic(axes: Axes) -> None:
@@ -316,9 +310,3 @@ def _decades(limits: tuple[float, float]) -> tuple[float, float]:
     """Return the powers of ten at or beyond both ends, but for a hair; never one twice."""
     low, high = np.floor(np.log10(limits[0]) + 0.05), np.ceil(np.log10(limits[1]) - 0.05)
     return float(10.0**low), float(10.0 ** max(high, low + 1.0))
-
-
-def _power_line(axes: Axes, rows: Sequence[Growth]) -> None:
-    largest = max(rows, key=lambda row: row.dofs)
-    ends = np.array([min(row.dofs for row in rows), largest.dofs])
-    axes.plot(ends, 1e3 * largest.floor_s * (ends / largest.dofs) ** 1.5, color=style.GREY, linewidth=0.7)

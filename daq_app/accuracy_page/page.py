@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import TypeVar
@@ -63,25 +64,27 @@ def _cell(text: str) -> str:
     return " ".join(words if len(words) <= CELL_WORDS else [*words[: CELL_WORDS - 1], "…"])
 
 
-def _of_rows(name: str, caption: str, rows: Sequence[R], columns: Mapping[str, Callable[[R], str]]) -> Table:
-    """Return a table with a line for each row, each cell made by its column."""
-    return Table(name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows))
+def _listed(
+    name: str,
+    kind: type[R],
+    caption: str,
+    columns: Mapping[str, Callable[[R], str]],
+    order: Callable[[R], tuple[bool, int]] = lambda _: (False, 0),
+) -> Callable[[RunResults], Table]:
+    """Return what makes a table with a line for each row of a kind, each cell made by its column."""
+
+    def table(measured: RunResults) -> Table:
+        rows = sorted(measured.of(kind), key=order)
+        return Table(
+            name, caption, tuple(columns), tuple(tuple(cell(row) for cell in columns.values()) for row in rows)
+        )
+
+    return table
 
 
-def tables(measured: RunResults) -> dict[str, Table]:
-    """Return the tables that there are rows for, by name."""
-    builders: tuple[Callable[[RunResults], Table], ...] = (
-        machine, targets, truths, speeds, estimates, warm, histories, costs, starts, orders, problems,
-        *(partial(_hard, kinematics=kinematics) for kinematics in ("small", "finite")),
-    )  # fmt: skip
-    return {table.name: table for table in (make(measured) for make in builders) if table.rows}
-
-
-def machine(measured: RunResults) -> Table:
-    """Return what the run was made on."""
+def _machine(measured: RunResults) -> Table:
     rows: list[tuple[str, str]] = []
     for row in measured.of(Machine):
-        assert isinstance(row, Machine)
         rows += [
             ("begun", f"{measured.begun} UTC"), ("system", row.system),
             ("processor", f"{row.processor}, {row.cores} cores"),
@@ -93,70 +96,18 @@ def machine(measured: RunResults) -> Table:
     return Table("machine", "Machine, load and versions.", ("", ""), tuple(rows))
 
 
-def targets(measured: RunResults) -> Table:
-    """Return the table of speeds with their targets."""
-    rows: list[Target] = measured.of(Target)
-    caption = (
-        "Targets of speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
-        "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said."
-    )
-    return _of_rows("targets", caption, rows, {
-        "work": lambda row: row.work, "at error": lambda row: row.at_error,
-        "reach": lambda row: _limit(row.reach, row.unit), "aim": lambda row: _limit(row.aim, row.unit),
-        "measured": lambda row: "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
-        "floors": lambda row: "–" if row.floors is None else number(row.floors, 2),
-        "verdict": lambda row: row.verdict, "how": lambda row: row.how,
-    })  # fmt: skip
-
-
-def truths(measured: RunResults) -> Table:
-    """Return the reference cases."""
-    rows: list[Truth] = measured.of(Truth)
-    cells: list[tuple[str, ...]] = []
-    for row in rows:
-        if row.numbers:
-            numbers = (*(number(value, 5) for value in row.numbers), percent(max(row.doubt)))
-            cells.append((row.kinematics, row.case, *numbers, " / ".join(f"{n:,}" for n in row.dofs)))
-        else:
-            cells.append((row.kinematics, row.case, "–", "–", "–", "–", row.refused))
-    caption = (
-        "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
-        "in this run. Doubt: how far they lie from it at most."
-    )
-    header = ("strain", "case", "SED [MPa]", "N [N/mm]", "drag [N/mm]", "doubt", "unknowns, or why there is none")
-    return Table("truths", caption, header, tuple(cells))
-
-
-def speeds(measured: RunResults) -> Table:
-    """Return time against error, mesh by mesh."""
-    rows: list[Speed] = sorted(measured.of(Speed), key=lambda row: (row.kinematics == "finite", row.dofs))
-    caption = (
-        "Time against true error, mesh by mesh of Q2/P-1 elements, eliminated by nested dissection. Floor: one "
-        "assembly, factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these "
-        "is in a picture of the decision on what the solver is made of, docs/decisions."
-    )
-    return _of_rows("speeds", caption, rows, {
-        "strain": lambda row: row.kinematics, "unknowns": lambda row: f"{row.dofs:,}",
-        "set-up [ms]": lambda row: _ms(row.setup_s), "floor [ms]": lambda row: _ms(row.floor_s),
-        "first [ms]": lambda row: _ms(row.first_s), "next [ms]": lambda row: _ms(row.next_s),
-        "largest error": lambda row: "–" if row.judged_error is None else percent(row.judged_error),
-        "no answer": lambda row: ", ".join(row.failed) or "–",
-    })  # fmt: skip
-
-
-def estimates(measured: RunResults) -> Table:
+def _estimates(measured: RunResults) -> Table:
     """Return how often estimates are above and near, by kinematics and number."""
-    rows: list[Estimate] = measured.of(Estimate)
+    rows = measured.of(Estimate)
     cells: list[tuple[str, ...]] = []
-    for kinematics in dict.fromkeys(row.kinematics for row in rows):
-        for name in NUMBERS:
-            mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
-            if mine:
-                met = _share([row.met for row in mine]) if name == NUMBERS[0] else "–"
-                ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
-                ratio = number(median(ratios), 2) if ratios else "–"
-                above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
-                cells.append((f"{kinematics} strain", name, str(len(mine)), above, near, met, ratio))
+    for kinematics, name in product(dict.fromkeys(row.kinematics for row in rows), NUMBERS):
+        mine = [row for row in rows if row.kinematics == kinematics and row.number == name]
+        if mine:
+            met = _share([row.met for row in mine]) if name == NUMBERS[0] else "–"
+            ratios = [row.estimate / max(row.error, 1e-9) for row in mine if row.above is not None]
+            ratio = number(median(ratios), 2) if ratios else "–"
+            above, near = _share([row.above for row in mine]), _share([row.near for row in mine])
+            cells.append((f"{kinematics} strain", name, str(len(mine)), above, near, met, ratio))
     caption = (
         "Estimates against true errors, of answers asked for with a tolerance. Above: the estimate is at least the "
         "true error. Near: below ten times the larger of true error and 0.02 %. Counted only where the truth can tell."
@@ -170,90 +121,13 @@ def _share(answers: Sequence[bool | None]) -> str:
     return f"{sum(verdicts)} of {len(verdicts)}" if verdicts else "–"
 
 
-def warm(measured: RunResults) -> Table:
-    """Return the warm stepper's rows."""
-    rows: list[Warm] = measured.of(Warm)
-    caption = "The warm stepper, fed reading by reading; p99 of each reading's median over five passes."
-    return _of_rows("warm", caption, rows, {
-        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
-        "readings": lambda row: str(row.readings), "median [ms]": lambda row: _ms(row.median_s),
-        "p99 [ms]": lambda row: _ms(row.p99_s), "p99 of one pass [ms]": lambda row: _ms(row.once_p99_s),
-        "largest error, by peak": lambda row: percent(row.worst_error),
-    })  # fmt: skip
-
-
-def histories(measured: RunResults) -> Table:
-    """Return courses against direct states."""
-    rows: list[March] = measured.of(March)
-    return _of_rows("histories", "A course of 200 substeps against the state found directly.", rows, {
-        "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
-        "unknowns": lambda row: str(row.dofs), "direct [ms]": lambda row: _ms(row.direct_s),
-        "200 substeps [ms]": lambda row: _ms(row.marched_s),
-        "times": lambda row: number(row.marched_s / row.direct_s, 2),
-        "difference of the SED": lambda row: f"{abs(row.difference):.0e}",
-    })  # fmt: skip
-
-
-def costs(measured: RunResults) -> Table:
-    """Return where the time goes."""
-    rows: list[Cost] = measured.of(Cost)
-    caption = (
-        "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
-        "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a profiler."
-    )
-    return _of_rows("costs", caption, rows, {
-        "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),
-        "unknowns": lambda row: f"{row.dofs:,}", "in all [ms]": lambda row: _ms(row.took_s),
-        "set-up [ms]": lambda row: _ms(row.setup_s), "solve [ms]": lambda row: _ms(row.wall_s),
-        "estimate [ms]": lambda row: _ms(row.estimate_s),
-        "by part": lambda row: ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
-    })  # fmt: skip
-
-
-def starts(measured: RunResults) -> Table:
-    """Return cold starts."""
-    rows: list[Cold] = measured.of(Cold)
-    caption = (
-        "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones."
-    )
-    return _of_rows("starts", caption, rows, {
-        "process": lambda row: row.what, "runs": lambda row: str(row.runs),
-        "processor time [ms]": lambda row: _ms(row.took_s), "time that passed [ms]": lambda row: _ms(row.passed_s),
-    })  # fmt: skip
-
-
-def orders(measured: RunResults) -> Table:
-    """Return observed orders of convergence."""
-    rows: list[Order] = measured.of(Order)
-    caption = "Observed orders of convergence. Time: of a solve on each mesh, the mesh included."
-    return _of_rows("orders", caption, rows, {
-        "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
-        "strain": lambda row: row.kinematics,
-        "errors, coarse to fine": lambda row: " / ".join(f"{error:.1e}" for error in row.errors),
-        "time [ms]": lambda row: " / ".join(number(1e3 * took) for took in row.took_s),
-        "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
-    })  # fmt: skip
-
-
-def problems(measured: RunResults) -> Table:
-    """Return the published problems."""
-    rows: list[Problem] = measured.of(Problem)
-    return _of_rows("problems", "Published problems, run through the same code as the finger.", rows, {
-        "problem": lambda row: row.problem, "source": lambda row: row.source, "quantity": lambda row: row.quantity,
-        "expected": lambda row: number(row.expected, 5), "obtained": lambda row: number(row.obtained, 5),
-        "off": lambda row: percent(row.off), "of": lambda row: row.of, "allowed": lambda row: percent(row.allowed),
-        "verdict": lambda row: "met" if row.met else "MISSED",
-    })  # fmt: skip
-
-
 def _hard(measured: RunResults, kinematics: str) -> Table:
-    rows: list[HardCase] = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
+    rows = [row for row in measured.of(HardCase) if row.kinematics == kinematics]
     passed = sum(not row.flaw for row in rows)
     caption = f"Hard cases at {kinematics} strain: {passed} of {len(rows)} ended as they must."
-    return _of_rows(f"hard-{kinematics}", caption, rows, {
-        "case": lambda row: row.case, "must": lambda row: row.must,
-        "outcome": lambda row: f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary,
-    })  # fmt: skip
+    outcomes = [f"FAILED, {row.flaw}: {row.summary}" if row.flaw else row.summary for row in rows]
+    cells = tuple((row.case, row.must, outcome) for row, outcome in zip(rows, outcomes, strict=True))
+    return Table(f"hard-{kinematics}", caption, ("case", "must", "outcome"), cells)
 
 
 def _ms(seconds: float | None) -> str:
@@ -262,6 +136,122 @@ def _ms(seconds: float | None) -> str:
 
 def _limit(value: float | None, unit: str) -> str:
     return "–" if value is None else f"{value:g} {unit}"
+
+
+def _value(row: Truth, at: int) -> str:
+    return number(row.numbers[at], 5) if row.numbers else "–"
+
+
+TABLES: tuple[Callable[[RunResults], Table], ...] = (
+    _machine,
+    _listed(
+        "targets", Target,
+        "Targets of speed, single thread, medians. Floors: the time by that of one assembly, factorisation "
+        "and solve of the same system in the same run. Mesh and tables are set-up and not included unless said.",
+        {
+            "work": lambda row: row.work, "at error": lambda row: row.at_error,
+            "reach": lambda row: _limit(row.reach, row.unit), "aim": lambda row: _limit(row.aim, row.unit),
+            "measured": lambda row: "–" if row.measured is None else f"{number(row.measured)} {row.unit}",
+            "floors": lambda row: "–" if row.floors is None else number(row.floors, 2),
+            "verdict": lambda row: row.verdict, "how": lambda row: row.how,
+        },
+    ),
+    _listed(
+        "truths", Truth,
+        "The reference cases and their truth: mean of three overkill solves on meshes that differ, made "
+        "in this run. Doubt: how far they lie from it at most.",
+        {
+            "strain": lambda row: row.kinematics, "case": lambda row: row.case,
+            "SED [MPa]": lambda row: _value(row, 0), "N [N/mm]": lambda row: _value(row, 1),
+            "drag [N/mm]": lambda row: _value(row, 2),
+            "doubt": lambda row: percent(max(row.doubt)) if row.numbers else "–",
+            "unknowns, or why there is none":
+                lambda row: " / ".join(f"{n:,}" for n in row.dofs) if row.numbers else row.refused,
+        },
+    ),
+    _listed(
+        "speeds", Speed,
+        "Time against true error, mesh by mesh of Q2/P-1 elements, eliminated by nested dissection. Floor: one "
+        "assembly, factorisation and solve. First, next: a surface from undeformed, a further one. What lost to these "
+        "is in a picture of the decision on what the solver is made of, docs/decisions.",
+        {
+            "strain": lambda row: row.kinematics, "unknowns": lambda row: f"{row.dofs:,}",
+            "set-up [ms]": lambda row: _ms(row.setup_s), "floor [ms]": lambda row: _ms(row.floor_s),
+            "first [ms]": lambda row: _ms(row.first_s), "next [ms]": lambda row: _ms(row.next_s),
+            "largest error": lambda row: "–" if row.judged_error is None else percent(row.judged_error),
+            "no answer": lambda row: ", ".join(row.failed) or "–",
+        },
+        order=lambda row: (row.kinematics == "finite", row.dofs),
+    ),
+    _estimates,
+    _listed(
+        "warm", Warm, "The warm stepper, fed reading by reading; p99 of each reading's median over five passes.",
+        {
+            "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+            "readings": lambda row: str(row.readings), "median [ms]": lambda row: _ms(row.median_s),
+            "p99 [ms]": lambda row: _ms(row.p99_s), "p99 of one pass [ms]": lambda row: _ms(row.once_p99_s),
+            "largest error, by peak": lambda row: percent(row.worst_error),
+        },
+    ),
+    _listed(
+        "histories", March, "A course of 200 substeps against the state found directly.",
+        {
+            "": lambda row: f"{row.kinematics} strain", "surface": lambda row: row.case,
+            "unknowns": lambda row: str(row.dofs), "direct [ms]": lambda row: _ms(row.direct_s),
+            "200 substeps [ms]": lambda row: _ms(row.marched_s),
+            "times": lambda row: number(row.marched_s / row.direct_s, 2),
+            "difference of the SED": lambda row: f"{abs(row.difference):.0e}",
+        },
+    ),
+    _listed(
+        "costs", Cost,
+        "Where the time of one surface goes, asked for with a tolerance: in all, from scene to answer. Set-up, solve "
+        "and estimate are of the mesh that the answer is from, as it tells itself; parts: shares of all, by a "
+        "profiler.",
+        {
+            "": lambda row: f"{row.kinematics} strain", "tolerance": lambda row: percent(row.tolerance),
+            "unknowns": lambda row: f"{row.dofs:,}", "in all [ms]": lambda row: _ms(row.took_s),
+            "set-up [ms]": lambda row: _ms(row.setup_s), "solve [ms]": lambda row: _ms(row.wall_s),
+            "estimate [ms]": lambda row: _ms(row.estimate_s),
+            "by part": lambda row: ", ".join(f"{name} {100 * part:.0f} %" for name, part in row.parts.items()),
+        },
+    ),
+    _listed(
+        "starts", Cold,
+        "Start-up: processes from start to end, medians. What Python and the solver take to load is in the last ones.",
+        {
+            "process": lambda row: row.what, "runs": lambda row: str(row.runs),
+            "processor time [ms]": lambda row: _ms(row.took_s), "time that passed [ms]": lambda row: _ms(row.passed_s),
+        },
+    ),
+    _listed(
+        "orders", Order, "Observed orders of convergence. Time: of a solve on each mesh, the mesh included.",
+        {
+            "problem": lambda row: row.problem, "quantity": lambda row: row.quantity,
+            "strain": lambda row: row.kinematics,
+            "errors, coarse to fine": lambda row: " / ".join(f"{error:.1e}" for error in row.errors),
+            "time [ms]": lambda row: " / ".join(number(1e3 * took) for took in row.took_s),
+            "order": lambda row: f"{row.order:.2f}", "at least": lambda row: f"{row.least:g}",
+        },
+    ),
+    _listed(
+        "problems", Problem, "Published problems, run through the same code as the finger.",
+        {
+            "problem": lambda row: row.problem, "source": lambda row: row.source,
+            "quantity": lambda row: row.quantity, "expected": lambda row: number(row.expected, 5),
+            "obtained": lambda row: number(row.obtained, 5), "off": lambda row: percent(row.off),
+            "of": lambda row: row.of, "allowed": lambda row: percent(row.allowed),
+            "verdict": lambda row: "met" if row.met else "MISSED",
+        },
+    ),
+    partial(_hard, kinematics="small"),
+    partial(_hard, kinematics="finite"),
+)  # fmt: skip
+
+
+def tables(measured: RunResults) -> dict[str, Table]:
+    """Return the tables that there are rows for, by name."""
+    return {table.name: table for table in (make(measured) for make in TABLES) if table.rows}
 
 
 def fill(docs: Path, tables: Mapping[str, Table]) -> None:

@@ -4,7 +4,7 @@ import datetime
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -41,6 +41,7 @@ KINDS = {
 }  # fmt: skip
 ALWAYS = ("machine", "targets")  # cost nothing, and follow even after a stop
 Progress = Callable[[float, str], None]
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +55,7 @@ class RunResults:
     rows: "Mapping[str, tuple[DataclassInstance, ...]]"  # by subject
     left_out: tuple[str, ...]
 
-    def of(self, kind: type[Any]) -> list[Any]:
+    def of(self, kind: type[R]) -> list[R]:
         """Return all rows of one kind."""
         return [row for rows in self.rows.values() for row in rows if isinstance(row, kind)]
 
