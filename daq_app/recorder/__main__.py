@@ -1,11 +1,99 @@
-"""Start of the recorder's process; `client.py` starts it."""
+"""The recorder's process: it takes requests down one pipe and reports up another, and nothing else reaches it.
 
+One main loop: between sessions it shows what the transducer measures, in a session `run_session` has the loop. When
+the client is gone the session in hand is ended by its rule (`session.py`) and the process ends.
+"""
+
+import os
+import signal
 import sys
+from collections.abc import Callable
 
-from daq_app.child_process import use_one_thread
+from daq_app.recorder import messages as m
+from daq_app.recorder.bench import Bench, NotNow
+from daq_app.recorder.display import Display
+from daq_app.recorder.pipes import Inbox, Outbox
+from daq_app.recorder.session import Prepared, begin, resume, run
+from drivers.clock import LONGEST_STEP, Clock, clock_at
+from drivers.transducer import DeviceFault, LinkLost, SetupError
+from sessions.recording import RecordingError
+
+LAST_WORDS = 2.0  # for the client to fetch the last reports [s]
+EXPECTED = (DeviceFault, LinkLost, NotNow, RecordingError, SetupError)  # what has a sentence for people
+
+
+def main(pace: float = 1.0) -> None:
+    """Serve the client at stdin and stdout until it goes, by a clock of that pace [-]."""
+    reading, writing = os.dup(0), os.dup(1)
+    # Whatever prints by mistake must not get between the messages.
+    os.dup2(2, 1)
+    signal.signal(signal.SIGINT, lambda _signal, _frame: None)  # a nudge: it only breaks off waiting
+    outbox = Outbox(writing)
+    try:
+        Recorder(Inbox(reading), outbox, clock_at(pace, LONGEST_STEP)).serve()
+    finally:
+        outbox.flush(LAST_WORDS)
+    sys.stdout.flush()
+    os._exit(0)  # threads of drivers and pipes have nothing left to do
+
+
+class Recorder:
+    """What the process does."""
+
+    def __init__(self, inbox: Inbox, outbox: Outbox, clock: Clock) -> None:
+        """Serve requests from `inbox`."""
+        self._inbox = inbox
+        self._send = outbox.send
+        self._clock = clock
+        self._display = Display(outbox.send, clock.factor)
+        self._bench = Bench(clock, self._display, outbox.send)
+
+    def serve(self) -> None:
+        """Do what is asked for until the client leaves."""
+        while not self._inbox.leaving.is_set():
+            self._attempt("Tare", self._bench.look)
+            self._display.look(self._bench.health)
+            for request in self._inbox.take_requests():
+                self._attempt(type(request).__name__, lambda request=request: self._do(request))
+        self._bench.disconnect()
+
+    def _do(self, request: m.Request) -> None:
+        match request:
+            case m.Connect(uri):
+                self._bench.connect(uri)
+            case m.Disconnect():
+                self._bench.disconnect()
+            case m.Tare(duration):
+                self._bench.begin_tare(duration)
+            case m.AcknowledgeOverloads():
+                self._display.acknowledge()
+            case m.StartSession():
+                self._session(lambda: begin(request, self._bench, self._clock))
+            case m.ResumeSession():
+                self._session(lambda: resume(request, self._bench, self._clock))
+            case m.Stop() | m.Shutdown():
+                self._inbox.answer_stop()
+                self._bench.end_tare()
+            case _:
+                raise NotNow("no session is running")
+
+    def _session(self, prepare: Callable[[], Prepared]) -> None:
+        """Run a session; afterwards the transducer is shown as before."""
+        try:
+            run(prepare(), self._bench, self._display, self._inbox, self._send)
+        finally:
+            self._inbox.answer_stop()
+            self._bench.stream()
+
+    def _attempt(self, name: str, work: Callable[[], None]) -> None:
+        """Do something asked for; what goes wrong is reported, and ends nothing else."""
+        try:
+            work()
+        except EXPECTED as error:
+            self._send(m.Failed(name, " ".join(str(error).split()), type(error).__name__))
+        except Exception as error:  # noqa: BLE001  an error of ours must not take the recorder along
+            self._send(m.Failed(name, f"unexpected {type(error).__name__} ({error})", type(error).__name__))
+
 
 if __name__ == "__main__":
-    use_one_thread()
-    from daq_app.recorder.process import main  # after that: it imports numpy
-
-    main(sys.argv[1:])
+    main(*map(float, sys.argv[1:]))

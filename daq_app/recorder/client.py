@@ -33,14 +33,14 @@ import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from queue import SimpleQueue
 from types import TracebackType
 from typing import Self
 
-from daq_app.child_process import interpreter
-from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, Gone, Report, Request, Shutdown, Splitter
+from daq_app.child_process import interpreter, use_one_thread
+from daq_app.recorder.messages import REPORTS, REQUESTS, BrokenMessage, Codec, Gone, Report, Request, Shutdown
 
 PATIENCE = 10.0  # for a recorder that was asked to end; it may be sealing [s]
-CHUNK = 1 << 20
 
 
 class Recorder:
@@ -53,9 +53,8 @@ class Recorder:
         self._requests = Codec(REQUESTS)
         self._reports = Codec(REPORTS)
         self._arrived: deque[Report] = deque()
-        self._to_send: deque[bytes | None] = deque()
+        self._to_send: SimpleQueue[bytes | None] = SimpleQueue()
         self._news = threading.Event()
-        self._something_to_send = threading.Event()
         self._asked_to_end = False
         self._heard = time.monotonic()
         self._reader = threading.Thread(target=self._read, name="recorder's reports", daemon=True)
@@ -68,12 +67,12 @@ class Recorder:
 
         With `debug` its errors go to our stderr. Raises OSError where no process can be made.
         """
+        use_one_thread()
         process = subprocess.Popen(
             interpreter("-m", "daq_app.recorder", repr(pace)),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=None if debug else subprocess.DEVNULL,
-            bufsize=0,
             # Out of reach of Ctrl-C and of a terminal that is closed: a session of its own; on Windows a group and a
             # console of its own, without a window (CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW).
             start_new_session=os.name == "posix",
@@ -104,8 +103,7 @@ class Recorder:
     def send(self, request: Request) -> None:
         """Ask for something, or tell what was done. To a recorder that is gone it is sent in vain: `Gone` says so."""
         self._asked_to_end |= isinstance(request, Shutdown)
-        self._to_send.append(self._requests.packed(request))
-        self._something_to_send.set()
+        self._to_send.put(self._requests.packed(request))
 
     def poll(self, timeout: float = 0.0) -> tuple[Report, ...]:
         """Return all reports since the last call, in order, waiting up to `timeout` [s] for the first."""
@@ -136,28 +134,25 @@ class Recorder:
 
     def leave(self) -> None:
         """Let go of the recorder: it ends by its rule for a client that is gone."""
-        self._to_send.append(None)
-        self._something_to_send.set()
+        self._to_send.put(None)
 
     def _read(self) -> None:
         """Take reports until there are no more."""
         assert self._process.stdout is not None
-        splitter = Splitter()
         said = ""
-        try:
-            while data := os.read(self._process.stdout.fileno(), CHUNK):
-                reports = [self._reports.unpacked(body) for body in splitter.feed(data)]
-                self._heard = time.monotonic()
-                self._arrived.extend(reports)
-                if reports:
-                    self._news.set()
-                    self._wake()
-        except BrokenMessage as error:
-            said = f"; it said {error}"
-        except OSError:
-            pass
-        self._process.stdout.close()
-        self._arrived.append(self._gone(said))
+        with self._process.stdout as pipe:
+            try:
+                for report in self._reports.read(pipe):
+                    self._heard = time.monotonic()
+                    self._arrive(report)
+            except BrokenMessage as error:
+                said = f"; it said {error}"
+            except OSError:
+                pass
+        self._arrive(self._gone(said))
+
+    def _arrive(self, report: Report) -> None:
+        self._arrived.append(report)
         self._news.set()
         self._wake()
 
@@ -178,16 +173,8 @@ class Recorder:
 
     def _write(self) -> None:
         """Send requests; a pipe that is full holds up nobody else."""
-        pipe = self._process.stdin
-        assert pipe is not None
-        with pipe, suppress(OSError, ValueError):  # it is gone: the reader says so
-            while True:
-                self._something_to_send.wait()
-                self._something_to_send.clear()
-                while self._to_send:
-                    packed = self._to_send.popleft()
-                    if packed is None:
-                        return
-                    rest = memoryview(packed)
-                    while rest:
-                        rest = rest[os.write(pipe.fileno(), rest) :]
+        assert self._process.stdin is not None
+        with suppress(OSError, ValueError), self._process.stdin as pipe:  # it is gone: the reader says so
+            while (packed := self._to_send.get()) is not None:
+                pipe.write(packed)
+                pipe.flush()

@@ -8,9 +8,9 @@ Nothing in it can be run.
 
 import math
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, cast, get_args
+from typing import IO, Any, Literal, cast, get_args
 
 import msgspec
 import numpy as np
@@ -227,6 +227,15 @@ class Codec:
         """Know these types, none of which share a name."""
         self._types = {cls.__name__: cls for cls in types}
 
+    def read(self, file: IO[bytes]) -> Iterator[Any]:
+        """Yield each message of a pipe until its other end goes, which may cut the last. Raises BrokenMessage."""
+        while len(head := file.read(LENGTH.size)) == LENGTH.size:
+            (length,) = LENGTH.unpack(head)
+            if length > LONGEST:
+                raise BrokenMessage(f"a message of {length} bytes is none of ours")
+            if len(body := file.read(length)) == length:
+                yield self.unpacked(body)
+
     def packed(self, message: object) -> bytes:
         """Return a message as bytes."""
         body = msgspec.msgpack.encode((type(message).__name__, message), enc_hook=_array_out)
@@ -240,30 +249,6 @@ class Codec:
             return msgspec.msgpack.decode(fields, type=cls, dec_hook=_array_in)
         except (KeyError, ValueError, TypeError, msgspec.MsgspecError) as error:
             raise BrokenMessage(f"a message that is none of ours ({error})") from error
-
-
-class Splitter:
-    """Cuts a stream of bytes into the bodies of messages, however it was cut before."""
-
-    def __init__(self) -> None:
-        self._buffer = bytearray()
-
-    def feed(self, data: bytes) -> list[bytes]:
-        """Take what arrived and return every body it completes. Raises BrokenMessage for a length beyond LONGEST."""
-        self._buffer += data
-        messages: list[bytes] = []
-        start = 0
-        while len(self._buffer) - start >= LENGTH.size:
-            (length,) = LENGTH.unpack_from(self._buffer, start)
-            if length > LONGEST:
-                raise BrokenMessage(f"a message of {length} bytes is none of ours")
-            stop = start + LENGTH.size + length
-            if len(self._buffer) < stop:
-                break
-            messages.append(bytes(self._buffer[start + LENGTH.size : stop]))
-            start = stop
-        del self._buffer[:start]
-        return messages
 
 
 def _array_out(value: object) -> object:

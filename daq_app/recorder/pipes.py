@@ -5,6 +5,7 @@ import signal
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 
 from msgspec import structs
 
@@ -19,13 +20,11 @@ from daq_app.recorder.messages import (
     Report,
     Request,
     Shutdown,
-    Splitter,
     Stop,
 )
 
 POKE_EVERY = 0.05  # between two nudges of the main thread by a stop nobody has answered [s]
 MOST_LIVE = 120  # messages of readings waiting to be fetched; later ones are left out, and counted
-CHUNK = 65_536
 
 
 class Inbox:
@@ -34,7 +33,6 @@ class Inbox:
     def __init__(self, reading: int) -> None:
         """Read from this file descriptor."""
         self._reading = reading
-        self._codec = Codec(REQUESTS)
         self._arrived: deque[Request] = deque()
         self._nudging = threading.Lock()
         self.client_gone = threading.Event()
@@ -52,13 +50,10 @@ class Inbox:
             self.stop_wanted.clear()
 
     def _read(self) -> None:
-        splitter = Splitter()
-        try:
-            while data := os.read(self._reading, CHUNK):
-                for body in splitter.feed(data):
-                    self._take(self._codec.unpacked(body))
-        except (OSError, BrokenMessage):
-            pass  # a client that cannot be understood is as good as gone
+        with suppress(OSError, BrokenMessage), open(self._reading, "rb", closefd=False) as pipe:
+            for request in Codec(REQUESTS).read(pipe):
+                self._take(request)
+        # A client that cannot be understood is as good as gone.
         self.client_gone.set()
         self.leaving.set()
 
@@ -89,7 +84,7 @@ class Outbox:
 
     def __init__(self, writing: int) -> None:
         """Write to this file descriptor."""
-        self._writing = writing
+        self._file = os.fdopen(writing, "wb", closefd=False)
         self._codec = Codec(REPORTS)
         self._waiting: deque[Report] = deque()
         self._live = 0  # messages of readings among them
@@ -127,10 +122,9 @@ class Outbox:
             self._news.wait()
             self._news.clear()
             while (report := self._next()) is not None:
-                packed = memoryview(self._packed(report))
                 try:
-                    while packed:
-                        packed = packed[os.write(self._writing, packed) :]
+                    self._file.write(self._packed(report))
+                    self._file.flush()
                 except OSError:
                     with self._lock:
                         self._broken = True

@@ -31,7 +31,6 @@ from daq_app.recorder.messages import (
     Sealed,
     SessionBegun,
     SessionEnded,
-    Splitter,
     StartSession,
     Stop,
     Tare,
@@ -244,7 +243,7 @@ def test_a_client_that_fetches_nothing_holds_up_nothing(tmp_path):
     assert recording.end["complete"]
     assert recording.losses == ()
     recorder.stdin.close()
-    reports = [Codec(REPORTS).unpacked(body) for body in Splitter().feed(recorder.stdout.read())]
+    reports = list(Codec(REPORTS).read(recorder.stdout))
     recorder.stdout.close()
     assert recorder.wait() == 0
     assert tuple(report for report in reports if isinstance(report, LoggedEvent)) == recording.events
