@@ -50,6 +50,11 @@ def add_number(
     parser.add_argument(name, type=within(name, kind, *span, words), default=default, metavar=metavar, help=meaning)
 
 
+def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
+    """Declare an option without a value, True where it is given."""
+    parser.add_argument(name, action="store_true", help=meaning)
+
+
 def add_seed(parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_SEED) -> None:
     """Declare --seed, of something that is drawn at random."""
     add_number(parser, "--seed", int, (0, largest), use, default)
@@ -85,13 +90,8 @@ def add_visit(parser: argparse.ArgumentParser, further: str = "") -> None:
 
 def add_quantity(parser: argparse.ArgumentParser, use: str) -> None:
     """Declare --quantity, which is put to some use in place of the SED."""
-    parser.add_argument(
-        "--quantity",
-        choices=NAMES,
-        default=SED.name,
-        metavar="NAME",
-        help=f"of the ending, {use} in place of the SED: {', '.join(NAMES)}",
-    )
+    meaning = f"of the ending, {use} in place of the SED: {', '.join(NAMES)}"
+    parser.add_argument("--quantity", choices=NAMES, default=SED.name, metavar="NAME", help=meaning)
 
 
 def add_kinematics(parser: argparse.ArgumentParser, meaning: str) -> None:
@@ -121,12 +121,8 @@ def add_variants(parser: argparse.ArgumentParser, meaning: str, default: str | N
 def add_workers(parser: argparse.ArgumentParser) -> None:
     """Declare where many solves run: processes of this computer or a Dask cluster."""
     add_number(parser, "--workers", int, (1, 1024), "processes on this computer (as many as cores)", metavar="N")
-    parser.add_argument(
-        "--scheduler",
-        type=_address,
-        metavar="ADDRESS",
-        help="of a Dask cluster you trust, such as tls://host:8786, in place of this computer",
-    )
+    meaning = "of a Dask cluster you trust, such as tls://host:8786, in place of this computer"
+    parser.add_argument("--scheduler", type=_address, metavar="ADDRESS", help=meaning)
 
 
 def _address(text: str) -> str:
@@ -140,16 +136,10 @@ FINGER = ("tip_radius", "width", "contact_angle")
 
 def add_body_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the subject's own finger and depths."""
-    parser.add_argument(
-        "--finger",
-        nargs="+",
-        default=[],
-        metavar="NAME=VALUE",
-        help="as measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]",
-    )
-    parser.add_argument(
-        "--depth", nargs="+", default=[], metavar="BLOCK=MM", help="the subject's own, in place of a block's"
-    )
+    meaning = "as measured on the subject: tip_radius [mm], width of the contact [mm], contact_angle [degrees]"
+    parser.add_argument("--finger", nargs="+", default=[], metavar="NAME=VALUE", help=meaning)
+    meaning = "the subject's own, in place of a block's"
+    parser.add_argument("--depth", nargs="+", default=[], metavar="BLOCK=MM", help=meaning)
 
 
 def body_of(options: argparse.Namespace) -> Body:
@@ -167,11 +157,8 @@ def body_of(options: argparse.Namespace) -> Body:
 
 def own_sentence(plan: SessionPlan) -> str | None:
     """Return what is the subject's own in a plan, for whoever runs the session; None where nothing is."""
-    parts: list[str] = []
-    if plan.finger.tip_radius is not None:
-        parts.append(f"tip radius {plan.finger.tip_radius:g} mm")
-    if plan.finger.width is not None:
-        parts.append(f"width {plan.finger.width:g} mm")
+    lengths = {"tip radius": plan.finger.tip_radius, "width": plan.finger.width}
+    parts = [f"{name} {length:g} mm" for name, length in lengths.items() if length is not None]
     if plan.contact_angle_origin == "measured":
         parts.append(f"contact angle {plan.contact_angle:g} degrees")
     own = [block for block in plan.blocks if block.indentation_origin == "measured"]
@@ -184,12 +171,8 @@ AS_BEFORE = "as the session was analysed before, or else fixed"
 
 def add_analysis(parser: argparse.ArgumentParser, otherwise: str = AS_BEFORE) -> None:
     """Declare --area, --area-force and --calibration-error; `otherwise` says which area holds without."""
-    parser.add_argument(
-        "--area",
-        metavar="LAW",
-        help="contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of "
-        f"N; where none is given {otherwise}",
-    )
+    meaning = "contact area for tau_max: fixed (the plan's), hertz (grows as N^(2/3)), or an exponent of N; where none"
+    parser.add_argument("--area", metavar="LAW", help=f"{meaning} is given {otherwise}")
     meaning = f"normal force at which an area that grows is the plan's ({PLANNED_AT:g}, assumed)"
     add_number(parser, "--area-force", float, (0.01, 100.0), meaning, None, "NEWTON", "0.01 to 100 (N)")
     add_calibration(parser)

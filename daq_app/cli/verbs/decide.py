@@ -7,6 +7,8 @@ back, by a line of its own. Times are seconds on the device's clock, as 'daq-app
 
 import argparse
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from daq_app.batch.derived import ANALYSIS, PREDICTION, analyse_session, settings_of, stored_document
 from daq_app.cli.options import add_session
@@ -14,11 +16,12 @@ from daq_app.console import DONE, FLAWED, Console, WrongValue, number
 from sessions.plan.study import check_code
 from sessions.recording import Recording
 from sessions.recording.derived import gain_error_set
-from sessions.strokes import Analysis, Stroke, analyse
+from sessions.strokes import Analysis, analyse
 from sessions.strokes.analysis import preview, with_present
 from sessions.strokes.decisions import Decision, DecisionError, Decisions, append, read
 
 EXAMPLE = 'daq-app decide recordings/P07 --trial 4 --steady 31.2 32.6 --by E02 --why "the ramp was in it"'
+CHANGING = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction", "break_away", "slide_onset")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,29 +29,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--trial", type=int, metavar="N", help="whose stroke; leave out for a recording without trials")
     parser.add_argument("--stroke", type=int, metavar="K", default=1, help="its number within the trial (1)")
     what = parser.add_mutually_exclusive_group(required=True)
-    for name, does in (
-        ("--steady", "steady window, for mu_dynamic and speed [s]"),
-        ("--stick", "stick phase: its greatest T/N is mu_static, its end break-away [s]"),
-    ):
-        what.add_argument(name, type=float, nargs=2, metavar=("FROM", "TO"), help=does)
+    window = partial(what.add_argument, type=float, nargs=2, metavar=("FROM", "TO"))
+    window("--steady", help="steady window, for mu_dynamic and speed [s]")
+    window("--stick", help="stick phase: its greatest T/N is mu_static, its end break-away [s]")
     what.add_argument("--onset", type=float, metavar="S", help="contact onset [s]")
     what.add_argument("--lift", type=float, metavar="S", help="end of contact [s]")
     what.add_argument("--slide-onset", type=float, metavar="S", help="where the slide begins, for mu_static [s]")
     what.add_argument("--direction", type=int, choices=[1, -1], help="1 proximal to distal, -1 distal to proximal")
-    what.add_argument(
-        "--drop", action="store_true", help="the stroke stays out: it is shown, the model does not get it"
-    )
-    what.add_argument("--keep", action="store_true", help="the stroke stays in, its flaws were looked at")
-    what.add_argument("--choose", action="store_true", help="of its trial's strokes the model gets this one")
-    what.add_argument(
-        "--tilt",
-        type=float,
-        nargs="*",
-        metavar="DEGREES",
-        help="of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell",
-    )
+    for name, meaning in (
+        ("--drop", "the stroke stays out: it is shown, the model does not get it"),
+        ("--keep", "the stroke stays in, its flaws were looked at"),
+        ("--choose", "of its trial's strokes the model gets this one"),
+        ("--list", "only tell what was decided"),
+    ):
+        what.add_argument(name, action="store_true", help=meaning)
+    meaning = "of the session: level a face that leans so far to +x and to +y; without numbers as its presses tell"
+    what.add_argument("--tilt", type=float, nargs="*", metavar="DEGREES", help=meaning)
     what.add_argument("--undo", type=int, metavar="NUMBER", help="take a decision back")
-    what.add_argument("--list", action="store_true", help="only tell what was decided")
     parser.add_argument("--by", metavar="CODE", help="who decides: a code, never a name")
     parser.add_argument("--why", metavar="REASON", help="in a few words")
 
@@ -87,12 +84,10 @@ def _decision(options: argparse.Namespace) -> Decision:
         return replace(decision, what="choice", stroke=None, new=options.stroke)
     if options.drop or options.keep:
         return replace(decision, what="kept", new=bool(options.keep))
-    for what in ("steady", "stick"):
-        span: list[float] | None = getattr(options, what)
-        if span is not None:
-            return replace(decision, what=what, new=(span[0], span[1]))
-    what = next(name for name in ("onset", "lift", "slide_onset", "direction") if getattr(options, name) is not None)
-    return replace(decision, what=what, new=getattr(options, what))
+    names = ("steady", "stick", "onset", "lift", "slide_onset", "direction")
+    what = next(name for name in names if getattr(options, name) is not None)
+    new: Any = getattr(options, what)
+    return replace(decision, what=what, new=tuple(new) if what in ("steady", "stick") else new)
 
 
 def _tilt(options: argparse.Namespace, analysis: Analysis) -> Decision:
@@ -123,15 +118,11 @@ def _changes(before: Analysis, after: Analysis) -> list[str]:
     sentences: list[str] = []
     strokes = [{one.stroke for one in analysis.friction} for analysis in (before, after)]
     for at, (old, new) in enumerate(zip(before.strokes, after.strokes, strict=False)):
-        words = [f"{name} {was} -> {now}" for name, was, now in _numbers(old, new) if was != now]
+        numbers = ((name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in CHANGING)
+        words = [f"{name} {was} -> {now}" for name, was, now in numbers if was != now]
         if (at in strokes[0]) != (at in strokes[1]):
             words.append("the model gets it" if at in strokes[1] else "the model does not get it")
         if words:
             trial = "" if new.trial is None else f" of trial {new.trial}"
             sentences.append(f"stroke {new.number}{trial}: {', '.join(words)}")
     return sentences
-
-
-def _numbers(old: Stroke, new: Stroke) -> list[tuple[str, str, str]]:
-    names = ("mu_static", "mu_dynamic", "mu_max", "tau_max", "speed", "direction", "break_away", "slide_onset")
-    return [(name, number(getattr(old, name), 4), number(getattr(new, name), 4)) for name in names]

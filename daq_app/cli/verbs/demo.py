@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from daq_app.batch.derived import analyse_session, predict_session
-from daq_app.cli.options import add_seed
+from daq_app.cli.options import add_flag, add_seed
 from daq_app.console import DONE, FLAWED, Console, number, table
 from daq_app.simulation.synthetic import Study, StudyCutShort, simulated_study
 from drivers.clock import LONGEST_STEP, clock_at
@@ -28,9 +28,7 @@ PACE = 20.0  # simulated seconds a real second
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="a new folder (demo-results/TIME)")
     add_seed(parser, "of surfaces' noise, subjects and orders (1)", 1)
-    parser.add_argument(
-        "--real-time", action="store_true", help=f"keep the clock; otherwise time runs {PACE:g} times faster"
-    )
+    add_flag(parser, "--real-time", f"keep the clock; otherwise time runs {PACE:g} times faster")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

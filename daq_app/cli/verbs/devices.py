@@ -49,10 +49,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
     ]
     rows.append(["sim:", "simulated bench", "–", "always there"])
     console.say(table(rows, head=["address", "model", "serial", "calibration"]))
-    for line in lines:
-        console.say(
-            f"{line} is a serial port, which was not opened: ask it as serial-ft://{line} or digital-ft://{line}"
-        )
+    unopened = "is a serial port, which was not opened: ask it as"
+    console.say(*(f"{line} {unopened} serial-ft://{line} or digital-ft://{line}" for line in lines))
     for device in devices:
         if device.problem:
             problem = device.problem.removeprefix(f"{device.uri}: ")
@@ -119,9 +117,8 @@ def _probe(uri: str, console: Console) -> int:
     if health.rate_words:
         console.say(health.rate_words)
     if mean is not None and noise is not None:
-        rows = [
-            [a, number(float(m)), number(float(s), 2), u] for a, m, s, u in zip(AXES, mean, noise, units, strict=True)
-        ]
+        columns = zip(AXES, mean.tolist(), noise.tolist(), units, strict=True)
+        rows = [[axis, number(m), number(sd, 2), unit] for axis, m, sd, unit in columns]
         console.say(table(rows, head=["axis", "mean", "noise (sd)", "unit"]))
     flawed = any(counts[name] for name in FLAWS) or not len(readings)
     return FLAWED if flawed else DONE
@@ -142,8 +139,6 @@ def _measured_rate(readings: ReadingBlock) -> float | None:
     """Return readings a second by regression of arrival on sequence [Hz]."""
     if len(readings) < 10:
         return None
-    numbers = readings.sequence - readings.sequence[0]
-    seconds = (readings.received_ns - readings.received_ns[0]) / 1e9
-    away = numbers - numbers.mean()
-    slope = float(away @ seconds) / float(away @ away)
+    numbers, arrivals = readings.sequence - readings.sequence[0], readings.received_ns - readings.received_ns[0]
+    slope = np.polynomial.Polynomial.fit(numbers, arrivals / 1e9, 1).convert().coef[1]
     return 1.0 / slope if slope > 0 else None

@@ -7,15 +7,8 @@ export as csv, bids or hdf5 can be imported again and is the session it was.
 import argparse
 from pathlib import Path
 
-from daq_app.batch.derived import (
-    ANALYSIS,
-    PREDICTION,
-    is_current,
-    outdated_prediction,
-    repeat,
-    settings_of,
-    stored_document,
-)
+from daq_app.batch import derived
+from daq_app.batch.derived import ANALYSIS, PREDICTION
 from daq_app.cli.options import add_session
 from daq_app.console import DONE, FLAWED, Console
 from sessions.exchange import FORMATS, ExportSource, export
@@ -50,12 +43,12 @@ def _source(recording: Recording, console: Console) -> ExportSource:
     """Return the session with the numbers kept in it; those made under other decisions are made anew."""
     decided = read(recording.folder)
     made_by = {"made_by": software_versions()}
-    analysis, prediction = stored_document(recording.folder, ANALYSIS), stored_document(recording.folder, PREDICTION)
-    if analysis is None or not is_current(analysis, decided):
+    analysis, prediction = (derived.stored_document(recording.folder, name) for name in (ANALYSIS, PREDICTION))
+    if analysis is None or not derived.is_current(analysis, decided):
         settings = analysis or {"gain_error": gain_error_set(recording.folder)}
-        analysis = made_by | repeat(ANALYSIS, settings, recording, decided)
-    if prediction is not None and not is_current(prediction, decided):
+        analysis = made_by | derived.repeat(ANALYSIS, settings, recording, decided)
+    if prediction is not None and not derived.is_current(prediction, decided):
         console.note(f"{PREDICTION} was made under other decisions than those in force, and is made anew")
-        prediction = made_by | repeat(PREDICTION, prediction, recording, decided)
-    console.note(outdated_prediction(recording, settings_of(analysis)))
+        prediction = made_by | derived.repeat(PREDICTION, prediction, recording, decided)
+    console.note(derived.outdated_prediction(recording, derived.settings_of(analysis)))
     return ExportSource(recording, analysis, prediction)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from daq_app.batch.derived import open_visit, stored_settings
-from daq_app.cli.options import add_calibration, add_number, add_seed, add_visit, calibration_error
+from daq_app.cli.options import add_calibration, add_flag, add_number, add_seed, add_visit, calibration_error
 from daq_app.console import DONE, FLAWED, Console, WrongValue, number, span, table
 from sessions.exchange.csv_text import displacement_log
 from sessions.file_access import write_whole
@@ -40,20 +40,14 @@ AGREE = 0.02  # the solver's own forces may differ so much from the fitted ones 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_visit(parser)
     parser.add_argument("--displacement", type=Path, required=True, metavar="FILE.csv", help="log of the stage")
-    parser.add_argument(
-        "--finger", type=Path, metavar="FILE", help="scene file with the finger's dimensions (else the session's own)"
-    )
-    for name, least, greatest, usual, metavar, words in (
-        ("--shift", -1e9, 1e9, 0.0, "S", "added to the log's times (0)"),
-        ("--mu", 0.0, 5.0, MU, "MU", f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly "
-         "changes)"),
-        ("--prior", 1.1, 4.0, FACTOR, "FACTOR", f"one standard deviation of each stiffness about the published one, as "
-         f"a factor ({FACTOR:g}, assumed)"),
-    ):  # fmt: skip
-        add_number(parser, name, float, (least, greatest), words, usual, metavar)
-    parser.add_argument(
-        "--relaxation", action="store_true", help="also how the finger relaxes while the stage stands; --scene gets it"
-    )
+    meaning = "scene file with the finger's dimensions (else the session's own)"
+    parser.add_argument("--finger", type=Path, metavar="FILE", help=meaning)
+    add_number(parser, "--shift", float, (-1e9, 1e9), "added to the log's times (0)", 0.0, "S")
+    meaning = f"friction of the surface pressed ({MU:g}, assumed; from 0.3 on the force hardly changes)"
+    add_number(parser, "--mu", float, (0.0, 5.0), meaning, MU, "MU")
+    meaning = f"one standard deviation of each stiffness about the published one, as a factor ({FACTOR:g}, assumed)"
+    add_number(parser, "--prior", float, (1.1, 4.0), meaning, FACTOR, "FACTOR")
+    add_flag(parser, "--relaxation", "also how the finger relaxes while the stage stands; --scene gets it")
     add_seed(parser, "of the posterior's draws (0)", largest=2**32)
     parser.add_argument("--scene", type=Path, metavar="OUT.toml", help="write the finger found as a scene file")
     add_calibration(parser)

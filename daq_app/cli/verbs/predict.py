@@ -14,6 +14,7 @@ from typing import Any
 from daq_app.batch.derived import analyse_session, open_visit, predict_session
 from daq_app.cli.options import (
     add_analysis,
+    add_flag,
     add_kinematics,
     add_number,
     add_quantity,
@@ -53,12 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_tau(
         parser, "reading of the traction bound: force over area, or a hundredth of it, as the paper's tables are headed"
     )
-    parser.add_argument(
-        "--scene",
-        type=Path,
-        metavar="FILE",
-        help="scene file with another finger; friction and loading are the trials'",
-    )
+    meaning = "scene file with another finger; friction and loading are the trials'"
+    parser.add_argument("--scene", type=Path, metavar="FILE", help=meaning)
     parser.add_argument("--indentation", type=float, metavar="MM", help="instead of each block's own")
     add_quantity(parser, "to print (--json has all)")
     add_variants(
@@ -67,27 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "second), or at finite strain too (about a minute: limits are looked for where a surface has no settled slide)",
         "small",
     )
-    parser.add_argument(
-        "--intervals", action="store_true", help="also what the uncertainty of friction makes of each SED (more solves)"
-    )
-    parser.add_argument(
-        "--afferent",
-        action="store_true",
-        help="also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration",
-    )
-    parser.add_argument(
-        "--afferent-set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="a parameter of the afferent, such as static_gain=30; --afferent prints all of them",
-    )
+    add_flag(parser, "--intervals", "also what the uncertainty of friction makes of each SED (more solves)")
+    meaning = "also firing rates and spike times of an SA-II afferent that answers to that quantity: an illustration"
+    add_flag(parser, "--afferent", meaning)
+    meaning = "a parameter of the afferent, such as static_gain=30; --afferent prints all of them"
+    parser.add_argument("--afferent-set", action="append", default=[], metavar="NAME=VALUE", help=meaning)
     add_number(parser, "--afferent-seed", int, (0, math.inf), "of the spike times (0)", 0, "SEED")
-    parser.add_argument(
-        "--seal",
-        action="store_true",
-        help="hash and keep the prediction, so that it is shown to be older than unblinding",
-    )
+    add_flag(parser, "--seal", "hash and keep the prediction, so that it is shown to be older than unblinding")
     add_analysis(parser)
 
 
@@ -157,9 +140,8 @@ def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
     if quantity.name not in row.responses:
         return "–", "–"
     value, error = row.responses[quantity.name]
-    return number(
-        value, 4, factor=1e3 if quantity.unit == "MPa" else 1.0
-    ), f"{100 * error / abs(value):.2g} %" if value else "–"
+    share = f"{100 * error / abs(value):.2g} %" if value else "–"
+    return number(value, 4, factor=1e3 if quantity.unit == "MPa" else 1.0), share
 
 
 def _print_beside(prediction: SessionPrediction, console: Console) -> None:
@@ -200,13 +182,8 @@ def _print_variant_intervals(prediction: SessionPrediction, console: Console) ->
     head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
     cells = [[_called(row), *(_ends(one.interval) for one in row.alternatives)] for row in rows]
     console.say(table(cells, head=head))
-    missing = (
-        (f"{_called(row)} ({n})", one.interval)
-        for row in rows
-        for n, one in enumerate(row.alternatives, 1)
-        if one.sed is not None
-    )
-    _print_missing(missing, console)
+    alternatives = ((_called(row), n, one) for row in rows for n, one in enumerate(row.alternatives, 1))
+    _print_missing(((f"{trial} ({n})", one.interval) for trial, n, one in alternatives if one.sed is not None), console)
 
 
 def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
@@ -215,13 +192,9 @@ def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
         "\n95 % interval of SED from the uncertainty of friction alone, not the model's own error, " + MARKED + ":"
     )
     console.say(table([_row(row) for row in prediction.trials], head=INTERVALS))
-    missing = [(_called(row), row.interval) for row in prediction.trials if row.sed is not None]
-    back = [
-        (f"{_called(row)} the other way", row.opposite_interval)
-        for row in prediction.trials
-        if row.opposite_sed is not None
-    ]
-    _print_missing([*missing, *back], console)
+    forth = [(_called(row), row.sed, row.interval) for row in prediction.trials]
+    back = [(f"{_called(row)} the other way", row.opposite_sed, row.opposite_interval) for row in prediction.trials]
+    _print_missing([(name, interval) for name, sed, interval in (*forth, *back) if sed is not None], console)
 
 
 def _print_missing(intervals: Iterable[tuple[str, SedInterval | None]], console: Console) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from daq_app.batch.derived import analyse_session, open_visit, predict_session, stored_afferent, stored_options
 from daq_app.cli.options import (
     add_analysis,
+    add_flag,
     add_paths,
     add_quantity,
     add_variants,
@@ -46,12 +47,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "also otherwise, as for 'daq-app predict': both readings of tau_max, by depth and by force, both ways; "
         "with 'both' at finite strain too (about a minute); small, or all that was predicted before",
     )
-    parser.add_argument(
-        "--afferent",
-        action="store_true",
-        help="also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept "
-        "before)",
-    )
+    meaning = "also firing rates of an SA-II afferent that answers to --quantity: an illustration (or where it was kept"
+    add_flag(parser, "--afferent", f"{meaning} before)")
     add_quantity(parser, "to hold against scores and rivals")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="also write every picture as SVG, its data as CSV")
     add_analysis(parser)

@@ -10,7 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
-from daq_app.cli.options import add_body_arguments, body_of, own_sentence
+from daq_app.cli.options import add_body_arguments, add_flag, body_of, own_sentence
 from daq_app.cli.terminal import attend_session, open_device
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, help="of the stimulus order (a new one, recorded, unless given)")
     parser.add_argument("--phases", nargs="+", choices=get_args(Phase), help="of the visit (the protocol's own)")
     add_body_arguments(parser)
-    parser.add_argument("--headless", action="store_true", help="no window: answers at the terminal, or simulated")
+    add_flag(parser, "--headless", "no window: answers at the terminal, or simulated")
     parser.add_argument("--simulate-subject", type=int, metavar="SEED", help="simulated people")
     parser.add_argument(
         "--pace", type=float, default=1.0, help="simulated seconds a real second, simulated people only (1)"
@@ -51,11 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--language", metavar="XX", help="that the subject reads, such as de; the protocol must have it (its own)"
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the session's folder (one below recordings/)")
-    parser.add_argument(
-        "--any-folder",
-        action="store_true",
-        help="also on a network drive or in a synchronised folder: at your own risk",
-    )
+    add_flag(parser, "--any-folder", "also on a network drive or in a synchronised folder: at your own risk")
 
 
 def run(options: argparse.Namespace, console: Console) -> int:

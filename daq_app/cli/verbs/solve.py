@@ -37,12 +37,8 @@ AUDITS = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, metavar="SCENE.toml", help="finger, materials, friction, loading, receptor")
-    parser.add_argument(
-        "--row",
-        type=float,
-        metavar="MM",
-        help="also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie",
-    )
+    meaning = "also every quantity along a row of endings so deep below the skin, as SA-I or RA endings lie"
+    parser.add_argument("--row", type=float, metavar="MM", help=meaning)
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
@@ -146,17 +142,15 @@ def _course_in_json(numbers: "CourseNumbers", errors: "CourseNumbers") -> dict[s
         columns = zip(names, values.tolist(), off.tolist(), strict=True)
         return {name: {"value": _none(value), "error": _none(error)} for name, value, error in columns}
 
-    parts = list(zip(INSTANTS, numbers.at, errors.at, numbers.rate, errors.rate, strict=True))
-    at = {part: pairs((*NUMBERS, *NAMES), value, error) for part, value, error, _, _ in parts}
-    rates = {part: pairs(NAMES, value, error) for part, _, _, value, error in parts}
-    by_name = {
-        name: {
-            **{part: rates[part][name]["value"] for part in INSTANTS},
-            "errors": {part: rates[part][name]["error"] for part in INSTANTS},
-        }
-        for name in NAMES
+    def by_part(values: "Array") -> dict[str, float | None]:
+        return dict(zip(INSTANTS, map(_none, values.tolist()), strict=True))
+
+    parts = zip(INSTANTS, numbers.at, errors.at, strict=True)
+    rates = zip(NAMES, numbers.rate.T, errors.rate.T, strict=True)
+    return {
+        "instants": {part: pairs((*NUMBERS, *NAMES), value, error) for part, value, error in parts},
+        "rates": {name: {**by_part(value), "errors": by_part(error)} for name, value, error in rates},
     }
-    return {"instants": at, "rates": by_name}
 
 
 def _say_course(numbers: "CourseNumbers", errors: "CourseNumbers", console: Console) -> None:

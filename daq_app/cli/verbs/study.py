@@ -167,12 +167,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, nargs="?", metavar="FOLDER", help="holds a folder for each session")
     meaning = "make a study of ten simulated subjects instead"
     add_number(parser, "--synthetic", int, (0, LARGEST_SEED), meaning, metavar="SEED")
-    parser.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="page, table and results (FOLDER/pooled); with --synthetic the study too",
-    )
+    meaning = "page, table and results (FOLDER/pooled); with --synthetic the study too"
+    parser.add_argument("--out", type=Path, metavar="DIR", help=meaning)
     add_workers(parser)
     add_kinematics(parser, "as for 'daq-app predict'; finite strain takes ten times as long")
     add_paths(
@@ -248,29 +244,20 @@ def _places(options: argparse.Namespace, console: Console) -> tuple[Path, Path]:
 
 def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
     """Write page, table and numbers and return where they are."""
-    # Imported here: drawing is slow to load.
-    from sessions.report.pages import (
-        COLUMNS,
-        TRIALS,
-        columns_csv,
-        paths_csv,
-        rivals_csv,
-        study_page,
-        swap_in,
-        trials_csv,
-    )
+    from sessions.report import pages  # drawing is slow to load
 
-    files = {"page": out / "study.html", "table": out / TRIALS, "columns": out / COLUMNS, "numbers": out / "study.json"}
-    swap_in(files["page"], study_page(study, name))
-    swap_in(files["table"], trials_csv(study))
-    swap_in(files["columns"], columns_csv(study))
-    swap_in(files["numbers"], json_text(study.to_dict()))
-    files["rivals"] = out / "rivals.csv"
-    swap_in(files["rivals"], rivals_csv(study))
+    files = {
+        "page": ("study.html", pages.study_page(study, name)),
+        "table": (pages.TRIALS, pages.trials_csv(study)),
+        "columns": (pages.COLUMNS, pages.columns_csv(study)),
+        "numbers": ("study.json", json_text(study.to_dict())),
+        "rivals": ("rivals.csv", pages.rivals_csv(study)),
+    }
     if study.options.paths != "none":
-        files["paths"] = out / "paths.csv"
-        swap_in(files["paths"], paths_csv(study))
-    return {what: str(path) for what, path in files.items()}
+        files["paths"] = ("paths.csv", pages.paths_csv(study))
+    for file, text in files.values():
+        pages.swap_in(out / file, text)
+    return {what: str(out / file) for what, (file, _) in files.items()}
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
