@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
@@ -89,7 +90,7 @@ class Visit:
         self._errors[:3, :3] += errors
         self._errors[3:, 3:] += np.diag(ACCURACY * draw.standard_normal(3))
         tilt = trouble.tilt or tuple((LEAN * draw.standard_normal(2)).tolist())
-        self._turn = _turned(tilt)
+        self._turn = Rotation.from_euler("xy", tilt, degrees=True).as_matrix()  # face's frame to transducer's
         self._hand = np.random.default_rng([seed, 78])
         self._phases = draw.uniform(0.0, 2.0 * np.pi, 8)
         self._slips_each = draw.uniform(5.0, 15.0)  # [Hz]
@@ -200,13 +201,6 @@ def _block(time: Array, wrench: Array) -> ReadingBlock:
     return ReadingBlock(position, position, np.zeros_like(position), time, np.rint(time * 1e9).astype(np.int64), counts)
 
 
-def _turned(lean: Sequence[float]) -> Array:
-    """Return the matrix (3, 3) from the face's frame to that of a transducer about whose x and y it is turned [deg]."""
-    (sx, sy), (cx, cy) = np.sin(np.radians(lean)), np.cos(np.radians(lean))
-    about_x = np.array([[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]])
-    return np.array([[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]]) @ about_x
-
-
 def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
     """Return noise (n, channels) whose power falls as 1/f, of standard deviation 1."""
     spectrum = np.fft.rfft(np.random.default_rng(seed).standard_normal((n, channels)), axis=0)
@@ -216,41 +210,32 @@ def _flicker(n: int, channels: int, seed: Sequence[int]) -> Array:
     return noise / noise.std(axis=0)
 
 
-@dataclass(frozen=True)
-class Coverage:
-    """How often intervals of a set hold what was planted."""
-
-    hits: dict[str, float]  # of those given, by number [-]
-    alone: dict[str, float]  # share that the errors in common alone would hold, by number [-]
-    withheld: dict[str, float]  # share of strokes without one, by number [-]
-    false_peaks: float  # share of strokes with a static peak [-]
-
-
-def coverage(trouble: Trouble, seeds: Sequence[int]) -> Coverage:
-    """Return how often intervals hold what was planted, over ten strokes of each seed."""
-    hits: dict[str, list[bool | None]] = defaultdict(list)
-    alone: dict[str, list[bool]] = defaultdict(list)
+def row(name: str, seeds: Sequence[int]) -> str:
+    """Return how often intervals of a set hold what was planted, over ten strokes of each seed, as a row of a table."""
+    hits: dict[str, list[bool | None]] = defaultdict(list)  # None: no interval
+    alone: dict[str, list[bool]] = defaultdict(list)  # by intervals of the errors in common alone
     peaks: list[bool] = []
     for seed in seeds:
-        visit = Visit(seed, trouble)
+        visit = Visit(seed, SETS[name])
         analysis, truths, forces = visit.strokes()
         for force in forces:
-            for name, holds in visit.errors_alone(force, analysis.bootstrap).items():
-                alone[name].append(holds)
+            for number, holds in visit.errors_alone(force, analysis.bootstrap).items():
+                alone[number].append(holds)
         at_trial = {stroke.trial: (at, stroke) for at, stroke in reversed(list(enumerate(analysis.strokes)))}
-        for number, truth in enumerate(truths, 1):
-            at, stroke = at_trial.get(number, (0, None))
+        for trial, truth in enumerate(truths, 1):
+            at, stroke = at_trial.get(trial, (0, None))
             intervals = None if stroke is None else analysis.intervals[at]
             peaks.append(stroke is not None and stroke.mu_static is not None)
-            for name in NUMBERS:
-                ends = None if intervals is None else getattr(intervals, name)
-                hits[name].append(None if ends is None else ends[0] <= truth[name] <= ends[1])
-    return Coverage(
-        {name: float(np.mean([hit for hit in ones if hit is not None] or [np.nan])) for name, ones in hits.items()},
-        {name: float(np.mean(ones)) for name, ones in alone.items()},
-        {name: ones.count(None) / len(ones) for name, ones in hits.items()},
-        float(np.mean(peaks)),
-    )
+            for number in NUMBERS:
+                ends = None if intervals is None else getattr(intervals, number)
+                hits[number].append(None if ends is None else ends[0] <= truth[number] <= ends[1])
+    cells = [name]
+    for number in NUMBERS:
+        known = [hit for hit in hits[number] if hit is not None]
+        cells.append(f"{100 * np.mean(known or [np.nan]):.1f} %")
+        cells[-1] += f" ({100 * np.mean(alone[number]):.1f} %)" if number in alone else ""
+    withheld = max(ones.count(None) / len(ones) for ones in hits.values())
+    return "| " + " | ".join((*cells, *(f"{100 * share:.1f} %" for share in (withheld, np.mean(peaks))))) + " |"
 
 
 def main() -> None:
@@ -259,11 +244,7 @@ def main() -> None:
     head = ("set", *(f"`{name}`" for name in NUMBERS), "withheld", "static peaks")
     print("| " + " | ".join(head) + " |\n" + "| --- " * len(head) + "|")
     for name in sys.argv[3:] or SETS:
-        measured = coverage(SETS[name], range(first, first + count))
-        alone = {n: f" ({100 * share:.1f} %)" for n, share in measured.alone.items()}
-        cells = [f"{100 * measured.hits[n]:.1f} %{alone.get(n, '')}" for n in NUMBERS]
-        cells += [f"{100 * share:.1f} %" for share in (max(measured.withheld.values()), measured.false_peaks)]
-        print("| " + " | ".join((name, *cells)) + " |", flush=True)
+        print(row(name, range(first, first + count)), flush=True)
 
 
 if __name__ == "__main__":

@@ -132,8 +132,7 @@ def main() -> None:
     if options.take:
         _take(options.setting, options.out, options.session)
         return
-    settings = [options.setting] if options.setting else list(_settings())
-    for setting in settings:
+    for setting in [options.setting] if options.setting else _settings():
         scale = setting.split("-")[1]
         environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "QT_SCALE_FACTOR": scale}
         command = [sys.executable, "-m", "benchmarks.screenshots", "--take", "--setting", setting]
@@ -144,10 +143,11 @@ def main() -> None:
 
 
 def _settings() -> list[str]:
-    settings: list[str] = []
-    for number, ((width, height), scale, theme) in enumerate(itertools.product(SIZES, SCALES, THEMES)):
-        settings.append(f"{width}x{height}-{scale:g}-{theme}-{LOCALES[number % 2]}")
-    return settings
+    combinations = itertools.product(SIZES, SCALES, THEMES)
+    return [
+        f"{width}x{height}-{scale:g}-{theme}-{LOCALES[number % 2]}"
+        for number, ((width, height), scale, theme) in enumerate(combinations)
+    ]
 
 
 def _take(setting: str, out: Path, session: Path | None) -> None:
@@ -165,57 +165,71 @@ def _take(setting: str, out: Path, session: Path | None) -> None:
     QSettings.setPath(QSettings.Format.IniFormat, QSettings.Scope.UserScope, str(out / "settings"))
     application = QApplication([])
     chosen = DARK if theme == "dark" else LIGHT
-    places = _Places(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
-    places.all()
-    places.window.bridge.end()
+    camera = _Camera(application, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
+    _Places(camera).all()
     if session is not None:
-        _take_analyst(application, session, (width, height), chosen, lambda name: out / f"{name}-{setting}.png")
+        _take_analyst(camera, session)
 
 
-def _take_analyst(application, session: Path, size, theme, path) -> None:  # noqa: ANN001
-    """Take a picture of each of the analyst's places, on a copy of a session."""
-    from daq_app.analyst import state as m
-    from daq_app.qt.analyst_window import AnalystWindow
+class _Camera:
+    """What pictures of a setting are taken with."""
 
-    def until(condition) -> None:  # noqa: ANN001
+    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
+        self.application, self.size, self.theme, self.path = application, size, theme, path
+        self.meanwhile = lambda: None  # done again and again while the window works
+
+    def wait(self, condition) -> None:  # noqa: ANN001
+        """Let the window work until something holds."""
         end = time.monotonic() + 120.0
         while not condition() and time.monotonic() < end:
-            application.processEvents()
-            time.sleep(0.005)
+            self.meanwhile()
+            self.application.processEvents()
+            time.sleep(0.002)
+
+    def picture(self, name: str, widget) -> None:  # noqa: ANN001
+        """Take a picture of a widget once it has painted."""
+        for _ in range(5):
+            self.meanwhile()
+            self.application.processEvents()
+            time.sleep(0.02)
+        widget.grab().save(str(self.path(name)))
+
+
+def _take_analyst(camera: _Camera, session: Path) -> None:
+    """Take a picture of each of the analyst's places, on a copy of a session."""
+    from daq_app.analyst import state
+    from daq_app.qt.analyst_window import AnalystWindow
 
     def picture(name: str, page: int) -> None:
-        until(lambda: window.state.step is None)
+        camera.wait(lambda: window.state.step is None)
         window._pages.setCurrentIndex(page)
-        for _ in range(5):
-            application.processEvents()
-            time.sleep(0.02)
-        window.grab().save(str(path(name)))
+        camera.picture(name, window)
 
     folder = Path(tempfile.mkdtemp()) / session.name
     shutil.copytree(session, folder)
-    window = AnalystWindow(folder, theme)
-    window.resize(*size)
+    window = AnalystWindow(folder, camera.theme)
+    window.resize(*camera.size)
     window.show()
     picture("19-opening", 0)
-    until(lambda: window.state.stage == "predicted")
+    camera.wait(lambda: window.state.stage == "predicted")
     picture("20-analyst-trials", 0)
     picture("21-analyst-finger", 2)
     steady = window.state.report.strokes[0].steady
-    window.ask(m.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
+    window.ask(state.Move(1, "steady begin", steady[0] + 0.1, "E02", "the finger still stuck there"))
     picture("22-analyst-window-moved", 1)
     window._follow("readings")
     window.stroke.player.step(-300)
     picture("23-analyst-replay", 1)
     window.model.near.click()
     window.model.history.click()
-    until(lambda: window.state.film is not None)
+    camera.wait(lambda: window.state.film is not None)
     window.model.player.seek(30)
     picture("24-analyst-history", 2)
     window.model.tabs.setCurrentIndex(1)
-    until(lambda: window.state.drawn)
+    camera.wait(lambda: window.state.drawn)
     picture("25-analyst-session", 2)
-    window.ask(m.Compare(str(session)))
-    until(lambda: "compared" in window.state.drawn)
+    window.ask(state.Compare(str(session)))
+    camera.wait(lambda: "compared" in window.state.drawn)
     picture("26-analyst-comparison", 2)
     window.keys.toggle()
     picture("27-analyst-keys", 2)
@@ -226,105 +240,86 @@ def _take_analyst(application, session: Path, size, theme, path) -> None:  # noq
 class _Places:
     """The window, brought to each of its places."""
 
-    def __init__(self, application, size, theme, path) -> None:  # noqa: ANN001
-        from benchmarks.screenshots import PlayedRecorder
+    def __init__(self, camera: _Camera) -> None:
         from daq_app.qt.start import opened
 
-        self.application, self.path = application, path
-        self.recorder = PlayedRecorder()
-        self.window = opened(application, lambda: self.recorder, theme)
-        self.window.resize(*size)
-        self.window.show()
+        self.camera, self.recorder = camera, PlayedRecorder()
+        self.window = opened(camera.application, lambda: self.recorder, camera.theme)
         self.subject = self.window.subject
-        self.subject.resize(*size)
         self.window.side.show = self.subject.show
-        self.now = 0.0
+        for widget in (self.window, self.subject):
+            widget.resize(*camera.size)
+        self.window.show()
+        camera.meanwhile = self._acknowledge
 
     def all(self) -> None:
         """Take a picture of each place."""
-        from benchmarks import screenshots as p
-        from sessions.run import steps
-
-        trial, second, other = p.PLAN.trials[0], p.PLAN.trials[1], p.PLAN.trials[5]
-        self.play(*p.OPEN, until=3.0)
+        trial, second, other = PLAN.trials[0], PLAN.trials[1], PLAN.trials[5]
+        self.play(*OPEN, until=3.0)
         self.picture("01-new-session")
         self.window.page.subject.setText("Ada Lovelace")
         self.window.page.seed.setText("seven")
         self.window.act("primary")
         self.picture("02-refused")
         self.window.page.seed.clear()
-        self.play(*p.BEGUN, until=3.5)
+        self.play(*BEGUN, until=3.5)
         self.picture("03-begin")
-        self.play(steps.ShowInstruction(p.PLAN.blocks[0]), steps.AskMount(trial), until=3.6)
+        self.play(steps.ShowInstruction(PLAN.blocks[0]), steps.AskMount(trial), until=3.6)
         self.picture("04-mount")
         self.picture("05-subject-instruction", self.subject)
         self.play(steps.StartTake(1, 1), steps.MeasureZero(), until=4.0)
         self.recorder.stroke(1, 4.0)
         self.play(steps.AskStroke(trial), until=5.0)
         self.picture("06-subject-stroke", self.subject)
-        self.play(p.logged("contact_onset", 1, time=4.7, noticed=4.71), until=6.5)
+        self.play(logged("contact_onset", 1, time=4.7, noticed=4.71), until=6.5)
         self.picture("07-stroking")
-        self.play(p.logged("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
-        self.play(steps.AskScore(trial, p.PLAN.blocks[0].scale_ends), until=8.5)
-        self.wait(lambda: self.window.bridge.state.session.judged == 1)
+        self.play(logged("finger_lifted", 1, time=7.2, noticed=7.25), until=7.3)
+        self.play(steps.AskScore(trial, PLAN.blocks[0].scale_ends), until=8.5)
+        self.camera.wait(lambda: self.window.bridge.state.session.judged == 1)
         self.picture("08-scoring")
         self.picture("09-subject-line-empty", self.subject)
         line = self.subject.line
         line._take(line.answer.pressed(1.0, 63.0, "mouse").released())
         self.picture("10-subject-line-answered", self.subject)
-        self.play(*p.scored(1, 63.0), steps.AskMount(second), until=9.0)
+        self.play(*scored(1, 63.0), steps.AskMount(second), until=9.0)
         self.window.act("skip")
         self.picture("11-reason")
         self.window.course.leave()
         for number in range(2, 6):
-            self.play(*p.scored(number, 20.0 * number), until=9.0 + number / 10)
-        self.play(steps.ShowInstruction(p.PLAN.blocks[1]), steps.AskMount(other), until=9.8)
+            self.play(*scored(number, 20.0 * number), until=9.0 + number / 10)
+        self.play(steps.ShowInstruction(PLAN.blocks[1]), steps.AskMount(other), until=9.8)
         self.window.live.show_seconds(5)
         self.picture("12-second-block")
-        self.play(p.m.LinkDown("no readings for 1 s"), p.health(lost=12), until=9.8)
+        self.play(m.LinkDown("no readings for 1 s"), health(lost=12), until=9.8)
         self.picture("13-link-lost")
-        self.play(p.m.LinkBack(p.INFO, True), until=9.9)
+        self.play(m.LinkBack(INFO, True), until=9.9)
         self.window.keys.toggle()
         self.picture("14-keys")
         self.window.keys.toggle()
-        self.play(p.CUT, until=9.9)
+        self.play(CUT, until=9.9)
         self.picture("15-cut-short")
-        self.play(p.ENDED, p.m.Sealing(p.FOLDER), p.m.Sealed(p.FOLDER), until=9.9)
+        self.play(ENDED, m.Sealing(FOLDER), m.Sealed(FOLDER), until=9.9)
         self.picture("16-ended")
         self.picture("17-subject-thanks", self.subject)
         self.subject.check_ruler()
         self.picture("18-subject-ruler", self.subject)
+        self.camera.meanwhile = lambda: None
+        self.window.bridge.end()
 
     def play(self, *reports, until: float) -> None:  # noqa: ANN002
         """Have reports said, then readings up to an instant."""
-        from benchmarks import screenshots as p
-
         self.recorder.play(*reports)
         self.recorder.readings(until)
-        self.wait(lambda: not any(isinstance(said, p.m.Live) for said in self.recorder._waiting))
-
-    def wait(self, condition) -> None:  # noqa: ANN001
-        """Let the window work until something holds."""
-        end = time.monotonic() + 60.0
-        while not condition() and time.monotonic() < end:
-            self._safe()
-            self.application.processEvents()
-            time.sleep(0.002)
-
-    def _safe(self) -> None:
-        """Have the disk acknowledge, as it does all the time."""
-        from benchmarks import screenshots as p
-
-        if self.window.bridge.recording:
-            self.recorder.play(p.status(time.monotonic_ns()))
+        self.camera.wait(lambda: not any(isinstance(said, m.Live) for said in self.recorder._waiting))
 
     def picture(self, name: str, widget=None) -> None:  # noqa: ANN001
-        """Take a picture."""
-        for _ in range(5):
-            self._safe()
-            self.application.processEvents()
-            time.sleep(0.02)
-        (widget or self.window).grab().save(str(self.path(name)))
+        """Take a picture of the window, or of another widget."""
+        self.camera.picture(name, widget or self.window)
+
+    def _acknowledge(self) -> None:
+        """Have the disk acknowledge, as it does all the time."""
+        if self.window.bridge.recording:
+            self.recorder.play(status(time.monotonic_ns()))
 
 
 if __name__ == "__main__":
