@@ -3,7 +3,7 @@
 import base64
 import io
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from itertools import chain
@@ -19,7 +19,7 @@ from sessions.prediction import QUANTITIES, SED
 from sessions.report import study_prose
 from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
-from sessions.report.figures.scores import study_plates
+from sessions.report.figures.relation import study_plates
 from sessions.report.prose import doubts, question, summary, told_apart
 from sessions.report.tables import Table, parted
 from sessions.report.tables.session import tables as session_tables
@@ -67,8 +67,8 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
         told_apart=told_apart(report),
         figures=figures,
         drawing=drawn,
-        data_address=partial(data_address, head=report.head if report.simulated else ""),
-        scene_address="" if report.scene is None else text_address(report.scene.text, "application/toml"),
+        text_address=text_address,
+        csv_of=partial(panel_csv, head=report.head if report.simulated else ""),
         numbers=_numbers(figures, {**tables, "further": further}),
         contents=_contents(report, figures, tables, further=bool(further)),
         tables=tables,
@@ -114,8 +114,12 @@ def write_figures(report: Report, folder: Path, drawings: Sequence[Plate] | None
 def _numbers(figures: dict[str, Plate], tables: dict[str, tuple[Table, ...]]) -> dict[str, int]:
     """Return the numbers of figures and of tables, each counted from 1 in the order of the page."""
     order = ("relation", "scores", "course", "friction", "speed", "finger", "response", "paths", "forces")
-    numbered = {name: n for n, name in enumerate((name for name in order if name in figures), 1)}
-    return numbered | {table.name: n for n, table in enumerate(chain.from_iterable(tables.values()), 1)}
+    return _numbered([name for name in order if name in figures], chain.from_iterable(tables.values()))
+
+
+def _numbered(figures: Iterable[str], tables: Iterable[Table]) -> dict[str, int]:
+    """Return the numbers of figures and of tables, each counted from 1, by their names."""
+    return {name: n for n, name in enumerate(figures, 1)} | {table.name: n for n, table in enumerate(tables, 1)}
 
 
 def _contents(
@@ -145,23 +149,14 @@ def drawn(panel: Panel) -> Markup:
     return Markup(panel.svg[panel.svg.index("<svg") :])
 
 
-def data_address(panel: Panel, head: str) -> str:
-    """Return an address that holds the numbers of a picture as CSV, so that a page needs no file beside it."""
-    return text_address(panel_csv(panel, head))
-
-
 def text_address(text: str, kind: str = "text/csv") -> str:
-    """Return an address that holds a text file, a CSV file unless another media type is given."""
+    """Return an address that holds a text file, CSV unless another media type is given, so that a page stands alone."""
     return f"data:{kind};charset=utf-8;base64," + base64.b64encode(text.encode()).decode()
 
 
 def panel_csv(panel: Panel, head: str) -> str:
     """Return the numbers of a picture, empty where there is none; `head` comes first where something is simulated."""
-    out = io.StringIO()
-    if head:
-        out.write(f"# {head}\n")
-    write_rows(out, [panel.header, *panel.rows])
-    return out.getvalue()
+    return (f"# {head}\n" if head else "") + _csv([panel.header, *panel.rows])
 
 
 def swap_in(path: Path, text: str) -> None:
@@ -183,23 +178,22 @@ def study_page(study: StudyFindings, name: str) -> str:
     figures = {plate.name: plate for plate in study_plates(study)}
     tables, further = parted(study_tables(study), STUDY_BODY)
     trials = tables.pop("trials")
-    numbers = {plate: n for n, plate in enumerate(figures, 1)}
-    numbers |= {table.name: n for n, table in enumerate((*chain.from_iterable(tables.values()), *further, *trials), 1)}
     return template("study.html.jinja").render(
         study=study,
         name=name,
         prose=study_prose,
         trials=sum(len(visit.rows) for visit in study.visits),
-        trials_file=text_address(trials_csv(study)),
-        columns_file=text_address(columns_csv(study)),
+        trials_csv=trials_csv(study),
+        columns_csv=columns_csv(study),
         unmodelled=missing_models(study),
         untold=missing_scores(study),
         figures=figures,
         tables={**tables, "trials": trials},
         further=further,
-        numbers=numbers,
+        numbers=_numbered(figures, (*chain.from_iterable(tables.values()), *further, *trials)),
         drawing=drawn,
-        data_address=partial(data_address, head=study.simulated),
+        text_address=text_address,
+        csv_of=partial(panel_csv, head=study.simulated),
     )
 
 
@@ -273,8 +267,8 @@ def trials_csv(study: StudyFindings) -> str:
             why = "" if decision is None else decision.why
             why = f"the same recording as {copies[visit.session]}" if visit.session in copies else why
             cells = ["yes" if visit.simulated else "no"] if mark else []
-            numbers = [*(getattr(row, name) for name in names), *map(row.responses.get, _RESPONSES)]
-            rows.append([*cells, visit.session, visit.subject, *numbers, why])
+            own = (" ".join(row.flaws) if name == "flaws" else getattr(row, name) for name in names)
+            rows.append([*cells, visit.session, visit.subject, *own, *map(row.responses.get, _RESPONSES), why])
     return _csv(rows)
 
 
@@ -283,11 +277,5 @@ def _csv(rows: Sequence[Sequence[object]], *, simulated: bool = False) -> str:
     if simulated:
         rows = [[SIMULATED, *rows[0]], *(["yes", *row] for row in rows[1:])]
     out = io.StringIO()
-    write_rows(out, [[_plain(value) for value in row] for row in rows])
+    write_rows(out, rows)
     return out.getvalue()
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, tuple):
-        return " ".join(str(one) for one in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
-    return "" if value is None else value

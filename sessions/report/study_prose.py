@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
@@ -18,6 +18,7 @@ from sessions.report.tables.scales import compared_in_study, psychometric_senten
 from sessions.report.tables.session import paths_sentence
 from sessions.report.wording import capital, correlation, digits, plural, significant, stopped
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
+from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
 
 _FEW = 12  # trials named one by one
@@ -134,13 +135,12 @@ def remarks(study: StudyFindings) -> list[str]:
         if not visit.complete
     ]
     sentences += [f"Session {visit.session}: {loss}." for visit in study.visits for loss in visit.losses]
-    for visit in study.visits:
-        choices = sum(row.choice is not None for row in visit.rows)
-        if choices:
-            sentences.append(
-                f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
-                "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
-            )
+    sentences += [
+        f"The answers of session {visit.session} are {choices} choices of one of two: they stand in the table "
+        "of trials, no mean or correlation of scores is taken of them, and its strokes count as any other."
+        for visit in study.visits
+        if (choices := sum(row.choice is not None for row in visit.rows))
+    ]
     for outcome, words in (("not answered", "No score, for the subject did not answer"), ("open", "Not done")):
         places = [f"{v.session} trial {r.trial}" for v in study.visits for r in v.rows if r.outcome == outcome]
         sentences += [f"{words}: {_listed(places)}."] if places else []
@@ -160,11 +160,7 @@ def remarks(study: StudyFindings) -> list[str]:
 
 def _meshes(study: StudyFindings) -> list[str]:
     """Return what it makes of the SEDs that sessions were not all solved on one mesh; nothing where they were."""
-    solved: defaultdict[str, list[str]] = defaultdict(list)
-    for visit in study.visits:
-        for name, value, _ in visit.model:
-            if name == UNKNOWNS:
-                solved[value].append(visit.session)
+    solved = by_key((value, v.session) for v in study.visits for name, value, _ in v.model if name == UNKNOWNS)
     errors = [row.error_estimate for visit in study.visits for row in visit.rows if row.error_estimate is not None]
     if len(solved) < 2 or not errors:
         return []
@@ -204,11 +200,12 @@ def _fits(study: StudyFindings, one: Exclusion) -> bool:
 def _missing(study: StudyFindings) -> list[str]:
     """Return which trials that were done have no SED, and why, those that differ in numbers alone together."""
     sentences: list[str] = []
-    alike: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for visit in study.visits:
-        for row in visit.rows if visit.forces else ():
-            if row.sed is None and row.why and row.outcome != "open":
-                alike[re.sub(r"[\d.]+", "#", row.why)].append((f"{visit.session} trial {row.trial}", row.why))
+    alike = by_key(
+        (re.sub(r"[\d.]+", "#", row.why), (f"{visit.session} trial {row.trial}", row.why))
+        for visit in study.visits
+        for row in (visit.rows if visit.forces else ())
+        if row.sed is None and row.why and row.outcome != "open"
+    )
     for places in alike.values():
         named, reasons = _listed([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
         why = f"{'' if len(reasons) == 1 else 'of the first: '}{stopped(reasons[0])}"
@@ -222,10 +219,7 @@ def _listed(places: Sequence[str]) -> str:
 
 def sealed(study: StudyFindings) -> str:
     """Return whether predictions were sealed before scores."""
-    alike: defaultdict[str, list[str]] = defaultdict(list)
-    for visit in study.visits:
-        if visit.sealed:
-            alike[visit.sealed].append(visit.session)
+    alike = by_key((visit.sealed, visit.session) for visit in study.visits if visit.sealed)
     if len(alike) == 1:
         ((sentence, sessions),) = alike.items()
         return f"In {'each' if len(sessions) > 1 else 'the one'} of {plural(len(sessions), 'session')}: {sentence}"
@@ -234,12 +228,10 @@ def sealed(study: StudyFindings) -> str:
 
 def modelled(study: StudyFindings) -> list[Fact]:
     """Return what was modelled; where sessions differ, each of the first few that do."""
-    effects: defaultdict[str, dict[tuple[str, str], list[str]]] = defaultdict(dict)
-    for visit in study.visits:
-        for name, value, remark in visit.model:
-            effects[name].setdefault((value, remark), []).append(visit.session)
+    effects = by_key((name, (fact, visit.session)) for visit in study.visits for name, *fact in visit.model)
     facts: list[Fact] = []
-    for name, values in effects.items():
+    for name, pairs in effects.items():
+        values = by_key(((value, remark), session) for (value, remark), session in pairs)
         for (value, remark), sessions in list(values.items())[:_FEW]:
             whose = "" if len(values) == 1 else f"in {_listed(sessions)}"
             facts.append(Fact(name, value, "; ".join(part for part in (remark, whose) if part)))
@@ -261,9 +253,7 @@ def again(study: StudyFindings) -> list[Fact]:
         Fact("many paths", study.options.paths),
         Fact("held against scores", BY_NAME[study.response].label, BY_NAME[study.response].meaning),
     ]
-    software: defaultdict[str, list[str]] = defaultdict(list)
-    for visit in study.visits:
-        software[", ".join(f"{name} {version}" for name, version in visit.made_by.items())].append(visit.session)
+    software = by_key((", ".join(map(" ".join, visit.made_by.items())), visit.session) for visit in study.visits)
     facts += [Fact("computed with", text, f"{plural(len(sessions), 'session')}") for text, sessions in software.items()]
     facts += [Fact(visit.session, f"SHA-256 {visit.sha256}", "session.sqlite") for visit in study.visits]
     return [fact for fact in facts if fact.value]

@@ -2,7 +2,6 @@
 
 import itertools
 import re
-from collections import defaultdict
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
@@ -16,6 +15,7 @@ from sessions.prediction.scenes import doubt_of
 from sessions.prediction.stored import model_facts
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, Field, History, PredictionFinding, StrokeFinding, Trace, same_fields
+from sessions.statistics.scores import bounds, by_key
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.forces import in_face_frame
@@ -53,12 +53,13 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
 
 def flaws(analysis: Analysis) -> tuple[Fact, ...]:
     """Return every flaw with its sentence, its grade and where it lies."""
-    facts: list[Fact] = []
-    for flaw in analysis.flaws:
-        where = "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
-        where = where if flaw.stroke is None else f"stroke {flaw.stroke + 1}"
-        facts.append(Fact(flaw.name.replace("_", " "), flaw.sentence, f"{where}: {flaw.grade}"))
-    return tuple(facts)
+
+    def where(flaw: Flaw) -> str:
+        if flaw.stroke is not None:
+            return f"stroke {flaw.stroke + 1}"
+        return "whole recording" if flaw.trial is None else f"trial {flaw.trial}"
+
+    return tuple(Fact(one.name.replace("_", " "), one.sentence, f"{where(one)}: {one.grade}") for one in analysis.flaws)
 
 
 def course(recording: Recording) -> Course | None:
@@ -201,17 +202,11 @@ def modelled(prediction: SessionPrediction | None) -> tuple[Fact, ...]:
 def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
     """Return what was left out, how much that may have changed the SED, and how this was estimated."""
     solved = [] if stored is None else [row.prediction for row in stored.trials if row.prediction is not None]
-    by_effect: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
-    for prediction in solved:
-        for name, entry in prediction.model.get("left_out", {}).items():
-            by_effect[name].append(entry)
-    facts = [Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()]
-    warned: dict[str, list[str]] = defaultdict(list)  # sentences that differ in their numbers only stand together
-    for prediction in solved:
-        for sentence in prediction.warnings:
-            warned[_NUMBER.sub("#", sentence)].append(sentence)
+    by_effect = by_key(item for prediction in solved for item in prediction.model.get("left_out", {}).items())
+    # Sentences that differ in their numbers only stand together.
+    warned = by_key((_NUMBER.sub("#", sentence), sentence) for prediction in solved for sentence in prediction.warnings)
     return (
-        *facts,
+        *(Fact(name, _share(entries), entries[0]["how"]) for name, entries in by_effect.items()),
         *(Fact("warning", same[0], f"the first of {len(same)} trials with this warning") for same in warned.values()),
     )
 
@@ -246,13 +241,16 @@ def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:
 def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing | None) -> PredictionFinding:
     """Return the finding with the intervals of its SED, and with an afferent's rates."""
     interval = row.interval
-    if interval is not None and interval.low is not None and interval.high is not None:
-        finding = replace(finding, sed_interval=(interval.low, interval.high), interval_by=interval.method or "")
-    elif interval is not None:
-        finding = replace(finding, reasons={**finding.reasons, "sed_interval": interval.reason})
     if interval is not None:
-        forces = interval.normal_force, interval.tangential_force
-        finding = replace(finding, normal_force_interval=forces[0], tangential_force_interval=forces[1])
+        ends = bounds(interval.low, interval.high)
+        finding = replace(
+            finding,
+            sed_interval=ends,
+            interval_by="" if ends is None else interval.method or "",
+            reasons=finding.reasons if ends else {**finding.reasons, "sed_interval": interval.reason},
+            normal_force_interval=interval.normal_force,
+            tangential_force_interval=interval.tangential_force,
+        )
     if firing is not None:
         finding = replace(
             finding,

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_example import example
 
-from sessions.report.figures.scores import _free_place
+from sessions.report.figures.relation import _free_place
 from sessions.report.figures.style import spread
 
 

@@ -43,8 +43,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
             axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
         axes.plot(course.time, values, color=colour, linewidth=0.8)
         axes.axhline(0.0, color=GREY, linewidth=0.4)
-        axes.set_ylabel(f"{name}\n[N]")
-        axes.set_xlim(first, last if last > first else first + 1.0)
+        axes.set(ylabel=f"{name}\n[N]", xlim=(first, last if last > first else first + 1.0))
         axes.margins(y=0.08)
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time on the device's clock [s]")
@@ -112,8 +111,7 @@ def stroke_panel(
         strokes = [stroke for stroke in strokes if stroke.speed is not None]
     drawn = sheet(328, 290)
     (axes,) = drawn.axes
-    axes.set_title(experiment)
-    axes.set_ylabel(of.axis)
+    axes.set(title=experiment, ylabel=of.axis)
     rows = _draw(drawn, of, [(stroke, stroke.trace) for stroke in strokes if stroke.trace is not None])
     if not rows:
         return None
@@ -138,7 +136,8 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
     labels: list[Label] = []
     for (stroke, trace), shade in zip(ordered, shades(of.colour, max(len(ordered), 1)), strict=False):
         values: Sequence[float | None] = getattr(trace, of.values)
-        inside = [in_window(stroke, t) for t in trace.time]
+        first, last = stroke.steady or (math.inf, -math.inf)
+        inside = [first <= trace.origin + t <= last for t in trace.time]
         y = [math.nan if v is None else v for v in values]
         level: float | None = getattr(stroke, of.level)
         text = _name(stroke) + (f", {of.word} {level:.3g} over the steady window" if level is not None else "")
@@ -153,26 +152,14 @@ def _draw(drawn: Sheet, of: StrokeQuantity, curves: Sequence[tuple[StrokeFinding
         if drawn_values:
             at = [(t, v) for t, v, within in drawn_values if within] or [(t, v) for t, v, _ in drawn_values]
             labels.append(Label(str(stroke.number if stroke.index is None else stroke.index), *at[-1]))
-    axes.set_xlabel("time since contact onset [s]")
-    axes.set_xlim(0.0, max((t for _, _, t, _, _ in rows), default=1.0))
-    _settle(axes, [v for _, _, _, v, _ in rows])
+    axes.set(xlabel="time since contact onset [s]", xlim=(0.0, max((t for _, _, t, _, _ in rows), default=1.0)))
+    if rows:  # from 0 on where nothing lies below
+        values = [v for _, _, _, v, _ in rows]
+        low, high = min(*values, 0.0), max(values)
+        axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
     if len(labels) <= MOST_LABELLED:
         label_right(drawn, axes, labels, "index" if ordered and ordered[0][0].index is not None else "stroke")
     return tuple(rows)
-
-
-def in_window(stroke: StrokeFinding, time: float) -> bool:
-    """Say whether an instant [s since the trace's zero] lies in the steady window."""
-    if stroke.steady is None or stroke.trace is None:
-        return False
-    return stroke.steady[0] <= stroke.trace.origin + time <= stroke.steady[1]
-
-
-def _settle(axes: Axes, values: Sequence[float]) -> None:
-    """Fix the limits at all that was drawn, from 0 on where nothing lies below."""
-    if values:
-        low, high = min(*values, 0.0), max(values)
-        axes.set_ylim(low - (0.03 * (high - low) if low < 0 else 0.0), high + 0.06 * (high - low))
 
 
 def _name(stroke: StrokeFinding) -> str:
@@ -204,9 +191,8 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
         for axes in drawn.axes:
             axes.plot(history.time, kilopascal, color=shade, linewidth=1.2, gid=drawn.note(text))
             if history.time[-1] < end:  # settled: it stays
-                axes.plot(
-                    [history.time[-1], end], [kilopascal[-1]] * 2, color=shade, linewidth=0.8, linestyle=(0, (2, 2))
-                )
+                rest = [history.time[-1], end], [kilopascal[-1]] * 2
+                axes.plot(*rest, color=shade, linewidth=0.8, linestyle=(0, (2, 2)))
         labels.append(Label(label, end, kilopascal[-1]))
         rows += [(prediction.trial, prediction.index, t, v) for t, v in zip(history.time, history.sed, strict=True)]
         seen += [v for t, v in zip(history.time, kilopascal, strict=True) if t >= PRESSED]
@@ -217,11 +203,8 @@ def response_panel(predictions: Sequence[PredictionFinding], name: str, *, simul
     whole.set_title(name)
     sliding.set_xlim(PRESSED, end)
     margin = 0.06 * (max(seen) - min(seen) or max(seen))
-    sliding.set_ylim(min(seen) - margin, max(seen) + margin)
-    whole.set_xlim(0.0, end)
-    whole.set_ylabel("SED [kPa]")
-    sliding.set_ylabel("SED while sliding [kPa]")
-    sliding.set_xlabel("time [s]")
+    sliding.set(ylim=(min(seen) - margin, max(seen) + margin), ylabel="SED while sliding [kPa]", xlabel="time [s]")
+    whole.set(xlim=(0.0, end), ylabel="SED [kPa]")
     label_right(drawn, sliding, labels, kind)
     title = f"Predicted response in time, {name or 'all strokes'}"
     name = f"response-{name}" if name else "response"

@@ -36,20 +36,20 @@ def finger_panels(field: Field, levels: tuple[float, ...], *, simulated: bool) -
     filled = _tissue(whole.axes[0], field, levels)
     _tissue(close.axes[0], field, levels)
     x, y = np.array(field.nodes).T
-    whole.axes[0].set_xlim(x.min() - 0.5, x.max() + 0.5)
-    whole.axes[0].set_ylim(-1.2, y.max() + 0.5)
+    whole.axes[0].set(xlim=(x.min() - 0.5, x.max() + 0.5), ylim=(-1.2, y.max() + 0.5))
     if filled is not None:
-        _bar(whole, filled, levels)
+        bar = whole.figure.colorbar(
+            filled, ax=whole.axes[0], location="bottom", spacing="proportional", aspect=28, pad=0.02, label="SED [kPa]"
+        )
+        bar.set_ticks(levels[:: -(-len(levels) // 6)])
     _name_layers(whole.axes[0], field)
     _tractions(close, field)
     inside = np.mean(np.asarray(field.patch), axis=0)
     close.axes[0].annotate("ending", tuple(inside), xytext=(0, 7), textcoords="offset points", ha="center", va="bottom")
     middle = _middle(field)
-    close.axes[0].set_xlim(middle - HALF_WIDTH, middle + HALF_WIDTH)
-    close.axes[0].set_ylim(-3.1, 4.4)
+    close.axes[0].set(xlim=(middle - HALF_WIDTH, middle + HALF_WIDTH), ylim=(-3.1, 4.4))
     for drawn in (whole, close):
-        drawn.axes[0].set_xlabel("along the surface, proximal to distal [mm]")
-        drawn.axes[0].set_ylabel("above the surface [mm]")
+        drawn.axes[0].set(xlabel="along the surface, proximal to distal [mm]", ylabel="above the surface [mm]")
         drawn.axes[0].set_title(f"{field.experiment}, index {field.index}")
     stem = f"finger-{field.experiment}-{field.index}"
     of = f"index {field.index} of {field.experiment}"
@@ -121,14 +121,6 @@ def _filling(axes: Axes, field: Field, levels: tuple[float, ...]) -> TriContourS
     return filled
 
 
-def _bar(drawn: Sheet, filled: TriContourSet, levels: tuple[float, ...]) -> None:
-    axes, ticks = drawn.axes[0], levels[:: -(-len(levels) // 6)]
-    bar = drawn.figure.colorbar(
-        filled, ax=axes, location="bottom", ticks=ticks, spacing="proportional", aspect=28, pad=0.02
-    )
-    bar.set_label("SED [kPa]")
-
-
 def _name_layers(axes: Axes, field: Field) -> None:
     """Write the layers' names beside the finger's back, each with a line into its layer, and the bone's on it."""
     if "bone" in field.outlines:
@@ -142,15 +134,8 @@ def _name_layers(axes: Axes, field: Field) -> None:
     line = {"arrowstyle": "-", "color": INK, "linewidth": 0.4, "shrinkA": 1.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
     for row, (name, outer, inner) in enumerate(zip(("epidermis", "dermis", "fat"), lines[:-1], lines[1:], strict=True)):
         at = int((0.88 - 0.04 * row) * len(outer))
-        axes.annotate(
-            name,
-            xy=tuple((outer[at] + inner[at]) / 2),
-            xytext=(0.75, 0.95 - 0.1 * row),
-            textcoords="axes fraction",
-            ha="left",
-            va="center",
-            arrowprops=line,
-        )
+        middle, text = tuple((outer[at] + inner[at]) / 2), (0.75, 0.95 - 0.1 * row)
+        axes.annotate(name, middle, text, textcoords="axes fraction", ha="left", va="center", arrowprops=line)
 
 
 def _middle(field: Field) -> float:

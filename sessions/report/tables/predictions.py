@@ -13,8 +13,6 @@ from sessions.report.wording import ShownResponse, direction, places, sed, shown
 
 def prediction_table(report: Report) -> Table | None:
     """Return what the model was given, and the SED it predicts."""
-    if not report.predictions:
-        return None
     notes = Notes()
     columns = "µ [1] | which µ | τ max [kPa] | depth [mm] | SED [kPa] | estimated error [%] | solved in [s]"
     strokes = {stroke.number: stroke for stroke in report.strokes}
@@ -197,8 +195,6 @@ def _by_strain(report: Report, cell: Callable[[Alternative], Cell]) -> list[Rows
 
 def force_table(report: Report) -> Table | None:
     """Return the model's forces beside the measured ones."""
-    if not report.predictions:
-        return None
     notes = Notes()
     columns = (
         "model N [N/mm] | model N × width [N] | measured N [N] | model T × width [N] | "

@@ -1,6 +1,7 @@
 """The tables of a session: strokes, scores, how predictions go with them, and what had been planted."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
 from sessions.prediction import BY_NAME
 from sessions.report.contents import Planted, Report, StrokeFinding
@@ -41,15 +42,11 @@ _OF_DECISION = {"onset": "onset", "break_away": "stick", "slide_onset": "slide_o
 
 def stroke_table(report: Report) -> Table | None:
     """Return the strokes with their friction, speed and flaws, each number over its interval."""
-    if not report.strokes:
-        return None
     notes = Notes()
     columns = "µ static [1] | µ dynamic [1] | µ maximum [1] | τ max [kPa] | speed [mm/s] | direction | flaws"
 
     def row(stroke: StrokeFinding) -> Row:
-        def cell(name: str, shown: Format, unit: float = 1.0) -> Cell:
-            return _estimate(notes, stroke, name, shown, unit)
-
+        cell = partial(_estimate, notes, stroke)
         return (
             cell("mu_static", places(3)),
             cell("mu_dynamic", places(3)),
@@ -80,9 +77,7 @@ def course_table(report: Report) -> Table | None:
     )
 
     def row(stroke: StrokeFinding) -> Row:
-        def cell(name: str, shown: Format) -> Cell:
-            return _estimate(notes, stroke, name, shown)
-
+        cell = partial(_estimate, notes, stroke)
         why = stroke.reasons.get("direction") or _TOO_SHORT
         return (
             cell("normal_force", places(2)),
@@ -129,8 +124,6 @@ def _estimate(notes: Notes, stroke: StrokeFinding, name: str, shown: Format, uni
 
 def planted_table(report: Report) -> Table | None:
     """Return what the simulator planted beside what the analysis found."""
-    if not report.planted:
-        return None
     notes = Notes()
     # Of several strokes in a trial the model gets the first.
     strokes_by_trial = {stroke.trial: stroke for stroke in reversed(report.strokes) if stroke.trial is not None}
@@ -243,9 +236,6 @@ def rank_interval(related: Relation, notes: Notes) -> Cell:
 
 
 def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
-    def slope(value: float) -> str:
-        return significant(1e6 * value, 3)
-
     without = [(label, NONE if r is None else correlation(r)) for label, r in related.without]
     no_slope = "no line has one through two points, or through points wholly on it"
     return (
@@ -256,7 +246,14 @@ def _relation_row(name: str, related: Relation, notes: Notes) -> Row:
         notes.number(related.spearman, correlation, related.reason),
         rank_interval(related, notes),
         notes.number(related.spearman_p, places(3), related.reason or "too many orders to count"),
-        notes.estimate(related.slope, slope, related.reason, slope_interval(related), no_slope, unit=1e6),
+        notes.estimate(
+            related.slope,
+            lambda v: significant(1e6 * v, 3),
+            related.reason,
+            slope_interval(related),
+            no_slope,
+            unit=1e6,
+        ),
         ", ".join(f"{label}:\N{NO-BREAK SPACE}{r}" for label, r in without),
     )
 

@@ -1,6 +1,5 @@
 """Tables of a study's page: mixed models, planted and estimated values, and every trial."""
 
-from collections import defaultdict
 from collections.abc import Callable, Iterable
 
 from sessions.prediction import BY_NAME, Quantity, shown_unit
@@ -8,9 +7,9 @@ from sessions.report.tables import Cell, Notes, Row, Table, range_cell, table
 from sessions.report.trials import model_in_short
 from sessions.report.wording import NONE, digits, p_value, places, plural, sed, significant, tau, three_figures
 from sessions.statistics.findings import INDEX, LEVELS, NOISE, UNITS, DescriptorFindings, StudyFindings
-from sessions.statistics.mixed_model import INTERCEPT, MixedModel
+from sessions.statistics.mixed_model import INTERCEPT, MixedModel, Spread, Term
 from sessions.statistics.pooled import response_term
-from sessions.statistics.scores import bounds
+from sessions.statistics.scores import bounds, by_key
 from sessions.statistics.visit import TrialRow, Visit, decided
 
 
@@ -50,11 +49,12 @@ def _models(one: DescriptorFindings, study: StudyFindings) -> tuple[tuple[str, M
 
 def missing_models(study: StudyFindings) -> list[str]:
     """Return why there is no correlation of means, and no mixed model: a sentence for each reason."""
-    by_reason: defaultdict[str, list[str]] = defaultdict(list)
-    for one in study.descriptors:
-        for what, model in _models(one, study):
-            if isinstance(model, str):
-                by_reason[model].append(f"{one.descriptor} on {what}")
+    by_reason = by_key(
+        (model, f"{one.descriptor} on {what}")
+        for one in study.descriptors
+        for what, model in _models(one, study)
+        if isinstance(model, str)
+    )
     return [
         *(
             f"No correlation of means on {one.descriptor}: {r.reason}."
@@ -73,20 +73,12 @@ def missing_scores(study: StudyFindings) -> list[str]:
         have = f"{one.descriptor} has {plural(whole, 'such subject')} and {plural(len(one.indices), 'surface')}"
         if not one.scores:
             continue
-        if one.agreement is None:
-            sentences.append(
-                f"No agreement on the order: it takes two subjects who scored each of three surfaces or more, not all "
-                f"alike; {have}."
-            )
-        if not one.within:
-            sentences.append(
-                f"No intervals within subjects: they take two subjects who scored each of two surfaces; {have}."
-            )
-        if not one.differences:
-            sentences.append(
-                f"No differences of surfaces of {one.descriptor}: they take three subjects who scored both, "
-                "not all with the same difference."
-            )
+        order = "it takes two subjects who scored each of three surfaces or more, not all alike"
+        within = "they take two subjects who scored each of two surfaces"
+        pairs = "they take three subjects who scored both, not all with the same difference"
+        sentences += [] if one.agreement else [f"No agreement on the order: {order}; {have}."]
+        sentences += [] if one.within else [f"No intervals within subjects: {within}; {have}."]
+        sentences += [] if one.differences else [f"No differences of surfaces of {one.descriptor}: {pairs}."]
     return sentences
 
 
@@ -100,19 +92,18 @@ def _terms(model: MixedModel, quantity: Quantity) -> Iterable[Row]:
     units = {response_term(quantity): f"points per {unit}", **UNITS}
     middle = f"{digits(model.middle, 3)} {unit}" if first != INDEX else f"index {digits(50 + model.middle, 1)}"
 
-    def row(name: str, unit: str, estimate: float, low: float, high: float, p: float | None) -> Row:
-        p_text = NONE if p is None else p_value(p)
-        return (name, unit, significant(estimate, 3), range_cell(low, high, three_figures), p_text)
+    def row(name: str, unit: str, value: float, of: Term | Spread, p: str = NONE) -> Row:
+        return (name, unit, three_figures(value), range_cell(of.low, of.high, three_figures), p)
 
     names = {INTERCEPT: f"level at {middle}"}
     for t in model.terms:
-        yield row(names.get(t.name, t.name), units.get(t.name, "points"), t.estimate, t.low, t.high, t.p)
+        yield row(names.get(t.name, t.name), units.get(t.name, "points"), t.estimate, t, p_value(t.p))
     of = model.spreads
     if of is not None:
-        kinds = ((LEVELS, of.level), ("spread of subjects' slopes", of.slope), (NOISE, of.left))
-        for name, s in kinds:
+        slopes = ("spread of subjects' slopes", units[first], of.slope)
+        for name, unit, s in ((LEVELS, "points", of.level), slopes, (NOISE, "points", of.left)):
             if s is not None:
-                yield row(name, units[first] if s is of.slope else "points", s.sd, s.low, s.high, None)
+                yield row(name, unit, s.sd, s)
 
 
 def planted_table(study: StudyFindings) -> Table | None:
@@ -122,8 +113,8 @@ def planted_table(study: StudyFindings) -> Table | None:
             one.descriptor,
             one.effect,
             UNITS[one.effect],
-            significant(one.planted, 3),
-            significant(one.estimate, 3),
+            three_figures(one.planted),
+            three_figures(one.estimate),
             range_cell(one.low, one.high, three_figures),
             "yes" if one.covered else "no",
         )
