@@ -1,4 +1,4 @@
-"""A settled state at finite strain on nested meshes: each begins where the coarser one ended, a few iterations away."""
+"""Solve settled states at finite strain on finer and finer meshes, each started from the coarser solution."""
 
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -20,8 +20,8 @@ from solver.scene import Scene
 COARSE = (
     4.0  # fineness of the mesh that all others begin at: 3 folds the skin of steep slides, 5 takes half as long again
 )
-ELSEWHERE = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
-NEARLY = 0.98  # of the friction limit, from which contact is where it is when the finger slides
+OFFSET_FINENESS = 1.05  # times as fine is a mesh whose nodes lie elsewhere; of refined lines, one with columns in two
+NEAR_SLIDE = 0.98  # of the friction limit, from which contact is where it is when the finger slides
 MARGIN = 3.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
 WIDER = 6.0  # the same where contact was met at the end of that skin
 
@@ -38,7 +38,7 @@ class MeshSolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NestedSolution:
-    """What a scene was solved by: the state on a coarse mesh, and the one that counts."""
+    """The solutions of one scene on the coarse mesh and on the mesh that counts."""
 
     coarse: MeshSolution
     top: MeshSolution
@@ -46,16 +46,16 @@ class NestedSolution:
 
 
 class Meshes:
-    """The meshes of one finger and the states on coarse ones, each made once; scenes that share them slide alike."""
+    """A cache of the meshes of one finger and of coarse solutions, for scenes that are pressed and slide alike."""
 
     def __init__(self) -> None:
-        """Make none yet."""
+        """Start empty."""
         self._fingers: dict[Sizing, FiniteFinger] = {}
         self._coarse: dict[tuple[Scene, Sizing], MeshSolution | SolveFailure] = {}
         self._last: MeshSolution | None = None
 
     def keep(self, fineness: float | Lines) -> None:
-        """Forget meshes that are neither coarse nor of this fineness."""
+        """Drop all meshes but the coarse one and those of this fineness."""
         self._fingers = {sizing: f for sizing, f in self._fingers.items() if sizing.fineness in (COARSE, fineness)}
 
     def finger(self, scene: Scene, sizing: Sizing) -> FiniteFinger:
@@ -65,15 +65,15 @@ class Meshes:
         return self._fingers[sizing]
 
     def coarse(self, scene: Scene, sizing: Sizing) -> MeshSolution:
-        """Return a state of a scene on a coarse mesh, sought first from the one found last there. Raises SolveFailure.
+        """Return a scene's solution on a coarse mesh, started from the last solution there. Raises SolveFailure.
 
-        It is the settled one, or the slide where a given drag nearly makes the finger slide.
+        It is the settled state, or the full slip where a given drag is close to the friction limit.
         """
-        new = (scene, sizing) not in self._coarse
-        if new:
-            begun = perf_counter()
+        is_new = (scene, sizing) not in self._coarse
+        if is_new:
+            start = perf_counter()
             finger = self.finger(scene, sizing)
-            setup = perf_counter() - begun
+            setup = perf_counter() - start
             near = None if self._last is None or self._last.finger is not finger else self._last.state
             try:
                 self._last = MeshSolution(finger, sizing, _on_coarse(finger, scene, near), setup)
@@ -83,57 +83,57 @@ class Meshes:
         solution = self._coarse[scene, sizing]
         if isinstance(solution, SolveFailure):
             raise solution
-        return solution if new else replace(solution, setup_s=0.0)
+        return solution if is_new else replace(solution, setup_s=0.0)
 
 
 def coarse_solution(scene: Scene, expected: float, fineness: float | Lines, meshes: Meshes) -> MeshSolution:
-    """Return the settled state on a coarse mesh, from which finer ones begin.
+    """Return the settled state on a coarse mesh, from which solutions on finer meshes start.
 
-    `expected` is the depth [mm], or about it where forces are given. For a drag near the limit of friction, which lies
-    a little elsewhere on each mesh, it is the slide. A coarse mesh will do where its state is sound. Near a limit, only
-    a mesh of `fineness` itself can tell. Raises NoSteadyState, NotConverged, Cancelled.
+    `expected` is the depth [mm], an estimate where forces are given. The friction limit differs a little between
+    meshes, so that for a drag near it the solution is full slip. Where the coarse state is unsound, as near a limit, a
+    mesh of `fineness` is solved directly. Raises NoSteadyState, NotConverged, Cancelled.
     """
     depth = expected if scene.normal_force is not None else scene.loading.depth
     sizing = Sizing(COARSE if isinstance(fineness, Lines) else min(COARSE, fineness), depth, margin=MARGIN)
-    beyond = False
+    beyond_limit = False
     try:
-        low = meshes.coarse(scene, sizing)
-        if low.state.reaches_end:
+        coarse = meshes.coarse(scene, sizing)
+        if coarse.state.reaches_end:
             sizing = replace(sizing, margin=WIDER)
-            low = meshes.coarse(scene, sizing)
-        if sound(low.finger, low.state):
-            return low
-        beyond = folded(low.finger, low.state)
+            coarse = meshes.coarse(scene, sizing)
+        if sound(coarse.finger, coarse.state):
+            return coarse
+        beyond_limit = folded(coarse.finger, coarse.state)
     except NoSteadyState:
         if scene.normal_force is not None and not scene.loading.dragged:
             raise  # decided on a mesh of its own, whatever this one is
     except NotConverged:
-        beyond = True
+        beyond_limit = True
     except SolveFailure:
         pass
-    if beyond and scene.normal_force is None and scene.loading.direction != 0:
+    if beyond_limit and scene.normal_force is None and scene.loading.direction != 0:
         refuse_far_beyond(scene, sliding_load(scene))
     sizing = replace(sizing, fineness=fineness)
     try:
-        return _plain(scene, sizing, meshes)
+        return _solve_uniform(scene, sizing, meshes)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return _plain(scene.without_drag(), sizing, meshes)
+        return _solve_uniform(scene.without_drag(), sizing, meshes)
 
 
-def _plain(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
-    begun = perf_counter()
+def _solve_uniform(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution:
+    start = perf_counter()
     finger = meshes.finger(scene, sizing)
-    setup = perf_counter() - begun
+    setup = perf_counter() - start
     state = settled(finger, scene)
     if sizing.margin < WIDER and state.reaches_end:
-        return _plain(scene, replace(sizing, margin=WIDER), meshes)
+        return _solve_uniform(scene, replace(sizing, margin=WIDER), meshes)
     return MeshSolution(finger, sizing, state, setup)
 
 
 def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None) -> EquilibriumState:
-    """Return the state on the coarse mesh, or the slide where a given drag nearly makes the finger slide there."""
+    """Return the state on the coarse mesh, or full slip where a given drag is close to the friction limit there."""
     drag = scene.tangential_force
     if drag is None:
         return roughly(finger, scene, near)
@@ -141,60 +141,61 @@ def _on_coarse(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None
         slide = roughly(finger, scene.without_drag(), near)
     except SolveFailure:
         return march(scene, finger).last  # the drag may be met before sliding would fold the skin
-    return slide if drag >= NEARLY * abs(slide.force[0]) else march(scene, finger).last
+    return slide if drag >= NEAR_SLIDE * abs(slide.force[0]) else march(scene, finger).last
 
 
-def refine(scene: Scene, fineness: float | Lines, low: MeshSolution, meshes: Meshes) -> NestedSolution:
-    """Return the settled state refined from `low`, the scene's coarse solution. Raises as `solution_on`."""
-    steps = choose_steps(scene, low.finger, low.state)
-    sizing = replace(low.sizing, fineness=fineness)
-    top = solution_on(scene, sizing, low, meshes, 1 if steps is None else steps.times)
+def refine(scene: Scene, fineness: float | Lines, coarse: MeshSolution, meshes: Meshes) -> NestedSolution:
+    """Return the settled state refined from `coarse`, the scene's coarse solution. Raises as `solution_on`."""
+    steps = choose_steps(scene, coarse.finger, coarse.state)
+    sizing = replace(coarse.sizing, fineness=fineness)
+    top = solution_on(scene, sizing, coarse, meshes, 1 if steps is None else steps.times)
     if top.sizing.margin < WIDER and top.state.reaches_end:
         wider = replace(sizing, margin=WIDER)
-        top = solution_on(scene, wider, low, meshes, 1 if steps is None else steps.times)
-    return NestedSolution(low, top, steps)
+        top = solution_on(scene, wider, coarse, meshes, 1 if steps is None else steps.times)
+    return NestedSolution(coarse, top, steps)
 
 
 def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes, times: int = 1) -> MeshSolution:
-    """Return the settled state on a mesh of `sizing`, begun at the state `below`.
+    """Return the settled state on a mesh of `sizing`, started from the coarser solution `below`.
 
-    A course takes so many `times` the usual load steps. Where friction is steep a mesh may have no state, its last node
-    neither open nor touching: then one with nodes elsewhere is asked. Raises NoSteadyState, NotConverged, Cancelled.
+    A load path takes so many `times` the usual steps. Under steep friction a mesh may have no state, because its last
+    node can be neither open nor in contact. Then a mesh with nodes at other places is solved. Raises NoSteadyState,
+    NotConverged, Cancelled.
     """
-    begun = _starting_solution(scene, sizing, below, meshes)
+    start = _starting_solution(scene, sizing, below, meshes)
     try:
-        return replace(begun, state=settled(begun.finger, scene, begun.state, times))
+        return replace(start, state=settled(start.finger, scene, start.state, times))
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
     lines = sizing.fineness
     if isinstance(lines, Lines):
-        elsewhere = lines.divided(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
+        offset = lines.divided(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
     else:
-        elsewhere = ELSEWHERE * lines
-    begun = _starting_solution(scene, replace(sizing, fineness=elsewhere), below, meshes)
-    return replace(begun, state=settled(begun.finger, scene, begun.state, times))
+        offset = OFFSET_FINENESS * lines
+    start = _starting_solution(scene, replace(sizing, fineness=offset), below, meshes)
+    return replace(start, state=settled(start.finger, scene, start.state, times))
 
 
 def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
-    """Return a mesh above the state `below`, with the state that a settled one is sought from."""
-    begun = perf_counter()
+    """Return a mesh of `sizing` with the solution `below` transferred to it, from which Newton starts."""
+    start = perf_counter()
     finger = meshes.finger(scene, sizing)
     if finger is below.finger:
         return below
-    start = finger.transfer(below.state, below.finger)
-    return MeshSolution(finger, sizing, start, perf_counter() - begun)
+    state = finger.transfer(below.state, below.finger)
+    return MeshSolution(finger, sizing, state, perf_counter() - start)
 
 
 def solve_nested(
     scene: Scene, top: MeshSolution, steps: Steps | None, meshes: Meshes
 ) -> tuple[NestedState | None, Steps | None]:
-    """Return the state of a scene on the nested mesh of `top`, None where it has none there, and its steps.
+    """Return the state of a scene on the nested mesh of `top`, None where none exists there, and its load steps.
 
-    `steps` are those taken where the state depends on its way. Raises Cancelled.
+    `steps` are the load steps taken where the state depends on its load path. Raises Cancelled.
     """
-    begun = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
-    finger = begun.finger
+    start = _starting_solution(scene, replace(top.sizing, halved=True), top, meshes)
+    finger = start.finger
     try:
         if top.state.load.path_dependent:
             if steps is None:  # since it slid on the coarse mesh
@@ -203,7 +204,7 @@ def solve_nested(
             state = end(scene, finger)
         else:
             steps = None
-            state = nearby(finger, scene, begun.state) or settled(finger, scene, begun.state)
+            state = nearby(finger, scene, start.state) or settled(finger, scene, start.state)
     except SolveFailure:
         return None, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)

@@ -1,15 +1,16 @@
-"""How far the numbers of a scene may be off: what halving every element changes, and where contact may end.
+"""Estimate the errors of a scene's numbers from its nested mesh and from moving the edges of contact.
 
-The answer's mesh H and its nested mesh h (every element in four) are solved. What a number J changes between them holds
-the error of all that both resolve. Errors of quadratic elements beneath a contact fall at least with the square of the
-element, so that the error on H is at most 1 + 1/4 + 1/16 + ... = 4/3 of the change (Roache 1994).
-What two meshes may agree on by chance is where contact states change: an edge of contact, or of skin that sticks or
-slips at the bound, lies anywhere between two nodes. Each edge is moved by one node of h to either side, every other
-state kept, and the linearised body is solved again. A third of the larger change counts, since numbers follow an edge
-by a parabola about its true place. Edges err independently: their changes are added as squares.
+The scene is solved on the mesh H of the answer and on its nested mesh h, which divides every element into four. Errors
+of quadratic elements beneath a contact fall at least with the square of the element size. The error on H is therefore
+at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994).
 
-Much of what a mesh makes wrong is the same for all surfaces of one finger and falls out of their differences. What is
-left in a difference is estimated in the same way: each surface has its edges of contact elsewhere.
+Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
+anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
+the linearised body is solved again. A number depends on the place of an edge by a parabola about the true place, so
+that a third of the larger change counts. Edges err independently, and their changes are added as squares.
+
+Much of the error is common to all surfaces of one finger and cancels in their differences. The rest is estimated in the
+same way, since each surface has its own edges of contact.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,37 +32,36 @@ from solver.quantities import NAMES
 from solver.scene import Scene
 
 FROM_HALVING = 4.0 / 3.0  # error on a mesh by what halving its elements changes: errors fall with their square
-# Of what a number changes by when an edge of contact moves by one node. Numbers follow an edge's place by a parabola
-# about the true one, half a node away at most; the width follows it by a line.
+# Parts of the change when an edge of contact moves by one node. Numbers depend on the place of an edge by a parabola
+# about the true place, at most half a node away; the width depends on it linearly.
 FROM_EDGES, WIDTH_FROM_EDGES = 1.0 / 3.0, 0.5
 SHIFT, WIDTH = 4, 5  # places of the bone's shift and of the contact's width among the numbers
 _PARTS_OF_EDGES = np.where(np.arange(COUNT) == WIDTH, WIDTH_FROM_EDGES, FROM_EDGES)
 
 
 def half_width(change: Array, edges: Array, part: Array | float = FROM_EDGES) -> Array:
-    """Return how far numbers may be off which change by so much on the nested mesh.
+    """Return the error estimate of numbers from their `change` to the nested mesh.
 
-    `edges` is what they change by there when edges of contact move by a node, of which a `part` counts.
+    `edges` is their change there when edges of contact move by a node, of which a `part` counts.
     """
     return FROM_HALVING * np.abs(change) + part * edges
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
-MOST = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
-USUAL = 0.003  # tolerance that steps are chosen for where none is asked for, as the default meshes' errors
-SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
+MOST_STEPS = 16  # times the usual steps, at most: a second's work on a coarse mesh at small strain
+USUAL_TOLERANCE = 0.003  # tolerance that steps are chosen for where none is asked for, as the default meshes' errors
+STEPS_SHARE = 0.3  # part of a tolerance that the error of the steps may take: the mesh, which costs more, has the rest
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steps:
-    """The steps of one course. Numbers are those of `all_numbers` (c,).
+    """The load steps of one path and their error. Numbers are those of `all_numbers` (c,).
 
-    A press with friction, or a drag that friction carries, depends on its way: where in a step a point comes to touch
-    is where it is held from then on. The error so falls with the number of steps, on average, and irregularly: each
-    point touches at some part of its step. It is nearly the same on every mesh, so that it is measured on a coarse one,
-    by two courses of fewer steps. With an error c of the usual steps and c/p of a part p of them, the end changes by
-    c (1/p - 1). Either course may agree with the usual one by chance, which is why both estimates of c are added. A
-    settled slide has no such error.
+    A press with friction, or a drag below the friction limit, depends on its load path: a point sticks where it first
+    touches, which is known to within a step. The error falls on average in proportion to the number of steps, and
+    irregularly. It is nearly the same on every mesh, and is measured on a coarse one by two paths of fewer steps. With
+    an error c after the usual steps and c/p after a part p of them, the end changes by c (1/p - 1). Either path may
+    agree with the usual one by chance, so that both estimates of c are added. A settled slide has no such error.
     """
 
     times: int  # the usual ones
@@ -70,30 +70,30 @@ class Steps:
 
     @staticmethod
     def of(usual: Array, fewer: Array, tolerance: float | None) -> "Steps":
-        """Return the fewest that a tolerance asks for.
+        """Return the fewest steps that meet a tolerance.
 
         `usual` (c,) and `fewer` (2, c) are numbers after the usual steps and after PARTS of them, on a coarse mesh.
         """
         excess = (fewer - usual) / (1.0 / PARTS - 1.0)[:, None]
         bound = np.abs(excess).sum(axis=0)
-        off = float(bound[0]) / max(abs(float(usual[0])), np.finfo(float).tiny)
-        times = min(max(1, ceil(off / (SHARE * (tolerance or USUAL)))), MOST)
+        relative_error = float(bound[0]) / max(abs(float(usual[0])), np.finfo(float).tiny)
+        times = min(max(1, ceil(relative_error / (STEPS_SHARE * (tolerance or USUAL_TOLERANCE)))), MOST_STEPS)
         return Steps(times, excess.mean(axis=0), bound)
 
     @property
     def error(self) -> Array:
-        """By how much numbers may be off for not taking more steps (c,)."""
+        """Error of the numbers (c,) from the finite number of steps."""
         return self.bound / self.times
 
     def extrapolate(self, usual: Array) -> Array:
-        """Return what the numbers (c,) after the usual steps would be after these."""
+        """Extrapolate numbers (c,) after the usual steps to these."""
         return usual - (1.0 - 1.0 / self.times) * self.excess
 
 
 def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumState | None = None) -> Steps | None:
-    """Return the load steps that a scene asks for, judged on one mesh, whose `settled` state may be known.
+    """Return the load steps that a scene needs, judged on one mesh, whose `settled` state may be known.
 
-    None where that does not depend on its way. Raises SolveFailure, Cancelled.
+    None where the state does not depend on its load path. Raises SolveFailure, Cancelled.
     """
     if settled is not None and not settled.load.path_dependent:
         return None
@@ -103,9 +103,9 @@ def choose_steps(scene: Scene, finger: Finger[Patches], settled: EquilibriumStat
 
 
 def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
-    """Return how many times the usual load steps a history takes whose end does not depend on them.
+    """Return how many times the usual steps a load path needs whose end does not depend on them.
 
-    Those that a tolerance asks for at the end of its press. Raises as `choose_steps`.
+    The end of its press decides. Raises as `choose_steps`.
     """
     if scene.solve.course == "steady" or scene.solve.tolerance is None or scene.friction.frictionless:
         return 1
@@ -114,7 +114,7 @@ def steps_of_press(scene: Scene, finger: Finger[Patches]) -> int:
 
 
 class Errors(NamedTuple):
-    """How far numbers may be off: relative, but for the shift. None for what was given, or is not there."""
+    """Error estimates: relative, except for the shift. None for numbers that are given or do not exist."""
 
     sed: float
     normal: float | None
@@ -131,19 +131,20 @@ def edge_changes(
     states: Sequence[tuple[EquilibriumState, ForceLoad | None]],
     numbers: Callable[[Sequence[EquilibriumState]], Array],
 ) -> tuple[Array, list[Array]]:
-    """Return the numbers (c, n) of states, and of each what they change by as each of its m edges of contact moves.
+    """Return the numbers (c, n) of states, and for each state their changes (m, n) as each of its m edges moves.
 
-    That is (m, n), by a node to the worse side. `states` are equilibria, each with the forces it is under or None for
-    its depth; `numbers` makes (c, n) of c states. Infinite where contact with a moved edge has no equilibrium.
+    An edge of contact moves by one node to either side, and the larger change counts. `states` are equilibria with
+    their forces, or None for a given depth. `numbers` returns (c, n) for c states. A change is infinite where no
+    equilibrium exists with the edge moved.
     """
     moved = [_move_edges(newton, state, forces) for state, forces in states]
-    known = [one for edges in moved for sides in edges for one in sides if one is not None]
-    values = numbers([*(state for state, _ in states), *known])
-    here, there = values[: len(states)], iter(values[len(states) :])
+    solutions = [one for edges in moved for sides in edges for one in sides if one is not None]
+    values = numbers([*(state for state, _ in states), *solutions])
+    here, moved_values = values[: len(states)], iter(values[len(states) :])
     size = here.shape[1]
 
     def change(sides: list[EquilibriumState | None], before: Array) -> Array:
-        changes = [np.full(size, np.inf) if one is None else np.abs(next(there) - before) for one in sides]
+        changes = [np.full(size, np.inf) if one is None else np.abs(next(moved_values) - before) for one in sides]
         return np.max(changes, axis=0)
 
     return here, [
@@ -164,10 +165,10 @@ class NestedState(NamedTuple):
 def nested_state(
     finger: Finger[Patches], state: EquilibriumState, values: Array, changes: Array, steps: Steps | None
 ) -> NestedState | None:
-    """Return a state of the nested mesh with its numbers, of `values` (COUNT + r,) and `changes` (m, COUNT + r).
+    """Return a state of the nested mesh with its numbers, from `values` (COUNT + r,) and `changes` (m, COUNT + r).
 
-    `steps` are those taken where it depends on its way. None where contact with a moved edge has no equilibrium, as at
-    a limit of friction.
+    `steps` are its load steps where it depends on its load path. None where no equilibrium exists with an edge moved,
+    as at a friction limit.
     """
     of_edges = np.linalg.norm(changes, axis=0)
     if np.isinf(of_edges).any():
@@ -180,9 +181,9 @@ def nested_state(
 def _move_edges(
     newton: Newton, state: EquilibriumState, forces: ForceLoad | None
 ) -> list[list[EquilibriumState | None]]:
-    """Return the equilibria with each edge of contact moved by a node to one side and to the other, edge by edge.
+    """Return for each edge of contact the equilibria with it moved by a node to either side.
 
-    The only node that touches stays: without it there is no contact, and no edge.
+    A single touching node stays, since there is no contact without it.
     """
     x = np.ascontiguousarray(state.place(newton.condensed)[:, 0])
     edges = np.flatnonzero(np.diff(state.state)).tolist()
@@ -200,28 +201,28 @@ def _move_edges(
 
 
 def _move_edge(
-    newton: Newton, state: EquilibriumState, forces: ForceLoad | None, x: Array, node: int, other: int
+    newton: Newton, state: EquilibriumState, forces: ForceLoad | None, x: Array, node: int, neighbour: int
 ) -> EquilibriumState | None:
-    """Return the equilibrium of the body, linearised at `state`, with `node` in the contact state of the `other`.
+    """Return the equilibrium of the body linearised at `state`, with `node` in the contact state of its `neighbour`.
 
-    `x` (k,) are the positions of the skin's nodes along the surface. None where there is no such equilibrium.
+    `x` (k,) are the positions of the skin's nodes along the surface. None where no such equilibrium exists.
     """
     states, senses = state.state.copy(), state.sense.copy()
-    states[node], senses[node] = states[other], senses[other]
-    begin = replace(state, state=states, sense=senses)
-    if newton.solve_contact(begin, state.load, x, 0, forces) == SINGULAR:
+    states[node], senses[node] = states[neighbour], senses[neighbour]
+    start = replace(state, state=states, sense=senses)
+    if newton.solve_contact(start, state.load, x, 0, forces) == SINGULAR:
         return None
     deeper, along = newton.system.motion.tolist() if forces is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
-    after = newton.moved(begin, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
-    return replace(after, state=states, sense=senses)  # and not those that the moved edge would call for
+    moved = newton.moved(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    return replace(moved, state=states, sense=senses)  # the prescribed states, not those that would follow
 
 
 def errors(scene: Scene, numbers: Array, nested: NestedNumbers | None, steps: Steps | None) -> Errors:
-    """Return the errors of the `numbers` (COUNT,) of `all_numbers`.
+    """Return the error estimates of `numbers` (COUNT,) of `all_numbers`.
 
-    `nested` is None where the nested mesh has no such state, so that nothing is known of them; `steps` are those that a
-    course has taken whose end depends on its way.
+    `nested` is None where the nested mesh has no such state, so that the errors are unknown. `steps` are the load steps
+    of a state that depends on its load path.
     """
     if nested is None:
         return _without_prescribed(scene, Errors(1.0, 1.0, 1.0, 1.0, None, 1.0, 1.0, np.full(len(NAMES), np.nan)))
@@ -249,7 +250,7 @@ def row_errors(row: Array, nested: NestedNumbers | None) -> Array:
 
 
 def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
-    """Return the errors without those of what the scene gives, and of the drag where nothing rubs."""
+    """Return the errors without those of prescribed numbers, and of the drag where there is no friction."""
     by_force, dragged = scene.normal_force is not None, scene.loading.dragged
     rubs = not scene.friction.frictionless
     return estimates._replace(
@@ -260,17 +261,17 @@ def _without_prescribed(scene: Scene, estimates: Errors) -> Errors:
     )
 
 
-COMPARED = ("SED", "normal force", "drag", "indentation")  # what is compared: the first four of all numbers
-WARNED = 0.05  # part of their range from which on a warning says how far differences may be off
-LEAST = 1e-5  # part of the numbers below which nobody minds
-NOTICED = 1e-3  # part of a force or depth that a sensor may tell
+COMPARED = ("SED", "normal force", "drag", "indentation")  # the first four of all numbers
+WARNING_SHARE = 0.05  # error of differences by their range from which on there is a warning
+LEAST_RANGE = 1e-5  # smallest range by the numbers: smaller errors of differences give no warning
+SENSOR_RESOLUTION = 1e-3  # relative, of a force or depth
 
 
 def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
-    """Return the sets of scenes that are compared: two or more surfaces of one finger, pressed and moved alike.
+    """Return the sets of scenes that are compared: two or more surfaces, pressed and moved alike.
 
-    Scenes asked for with quick evidence are variants of one surface, whose differences have their own ways
-    (`solver.response.nearby`), and belong to none.
+    Scenes with quick evidence belong to none. They are variants of one surface, whose differences come from
+    `solver.response.nearby`.
     """
     sets: dict[object, list[int]] = {}
     for number, scene in enumerate(scenes):
@@ -280,17 +281,17 @@ def compared_sets(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 class ContrastError(NamedTuple):
-    """By how much of their range differences between surfaces may be off."""
+    """The error estimate of differences between surfaces by their range."""
 
     share: float  # in SED, at worst [-]
     warning: str = ""  # a sentence where that is too much of it, or of a force or depth
 
 
 def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
-    """Return what differences between these surfaces may be off by.
+    """Return the error estimate of differences between surfaces.
 
-    Of forces and depth only what is off by more than sensors tell is warned of. A surface that has no state on the
-    nested mesh is left out: nothing is known of it.
+    For forces and depth, only errors above the resolution of sensors give a warning. A surface without a state on the
+    nested mesh is left out, since its error is unknown.
     """
     known = [(one, one.nested) for one in predictions if one.nested is not None]
     if len(known) < 2:
@@ -302,10 +303,12 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     pairs = np.array(list(combinations(range(len(known)), 2))).T
     worst = half_width(change[pairs[0]] - change[pairs[1]], np.hypot(edges[pairs[0]], edges[pairs[1]]))
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
-    shares = off_by / np.maximum(np.maximum(np.ptp(numbers, axis=0), LEAST * mean / WARNED), np.finfo(float).tiny)
-    minded = off_by > NOTICED * mean
+    shares = off_by / np.maximum(
+        np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
+    )
+    minded = off_by > SENSOR_RESOLUTION * mean
     minded[0] = True
-    warned = np.where((shares > WARNED) & minded, shares, 0.0)
+    warned = np.where((shares > WARNING_SHARE) & minded, shares, 0.0)
     first = int(warned.argmax())
     return ContrastError(
         float(shares[0]), _in_a_sentence(COMPARED[first], float(warned[first])) if warned.any() else ""
@@ -337,7 +340,7 @@ def estimate_errors(
     forces: ForceLoad | None = None,
     fewer: Sequence[EquilibriumState] = (),
 ) -> ErrorInterval:
-    """Return the `numbers` (n,) of a state and how far each may be off.
+    """Return the `numbers` (n,) of a state with the error estimate of each.
 
     `nested` is the same state on the halved mesh (`solver.mesh`), `forces` the forces it is under, if any. Where
     the state is the end of a load path on which skin sticks, `fewer` are its ends on the same mesh after `PARTS` of

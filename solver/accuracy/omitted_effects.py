@@ -26,8 +26,8 @@ DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
 # Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
 # not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
 RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
-WORTH_TELLING = 0.02  # part of the SED from which something left out is worth a warning [-]
-LARGE_STRAIN = 0.1  # a strain from which finite strain ought to be considered [-]
+WARNING_CHANGE = 0.02  # part of the SED from which something left out is worth a warning [-]
+STRAIN_LIMIT = 0.1  # a strain from which finite strain ought to be considered [-]
 
 
 def _describe_laws(scene: Scene) -> str:
@@ -107,7 +107,7 @@ def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
         needs["viscosity"] = 'ask for solve.course = "history"'
     for name, cure in needs.items():
         change = left_out[name]["estimate"] if name in left_out else None
-        if change is not None and change > WORTH_TELLING:
+        if change is not None and change > WARNING_CHANGE:
             sentences.append(f"Leaving out {name} may have changed the ending's SED by {percent(change)}: {cure}.")
     return tuple(sentences)
 
@@ -117,10 +117,10 @@ def _of_strain(entry: Mapping[str, Any]) -> list[str]:
     if "limit_mu" in numbers:
         return ["At finite strain this scene has no settled state: the skin folds first. Small strain hides that."]
     if "with_MPa" in numbers:
-        if change is None or change <= WORTH_TELLING:
+        if change is None or change <= WARNING_CHANGE:
             return []
         return [f"At finite strain the ending's SED differs by {percent(change)}: small strain is not meant for it."]
-    if numbers["largest_strain"] <= LARGE_STRAIN:
+    if numbers["largest_strain"] <= STRAIN_LIMIT:
         return []
     return [
         f"Strains reach {100 * numbers['largest_strain']:.0f} % in the skin and "

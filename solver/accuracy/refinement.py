@@ -1,13 +1,14 @@
-"""Where a mesh is to be refined: what each gap between its lines adds to the error of the ending's SED.
+"""Refine a mesh where its error comes from: the share of each column and row in the error of the ending's SED.
 
-A mesh's lines divide it in columns and rows. On the nested mesh, every element in four, the solution u and the adjoint
-z of the SED are known. What a column is too wide for is what u and z differ by from their quadratic interpolants across
-it. The product of both differences in the energy of shear is its part of the error (dual-weighted residuals: Becker and
-Rannacher 2001, Acta Numerica 10, 1; by directions: Richter 2010, Int. J. Numer. Meth. Fluids 62, 90). Rows likewise.
-The energy of volume is left out: interpolants of nearly incompressible tissue change volume, solutions do not. So parts
-are right among each other, and are scaled to the estimate that two meshes give (`solver.accuracy.error_estimate`).
+The lines of a mesh divide it into columns and rows. The solution u and the adjoint z of the SED are known on the nested
+mesh, which divides every element into four. A column does not resolve the difference of u and z from their quadratic
+interpolants across it. The product of both differences in the energy of shear is the column's share of the error
+(dual-weighted residuals: Becker and Rannacher 2001, Acta Numerica 10, 1; by directions: Richter 2010, Int. J. Numer.
+Meth. Fluids 62, 90). Rows likewise. The energy of volume is left out, because interpolants of nearly incompressible
+tissue change volume and solutions do not. The shares are therefore relative, and are scaled to the estimate from two
+meshes (`solver.accuracy.error_estimate`).
 
-What holds for small strain guides finite strain too, where the undeformed body stands for the tangent.
+At finite strain the undeformed body takes the place of the tangent.
 """
 
 from dataclasses import dataclass, replace
@@ -28,20 +29,20 @@ from solver.mesh.mesher import FINEST, FingerMesh
 from solver.prediction import NestedNumbers
 from solver.scene import Scene
 
-MOST = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
-# Measured on 23 scenes at tolerances of 0.3 and 0.05 %: to halve or double any of the next four takes 1 to 18 % more
-# work, but for a smaller growth, which takes 4 % less in more rounds.
-PARTS = 4  # of one gap in a round, at most: an error says little about elements many times smaller
+MOST_UNKNOWNS = 25_000  # unknowns of a mesh: its nested one has 100,000, which take 1 s at small strain and 4 at finite
+# Measured on 23 scenes at tolerances of 0.3 and 0.05 %: halving or doubling one of the next four costs 1 to 18 % more
+# work, except for a smaller growth, which costs 4 % less in more rounds.
+MOST_PARTS = 4  # of one gap in a round, at most: an error says little about elements many times smaller
 GROWTH = 1.3  # of the unknowns in a round, at least
-AIM = 0.6  # sum of the parts on the next mesh, by the tolerance
-ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
+ERROR_AIM = 0.6  # sum of the parts on the next mesh, by the tolerance
+SHARE_ORDER = 4.0  # power of a gap's size with which its part falls, where solutions are smooth
 SCALES = 200  # that are tried, each a tenth smaller
 QUADRATIC = line(np.linspace(-1.0, 1.0, 5))[0]  # (5, 3) at the nodes of two elements, by those of the one they divide
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NestedGrid:
-    """A nested mesh by the elements that it divides: a columns of b, each with 5 x 5 nodes."""
+    """A nested mesh, indexed by the a x b elements that it divides, with 5 x 5 nodes each."""
 
     finger: LinearFinger
     nodes: Indices  # (a, b, 5, 5)
@@ -51,7 +52,7 @@ class NestedGrid:
 
     @staticmethod
     def of(finger: LinearFinger) -> "NestedGrid":
-        """Index the mesh of a finger that was halved."""
+        """Index the nested mesh of a finger."""
         mesh, columns = finger.geometry.mesh, (len(finger.geometry.arcs) - 1) // 2
         rows = len(mesh.elements) // columns // 4
         wide, five = 4 * rows + 1, np.arange(5)
@@ -66,9 +67,9 @@ class NestedGrid:
         return NestedGrid(finger, nodes, shear, affine, fit)
 
     def parts(self, displacement: Array, state: EquilibriumState) -> tuple[Array, Array]:
-        """Return what columns (a,) and rows (b,) add to the error of the SED [MPa], right among each other.
+        """Return the shares of columns (a,) and rows (b,) in the error of the SED [MPa], up to a common factor.
 
-        `displacement` (nodes, 2) and the contact of `state` are those on this mesh.
+        `displacement` (nodes, 2) and the contact states of `state` are those on this mesh.
         """
         dual = adjoint(self.finger, displacement, state)
         primal, dual = (self._curvature(one) for one in (displacement, dual))
@@ -98,10 +99,10 @@ class NestedGrid:
 
 
 def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) -> Array:
-    """Return how the ending's SED follows forces on the nodes (nodes, 2), contact states kept [MPa per N/mm].
+    """Return the derivative of the ending's SED by forces on the nodes (nodes, 2) at fixed contact states [MPa mm/N].
 
-    Skin that slips passes on mu times what its normal force changes by: there the adjoint's normal component is mu
-    times its tangential one, against the friction. Skin that sticks has none.
+    Where skin slips, its tangential force changes by mu times its normal force. There the normal component of the
+    adjoint is mu times the tangential one, against the friction. Skin that sticks does not move.
     """
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
@@ -117,12 +118,12 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     return recover((free + compliance[:, forces] @ missing).reshape(-1, 2))
 
 
-def with_shares(scene: Scene, numbers: Array, there: NestedState, steps: Steps | None) -> NestedNumbers:
-    """Return the numbers of a nested state, with each gap's part of the SED's error where a finer mesh may be wanted.
+def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Steps | None) -> NestedNumbers:
+    """Return the numbers of a nested state, with the shares of columns and rows where a finer mesh may be needed.
 
-    `numbers` (COUNT,) are the scene's on the mesh that counts.
+    `numbers` (COUNT,) are the scene's on the mesh of the answer.
     """
-    nested, finger, state, edges = there
+    nested, finger, state, edges = on_nested
     tolerance = scene.solve.tolerance
     missed = tolerance is not None and errors(scene, numbers, nested, steps).sed > tolerance
     if not missed and scene.solve.contrast_tolerance is None:
@@ -139,33 +140,33 @@ def with_shares(scene: Scene, numbers: Array, there: NestedState, steps: Steps |
 
 @lru_cache(maxsize=1)
 def _grid(finger: Finger[Any]) -> NestedGrid:
-    """Return the grid of a nested finger, as at small strain; surfaces of one mesh follow each other and share it."""
+    """Return the grid of a nested finger at small strain; consecutive surfaces of one mesh share it."""
     return NestedGrid.of(finger if isinstance(finger, LinearFinger) else LinearFinger.on(finger.scene, finger.geometry))
 
 
 def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
-    """Return the lines of a finer mesh; None where none may be finer.
+    """Return the lines of a finer mesh, or None where no mesh may be finer.
 
-    `parts` (a + b,) are the errors of each column and row of `mesh`, by the tolerance; None where they are not known.
-    With the fewest lines for one sum of errors, a gap's parts grow with its error, by what a line costs there, to the
-    power of one by `ORDER` and one. Where errors fall more slowly, at edges and corners, another round follows.
+    `parts` (a + b,) are the errors of the columns and rows of `mesh` by the tolerance, None where they are unknown. The
+    fewest lines for a given sum of errors divide a gap into a number of parts that grows as its error per cost of a
+    line to the power 1/(`SHARE_ORDER` + 1). Where errors fall more slowly, at edges and corners, another round follows.
     """
     lines = mesh.lines
     counts = np.array([len(lines.arcs) - 1, lines.rows])
     if parts is None:
         halves = np.full(counts.sum(), 2)
-        return lines.divided(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST else None
-    most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, PARTS)
+        return lines.divided(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST_UNKNOWNS else None
+    most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, MOST_PARTS)
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
     chosen = None
     for scale in per_line.max() * np.geomspace(1.0, 1e-9, SCALES):
-        wanted = np.maximum(np.rint((per_line / scale) ** (1.0 / (ORDER + 1.0))), 1.0)
+        wanted = np.maximum(np.rint((per_line / scale) ** (1.0 / (SHARE_ORDER + 1.0))), 1.0)
         divided = np.minimum(wanted, most)
-        if (unknowns := _unknowns(divided, counts)) > MOST:
+        if (unknowns := _unknowns(divided, counts)) > MOST_UNKNOWNS:
             break
         chosen = divided
-        if np.sum(parts / wanted**ORDER) <= AIM and unknowns >= least:
+        if np.sum(parts / wanted**SHARE_ORDER) <= ERROR_AIM and unknowns >= least:
             break
     if chosen is None or chosen.max() == 1.0:
         return None
@@ -173,13 +174,13 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
 
 
 def _unknowns(parts: Array, counts: Indices) -> float:
-    """Return about how many unknowns a mesh has whose columns and rows, `counts` of them, are divided in `parts`."""
+    """Return the approximate number of unknowns once `counts` columns and rows are divided into `parts`."""
     columns, rows = (float(part.sum()) for part in np.split(parts, counts[:1]))
     return 2.0 * (2.0 * columns + 1.0) * (2.0 * rows + 1.0)
 
 
 def _lengths(mesh: FingerMesh) -> Array:
-    """Return the least widths (a + b,) of columns and rows [mm]."""
+    """Return the smallest width of each column and row (a + b,) [mm]."""
     lines, finger = mesh.lines, mesh.outline.finger
     fat = finger.pulp_thickness() - finger.epidermis - finger.dermis
     scales = ((lines.arcs, 1.0), (lines.bone, finger.bone_radius), (lines.fat, fat), (lines.skin, -1.0))

@@ -1,7 +1,8 @@
-"""What tissues that relax would still hold of their past when the slide of an elastic finger has settled.
+"""Estimate the overstress that relaxing tissues would still hold once an elastic finger slides steadily.
 
-The course is marched, on a rough mesh and in few steps: the press, then a slide as long as the skin follows the surface
-sideways, by when all of an elastic finger slips. A step is exact for a strain that grows evenly, so that few will do.
+The load path is marched on a coarse mesh in few steps: the press, then a slide as long as the skin follows the surface
+sideways, at whose end all of an elastic finger slips. A step is exact for a strain that grows evenly, so that few steps
+suffice.
 """
 
 from copy import copy
@@ -26,22 +27,22 @@ from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation
 
-ROUGH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
+FINENESS_OF_MARCH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
 STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualOverstress:
-    """What is still held, and when."""
+    """The overstress that remains, and when."""
 
     part: float  # of the settled SED of the ending, by which it is larger [-]
     slide_s: float  # after the slide began [s]
 
 
-def relaxing(scene: Scene) -> Scene | None:
-    """Return a scene whose tissues relax: as they are if they do, else to the moduli that they have.
+def relaxing_scene(scene: Scene) -> Scene | None:
+    """Return the scene with tissues that relax: its own series, or else literature's towards its moduli.
 
-    Their bulk modulus stays, which is not possible for tissue that is very compressible: None.
+    The bulk modulus is kept. None for tissue too compressible for that.
     """
     if scene.materials.relax:
         return scene
@@ -82,34 +83,34 @@ def with_viscosity(prediction: Prediction) -> Prediction:
 
 
 def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
-    """Return what tissues would still hold in the scene of `prediction`, whose skin says how long the slide lasts.
+    """Return the remaining overstress in the scene of `prediction`, whose skin gives the length of the slide.
 
-    None where the rough mesh has no such course. Raises Cancelled.
+    None where the coarse mesh has no such load path. Raises Cancelled.
     """
-    scene = relaxing(prediction.scene.driven(prediction.indentation))
+    scene = relaxing_scene(prediction.scene.driven(prediction.indentation))
     if scene is None or not prediction.sed_ending > 0.0:
         return None
     direction = scene.loading.direction
     touching = prediction.mesh.skin[[state != "open" for state in prediction.skin.state]]
     slide = sideways(prediction.displacement, touching) if direction else 0.0
     kind, depth = scene.solve.kinematics, scene.loading.depth
-    lasting = slide / scene.loading.speed if direction else 0.0
+    slide_s = slide / scene.loading.speed if direction else 0.0
     press, along = (np.arange(1, steps + 1) / steps for steps in STEPS[kind])
     aims = [Aim(PRESSING_TIME * part, depth * part, 0.0) for part in press.tolist()]
     if slide > 0.0:
-        aims += [Aim(PRESSING_TIME + lasting * part, depth, direction * slide * part) for part in along.tolist()]
+        aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in along.tolist()]
     try:
         if kind == "small":
             way, at_last = _small(scene)
         else:
-            finger = FiniteFinger.of(scene, Sizing(ROUGH[kind], depth, margin=MARGIN))
+            finger = FiniteFinger.of(scene, Sizing(FINENESS_OF_MARCH[kind], depth, margin=MARGIN))
             at_last = finger.sed_ending(roughly(finger, scene).u)
             way = way_of(scene, finger, relaxing=True)
         for aim in aims:
             way.go(aim)
     except SolveFailure:
         return None
-    return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), lasting) if at_last > 0.0 else None
+    return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None
 
 
 def _small(scene: Scene) -> tuple[Way, float]:
@@ -125,7 +126,7 @@ def _small(scene: Scene) -> tuple[Way, float]:
 @lru_cache(maxsize=1)
 def _rough(scene: Scene) -> tuple[LinearFinger, RelaxingBody]:
     """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
-    coarse = LinearFinger.of(scene, Sizing(ROUGH["small"], scene.loading.depth, margin=4.0))
+    coarse = LinearFinger.of(scene, Sizing(FINENESS_OF_MARCH["small"], scene.loading.depth, margin=4.0))
     body = RelaxingBody(coarse.geometry.mesh, relaxing_laws(scene.materials), checked=True)
     body.ready(PRESSING_TIME / STEPS["small"][0])
     return coarse, body

@@ -1,7 +1,7 @@
-"""From scenes that share a finger to predictions, on meshes of one fineness, an error estimate with each.
+"""Solve scenes of one finger on meshes of one fineness, each with an error estimate.
 
-Settled sliding is found directly and refused where it does not exist; a course is marched, and where tissues relax, in
-time (`solver.equilibrium.relaxation`).
+Settled sliding is solved directly, and refused where it does not exist. A load path is marched step by step, in time
+where tissues relax (`solver.equilibrium.relaxation`).
 """
 
 from abc import ABC, abstractmethod
@@ -50,49 +50,49 @@ BEYOND_THE_SKIN = NotConverged(
 
 Answer = Prediction | SolveFailure
 LoadingGroup = tuple[float, float, str]  # how deep or hard, and which way: `Scene.loading_group`
-Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # called with each answer, and its way
+Watch = Callable[[int, Answer, LinearFinger, tuple[Instant, ...] | None], None]  # position, answer, finger, load path
 
 
 class Meshing(ABC):
-    """Solves scenes of one finger on meshes of any fineness, and keeps those that may serve again."""
+    """Solves scenes of one finger on meshes of any fineness, and keeps meshes for reuse."""
 
     def __init__(self, depth: float, progress: Progress | None) -> None:
-        """Make none yet. The scenes reach a `depth` [mm], or about it where forces are given."""
+        """Start without meshes. `depth` [mm] is the deepest indentation, an estimate where forces are given."""
         self.depth, self.progress = depth, progress
 
     @abstractmethod
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
-        """Return the predictions of scenes, or why there is none, on meshes of that fineness.
+        """Return the prediction or the failure of each scene on meshes of a `fineness`.
 
         Raises SceneError where the finger cannot be meshed, Cancelled where `progress` says so.
         """
 
 
 def _audit(
-    scene: Scene, finger: Finger[Patches], one: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
+    scene: Scene, finger: Finger[Patches], solution: SceneSolution, newton: Newton, settled_sed: Callable[[], float]
 ) -> None:
-    """Complete the audits of a state and of its course, or raise the SolveFailure that they ask for.
+    """Complete the audits of a state and of its load path; raise SolveFailure where they fail.
 
-    `newton` is that of the body whose energy the course stores; `settled_sed` returns the SED of the state found
-    directly, which a course must end in.
+    `newton` belongs to the body that stores the energy of the load path. `settled_sed` returns the SED of the state
+    that was solved directly, with which a load path must end.
     """
-    checks, state, way = one.audits, one.state, one.way
+    checks, state, way = solution.audits, solution.state, solution.way
     audit.refuse_unsound(checks, state.load.depth)
-    audit.refuse_beyond_finger(finger, state, one.displacement)
+    audit.refuse_beyond_finger(finger, state, solution.displacement)
     checks |= audit.force_residuals(scene, float(state.force[1]), float(state.force[0]))
     if way is None:
         return
     relaxing = way.tissue is not None
     checks |= audit.course_audits(newton, [instant.state for instant in way.instants], relaxing=relaxing)
     if not relaxing or state.sticking == 0.0:  # stuck and relaxing, the end depends on the way
-        checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(one.displacement) - 1.0)
+        checks["course_against_direct"] = abs(settled_sed() / finger.sed_ending(solution.displacement) - 1.0)
 
 
 class SmallMeshing(Meshing):
-    """Small strain: all scenes share one mesh, and its nested one for their estimates."""
+    """Small strain: all scenes share one mesh and its nested mesh."""
 
     def __init__(self, depth: float, progress: Progress | None) -> None:
-        """Make none yet."""
+        """Start without meshes."""
         super().__init__(depth, progress)
         self._fingers: dict[Sizing, tuple[LinearFinger, float]] = {}  # and what each took to make [s]
 
@@ -104,7 +104,7 @@ class SmallMeshing(Meshing):
         return self._fingers[sizing]
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
-        """Do as `Meshing` says; where contact reaches out, all are solved again on a mesh with more skin."""
+        """Do as `Meshing` says; where contact leaves the skin considered, solve all on a mesh with more of it."""
         self._fingers = {sizing: kept for sizing, kept in self._fingers.items() if sizing.fineness == fineness}
         most = max(self.depth, min(WIDE * self.depth, scenes[0].finger.pulp_thickness()))  # for drags that lay much on
         narrow, wide = (Sizing(fineness, depth, margin=WIDE) for depth in (self.depth, most))
@@ -115,48 +115,48 @@ class SmallMeshing(Meshing):
             return [failure] * len(scenes)
 
     def _on_mesh(self, scenes: list[Scene], sizing: Sizing, watch: Watch | None, *, last: bool) -> list[Answer]:
-        """Return the answers on one mesh; none where contact must be looked for on more of the skin than this.
+        """Return the answers on one mesh; an empty list where contact leaves the skin that this mesh considers.
 
-        Of settled slides the steepest, whose contact reaches farthest, comes first. On the `last` mesh what reaches out
-        nevertheless has no answer.
+        Settled slides are solved by falling friction, since the steepest has the longest contact. On the `last` mesh a
+        scene whose contact leaves that skin gets a failure.
         """
-        finger, took = self._finger(scenes[0], sizing)
-        done: dict[int, Answer] = {}
-        # Settled slides take milliseconds and are estimated together; a course is watched as soon as it is marched.
+        finger, setup_s = self._finger(scenes[0], sizing)
+        answers: dict[int, Answer] = {}
+        # Settled slides take milliseconds and share one estimate; a load path is watched as soon as it is marched.
         every = range(len(scenes))
         steepest_first = sorted(every, key=lambda number: -float(scenes[number].friction.mu))
         marched = any(scene.solve.course == "history" for scene in scenes)
         for batch in [[number] for number in every] if marched else [steepest_first]:
             states: dict[int, SceneSolution] = {}
             for number in batch:
-                position = len(done) + len(states)
+                position = len(answers) + len(states)
                 report_part(self.progress, position / len(scenes))
                 try:
                     solved = self._solve_state(scenes[number], finger, position, len(scenes))
                 except SolveFailure as failure:
-                    done[number] = failure.in_a_sentence()
+                    answers[number] = failure.in_a_sentence()
                     continue
                 if solved is not None:
-                    states[number] = replace(solved, setup_s=took - finger.solve_s)
+                    states[number] = replace(solved, setup_s=setup_s - finger.solve_s)
                 elif last:
-                    done[number] = BEYOND_THE_SKIN
+                    answers[number] = BEYOND_THE_SKIN
                 else:
                     return []
             if states:
-                done |= zip(states, self._predict(list(states.values()), finger, sizing), strict=True)
+                answers |= zip(states, self._predict(list(states.values()), finger, sizing), strict=True)
             if watch is not None:
                 for number in batch:
-                    if done[number] is not BEYOND_THE_SKIN:
-                        watch(number, done[number], finger, states[number].elastic_way if number in states else None)
-        return [done[number] for number in every]
+                    if answers[number] is not BEYOND_THE_SKIN:
+                        watch(number, answers[number], finger, states[number].elastic_way if number in states else None)
+        return [answers[number] for number in every]
 
     def _solve_state(self, scene: Scene, finger: LinearFinger, position: int, count: int) -> SceneSolution | None:
-        """Return the state of one of `count` scenes; None where contact must be looked for on more of the skin.
+        """Return the state of one of `count` scenes; None where contact leaves the skin that the mesh considers.
 
-        Where the course is asked for, an earlier slide that never settles is refused as the last one is, with its
-        limits. Raises SolveFailure.
+        Where the load path is asked for, an earlier slide that never settles is refused with its limits. Raises
+        SolveFailure.
         """
-        begun = perf_counter()
+        start = perf_counter()
         history = scene.solve.course == "history"
         for leg in scene.earlier_slides() if history else ():
             direct(leg, finger)
@@ -165,7 +165,7 @@ class SmallMeshing(Meshing):
             steps = choose_steps(scene, finger, settled=steady)
             times = steps_of_press(scene, finger) if steps is None else steps.times
         except SolveFailure:
-            steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # nor will there be an estimate
+            steps, times = Steps(1, np.zeros(COUNT), np.zeros(COUNT)), 1  # there will be no estimate either
         if times > 1 and steps is not None:
             steady = direct(scene, finger, times)
         way, state, relaxing = None, steady, history and scene.materials.relax
@@ -183,8 +183,8 @@ class SmallMeshing(Meshing):
         in_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
-        simple = way is None and scene.normal_force is None and not state.load.path_dependent
-        if simple:  # round-off is taken out at once, else where it shows
+        directly_refinable = way is None and scene.normal_force is None and not state.load.path_dependent
+        if directly_refinable:  # other states lose their round-off only where audits show it
             state, displacement = refined(scene, finger, state, displacement)
         checks = audit.audits(finger, state, displacement)
         if not relaxing and audit.imbalance(checks) > SMALL_IMBALANCE:
@@ -193,20 +193,20 @@ class SmallMeshing(Meshing):
         solved = SceneSolution(scene, state, displacement, checks, steps, way)
         _audit(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
         warnings = tuple(filter(None, [audit.inside_out(checks), YIELDS if gives_way(scene, finger, state) else ""]))
-        return replace(solved, warnings=warnings, wall_s=perf_counter() - begun + finger.solve_s / count)
+        return replace(solved, warnings=warnings, wall_s=perf_counter() - start + finger.solve_s / count)
 
     def _predict(self, solved: list[SceneSolution], finger: LinearFinger, sizing: Sizing) -> list[Prediction]:
-        """Return the prediction of each state, with its error; numbers of all are made at once."""
-        begun = perf_counter()
+        """Return the prediction of each state with its error estimate; the numbers of all are computed together."""
+        start = perf_counter()
         numbers = finger.all_numbers([one.state for one in solved])
         displacements = np.stack([one.displacement for one in solved], axis=2)
         numbers[:, FORCES_AND_PLACES:] = finger.ending.responses(displacements)[:, 0].T
         numbers[:, 0] = numbers[:, FORCES_AND_PLACES]
         rows = finger.row.average(displacements)
         nested = nested_numbers_of_all(self._finger(solved[0].scene, replace(sizing, halved=True))[0], solved, numbers)
-        took = (perf_counter() - begun) / len(solved)
+        estimate_s = (perf_counter() - start) / len(solved)
         return [
-            prediction(one, finger, numbers[number], rows[:, number], nested[number], took)
+            prediction(one, finger, numbers[number], rows[:, number], nested[number], estimate_s)
             for number, one in enumerate(solved)
         ]
 
@@ -214,9 +214,9 @@ class SmallMeshing(Meshing):
 def nested_numbers_of_all(
     mesh: LinearFinger, solved: Sequence[SceneSolution], numbers: Array
 ) -> list[NestedNumbers | None]:
-    """Return the numbers of solved scenes on the nested `mesh`, None where one has no state there.
+    """Return the numbers of solved scenes on the nested `mesh`, None for a scene without a state there.
 
-    `numbers` (c, COUNT) are theirs on the mesh that counts.
+    `numbers` (c, COUNT) are those on the mesh of the answers.
     """
     states: dict[int, EquilibriumState] = {}
     for number, one in enumerate(solved):
@@ -236,41 +236,40 @@ def nested_numbers_of_all(
 
 
 class FiniteMeshing(Meshing):
-    """Finite strain: each scene has a mesh made for its contact, and begins on a coarse one.
+    """Finite strain: each scene starts on a coarse mesh and is refined on a mesh made for its contact.
 
-    Scenes pressed alike and moved the same way share meshes and are solved one after the other, friction rising, each
-    begun at the one before.
+    Scenes that are pressed and move alike share meshes. They are solved by rising friction, each from the one before.
     """
 
     def __init__(self, depth: float, progress: Progress | None) -> None:
-        """Make none yet."""
+        """Start without meshes."""
         super().__init__(depth, progress)
         self._meshes: dict[LoadingGroup, Meshes] = {}
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:  # noqa: ARG002 - of small strain
         """Do as `Meshing` says."""
-        done: dict[int, Answer] = {}
-        with interruptible(self.progress, lambda: len(done) / len(scenes)):
+        answers: dict[int, Answer] = {}
+        with interruptible(self.progress, lambda: len(answers) / len(scenes)):
             for number in sorted(range(len(scenes)), key=lambda n: alike(scenes[n])):
                 check_stop()
-                begun, scene = perf_counter(), scenes[number]
+                start, scene = perf_counter(), scenes[number]
                 report_progress("solving on a finer mesh" if isinstance(fineness, Lines) else "solving on a mesh")
                 meshes = self._meshes.setdefault(scene.loading_group, Meshes())
                 meshes.keep(fineness)
                 try:
-                    low = coarse_solution(scene, self.depth, fineness, meshes)
-                    done[number] = _predict(scene, refine(scene, fineness, low, meshes), meshes, begun)
+                    coarse = coarse_solution(scene, self.depth, fineness, meshes)
+                    answers[number] = _predict(scene, refine(scene, fineness, coarse, meshes), meshes, start)
                 except SolveFailure as failure:
-                    done[number] = failure
-        return [done[number] for number in range(len(scenes))]
+                    answers[number] = failure
+        return [answers[number] for number in range(len(scenes))]
 
 
 def alike(scene: Scene) -> tuple[LoadingGroup, float]:
-    """Return what scenes are sorted by, so that neighbours are alike: how they are pressed, then their friction."""
+    """Return a key that sorts scenes by how they are pressed, then by friction, so that neighbours are similar."""
     return scene.loading_group, float(scene.friction.mu)
 
 
-def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: float) -> Prediction:
+def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float) -> Prediction:
     """Return the prediction of a scene solved at finite strain. Raises SolveFailure, Cancelled."""
     top, steps = nested.top, nested.steps
     finger, state, way = top.finger, top.state, None
@@ -289,24 +288,24 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, begun: float)
     solved = SceneSolution(scene, state, state.u, checks, steps, way)
     _audit(scene, finger, solved, newton, lambda: finger.sed_ending(top.state.u))
     numbers = finger.all_numbers([state])[0]
-    before_estimate = perf_counter()
+    solved_at = perf_counter()
     report_progress("estimating errors, on the nested mesh")
-    there, steps = solve_nested(scene, top, steps, meshes)
-    finer = None if there is None else with_shares(scene, numbers, there, steps)
+    on_nested, steps = solve_nested(scene, top, steps, meshes)
+    nested_numbers = None if on_nested is None else with_shares(scene, numbers, on_nested, steps)
     row = finger.row.average(state.u)
-    took = perf_counter() - before_estimate
-    warnings, wall = doubts(finger, state), before_estimate - begun - setup
+    estimate_s = perf_counter() - solved_at
+    warnings, wall = doubts(finger, state), solved_at - start - setup
     solved = replace(solved, steps=steps, warnings=warnings, wall_s=wall, setup_s=setup)
-    return prediction(solved, finger, numbers, row, finer, took)
+    return prediction(solved, finger, numbers, row, nested_numbers, estimate_s)
 
 
 def _balance(
     finger: FiniteFinger, newton: Newton, state: EquilibriumState
 ) -> tuple[EquilibriumState, dict[str, float]]:
-    """Return a state and its checks, its displacements so good that no force is left over but by round-off.
+    """Return a state and its audits after further Newton steps that bring unbalanced forces down to round-off.
 
-    `newton` is the finger's own, or that of its tissues as they relax. Displacements good to a part of a nanometre
-    leave much of a light touch on a nearly incompressible body unbalanced.
+    `newton` is that of the finger, or of its relaxing tissues. Under a light touch, errors of displacements far below a
+    nanometre leave a large part of the forces on nearly incompressible tissue unbalanced.
     """
     checks = _audits(finger, newton, state)
     for _ in range(CORRECTIONS):
@@ -315,13 +314,15 @@ def _balance(
         x = state.place(newton.condensed)[:, 0]
         if not newton.linearise(state, state.load, x):
             break
-        after, _, _ = newton.moved(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
-        after = replace(after, state=state.state, sense=state.sense)  # a step of nanometres turns no slip into stick
-        better = _audits(finger, newton, after)
-        worse = _contradicting(better) > max(_contradicting(checks), FINITE_IMBALANCE)
-        if worse or audit.imbalance(better) >= audit.imbalance(checks):
+        corrected, _, _ = newton.moved(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+        corrected = replace(
+            corrected, state=state.state, sense=state.sense
+        )  # a step of nanometres changes no contact state
+        corrected_checks = _audits(finger, newton, corrected)
+        worse = _contradicting(corrected_checks) > max(_contradicting(checks), FINITE_IMBALANCE)
+        if worse or audit.imbalance(corrected_checks) >= audit.imbalance(checks):
             break
-        state, checks = after, better
+        state, checks = corrected, corrected_checks
     return state, checks
 
 

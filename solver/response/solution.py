@@ -1,4 +1,4 @@
-"""From scenes to predictions: one mesh for all that share a finger, and an error estimate with every answer."""
+"""Solve scenes to a prediction with an error estimate each, refining the mesh until tolerances are met."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,17 +21,19 @@ from solver.progress import Progress, interruptible, report_progress
 from solver.response.answers import MESHINGS, Answer, Meshing, Watch
 from solver.scene import Scene
 
-KNOWN = 0.03  # of a limit of friction, to which it is known
-WORTH = 0.1  # error estimate up to which a coarser mesh's number near a limit is worth more than the limit alone
+LIMIT_ACCURACY = 0.03  # relative, of a friction limit
+USABLE_ESTIMATE = 0.1  # largest error estimate with which a coarser mesh's answer near a limit is still given
 NEAR_LIMIT = "That mesh ends settled sliding at mu = {:.3g}, which is known to {:.0f} %: this state may lie beyond."
-MISSES = "The finest mesh leaves an error estimate above the tolerance asked for."
-UNKNOWN = "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
+TOLERANCE_MISSED = "The finest mesh leaves an error estimate above the tolerance asked for."
+ERROR_UNKNOWN = (
+    "How far this is off is not known, since the nested mesh has no such state: ask for less friction or depth."
+)
 NOT_NESTED = NotConverged("The nested mesh has no such state.")
-DEFAULT = {"small": 8.0, "finite": 6.0}  # fineness where no tolerance is asked for: estimates of 0.1 % and 0.4 %
-FIRST = 4.0  # fineness where one is asked for: on 3 and on 5 ten surfaces take as long to 1 %
-NEXT = 1.2  # times as fine, or as coarse, is the mesh that is asked next where one may have no state by chance
-NOT_KNOWN = 4.0  # times the tolerance, that an error is taken for of which nothing is known
-Rough = Callable[[Prediction], None]  # called with an answer before it is refined: what there is, should work stop
+DEFAULT_FINENESS = {"small": 8.0, "finite": 6.0}  # without a tolerance: error estimates of 0.1 % and 0.4 %
+FIRST_FINENESS = 4.0  # with a tolerance: from 3 and from 5 ten surfaces take as long to 1 %
+FINENESS_RATIO = 1.2  # to the next mesh that is tried where one mesh may have no state by chance
+ASSUMED_ERROR = 4.0  # by the tolerance, where nothing is known of the error
+Rough = Callable[[Prediction], None]  # called with each answer that is to be refined, to be kept if work stops
 
 
 def solve(scene: Scene, progress: Progress | None = None, *, rough: Rough | None = None) -> Prediction:
@@ -51,24 +53,24 @@ def solve_many(
 ) -> tuple[Prediction | SolveFailure, ...]:
     """Return the prediction of each scene, in their order, or the failure that says why it has none.
 
-    Scenes with the same finger, materials and receptor share meshes; those whose tolerance is missed are solved again
-    on a finer one. Where a `contrast_tolerance` is asked for, surfaces pressed alike share a mesh so fine that
-    differences in SED between them are as good as that, as estimated. Where they may be off by more than 5 % of their
-    range, a warning says by how much.
+    Scenes with the same finger, materials and receptor share meshes. A scene that misses its tolerance is solved again
+    on a finer mesh. With a `contrast_tolerance`, surfaces that are pressed alike share a mesh on which the estimated
+    error of their differences in SED meets it. A warning says where differences may be off by more than 5 % of their
+    range.
 
-    At small strain `watch` is given each answer, by the position of its scene, as soon as it is found, with the finger
-    and the way that led to it; where another mesh is needed it is given once more. `rough` is given the answers that a
-    tolerance sends to a finer mesh, or that await their evidence. Raises SceneError where a finger cannot be meshed,
-    Cancelled where `progress` says so.
+    At small strain `watch` receives each answer as soon as it is known: the position of its scene, the answer, the
+    finger and the load path. It receives the answer again from every finer mesh. `rough` receives answers before they
+    are refined or completed by evidence. Raises SceneError where a finger cannot be meshed, Cancelled where `progress`
+    says so.
     """
-    known: dict[int, tuple[Answer, Answer]] = {}  # an answer's evidence is made once
+    completed: dict[int, tuple[Answer, Answer]] = {}  # by its id, an answer and the same with evidence
 
     def add_evidence(answer: Answer) -> Answer:
-        if id(answer) not in known:
+        if id(answer) not in completed:
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-            known[id(answer)] = answer, _with_evidence(answer, progress)
-        return known[id(answer)][1]
+            completed[id(answer)] = answer, _with_evidence(answer, progress)
+        return completed[id(answer)][1]
 
     def watch_with_evidence(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
         assert watch is not None
@@ -81,7 +83,7 @@ def solve_many(
 def _answers(
     scenes: Sequence[Scene], progress: Progress | None = None, watch: Watch | None = None, rough: Rough | None = None
 ) -> tuple[Answer, ...]:
-    """Do the same, evidence as far as it comes with the answers."""
+    """Return the answers of `solve_many` before `_with_evidence`."""
     out: dict[int, Answer] = {}
     for group in _groups(scenes):
         answers = _solve_group([scenes[i] for i in group], progress, _within(watch, group), rough)
@@ -91,7 +93,7 @@ def _answers(
 
 
 def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
-    """Return the answer with its evidence marched, and measured where its scene asks for that."""
+    """Return a prediction with its evidence on omitted effects, as `scene.solve.evidence` asks; a failure as it is."""
     if not isinstance(prediction, Prediction) or prediction.scene.solve.evidence == "quick":
         return prediction
     report_progress("estimating what the model leaves out")
@@ -104,15 +106,16 @@ def _with_evidence(prediction: Answer, progress: Progress | None) -> Answer:
     return measure_differences(prediction, lambda scenes: _answers(scenes, progress))
 
 
-def _with_earlier_slides(prediction: Prediction, solved: Answers) -> Prediction:
-    """Return a settled answer with a warning of every slide before that would not have settled, on a coarse mesh."""
-    before = prediction.scene.earlier_slides() if prediction.scene.solve.course == "steady" else ()
-    quick = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in before]
-    lost = [leg for leg in solved(quick) if isinstance(leg, SolveFailure)] if quick else []
-    more = (
-        f"A slide before this one, the other way, has no settled state that it could come from: {leg}" for leg in lost
+def _with_earlier_slides(prediction: Prediction, solve: Answers) -> Prediction:
+    """Return a prediction with a warning for each earlier slide that has no settled state on a coarse mesh."""
+    earlier = prediction.scene.earlier_slides() if prediction.scene.solve.course == "steady" else ()
+    coarse = [replace(leg, solve=replace(leg.solve, tolerance=COARSE, evidence="estimated")) for leg in earlier]
+    failures = [leg for leg in solve(coarse) if isinstance(leg, SolveFailure)] if coarse else []
+    sentences = (
+        f"A slide before this one, the other way, has no settled state that it could come from: {leg}"
+        for leg in failures
     )
-    return replace(prediction, warnings=(*prediction.warnings, *more))
+    return replace(prediction, warnings=(*prediction.warnings, *sentences))
 
 
 def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
@@ -123,7 +126,7 @@ def _groups(scenes: Sequence[Scene]) -> list[list[int]]:
 
 
 def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
-    """Return `watch` for a group, called with positions in the group."""
+    """Return `watch` for the scenes of a `group`, called with positions among them."""
     if watch is None:
         return None
     return lambda number, answer, finger, way: watch(group[number], answer, finger, way)
@@ -132,125 +135,133 @@ def _within(watch: Watch | None, group: Sequence[int]) -> Watch | None:
 def _solve_group(
     scenes: list[Scene], progress: Progress | None, watch: Watch | None, rough: Rough | None
 ) -> list[Answer]:
-    """Solve scenes that share a mesh on the coarsest that does."""
+    """Return the answers of scenes that share meshes."""
     kind = scenes[0].solve.kinematics
     depth = max(expected_depth(scene) for scene in scenes)
-    limited = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
-    fineness = FIRST if limited else DEFAULT[kind]
-    on_mesh = MESHINGS[kind](depth, progress)
-    marched = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
-    if marched and (limited or compared_sets(scenes)):
-        return _march(scenes, fineness, on_mesh, watch)
-    refined = _refine(scenes, fineness, on_mesh, watch, rough)
-    return [_add_warnings(answer, more) for answer, more in zip(refined.answers, refined.warnings, strict=True)]
+    has_tolerance = any(scene.solve.tolerance or scene.solve.contrast_tolerance for scene in scenes)
+    fineness = FIRST_FINENESS if has_tolerance else DEFAULT_FINENESS[kind]
+    meshing = MESHINGS[kind](depth, progress)
+    has_course = kind == "small" and any(scene.solve.course == "history" for scene in scenes)
+    if has_course and (has_tolerance or compared_sets(scenes)):
+        return _march(scenes, fineness, meshing, watch)
+    refinement = _refine(scenes, fineness, meshing, watch, rough)
+    return [_add_warnings(answer, more) for answer, more in zip(refinement.answers, refinement.warnings, strict=True)]
 
 
-def _march(scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None) -> list[Answer]:
-    """March courses on the mesh that their settled ends ask for, so that each is marched, and watched, once.
+def _march(scenes: list[Scene], fineness: float, meshing: Meshing, watch: Watch | None) -> list[Answer]:
+    """Return the answers of load paths, each marched once, on the mesh that the settled states need.
 
-    What is to be said of an end is said of its course.
+    Warnings of a settled state hold for its load path too.
     """
     ends = [replace(scene, solve=replace(scene.solve, course="steady")) for scene in scenes]
-    ended = _refine(ends, fineness, on_mesh, None, None)
-    out: dict[int, Answer] = {}
+    refinement = _refine(ends, fineness, meshing, None, None)
+    answers_of_courses: dict[int, Answer] = {}
 
     def record(number: int, answer: Answer, finger: LinearFinger, way: tuple[Instant, ...] | None) -> None:
-        out[number] = _add_warnings(answer, ended.warnings[number])
+        answers_of_courses[number] = _add_warnings(answer, refinement.warnings[number])
         if watch is not None:
-            watch(number, out[number], finger, way)
+            watch(number, answers_of_courses[number], finger, way)
 
-    answers = on_mesh.answers(scenes, ended.fineness, record)
-    return [out.get(number, answer) for number, answer in enumerate(answers)]
+    answers = meshing.answers(scenes, refinement.fineness, record)
+    return [answers_of_courses.get(number, answer) for number, answer in enumerate(answers)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Refinement:
-    """What was found of scenes that share a mesh."""
+    """The answers of scenes that share meshes, after the last refinement."""
 
     answers: list[Answer]
-    warnings: list[tuple[str, ...]]  # of each, sentences about what the finest mesh has left undone
+    warnings: list[tuple[str, ...]]  # of each answer, about what the finest mesh leaves open
     fineness: float | Lines  # of the last mesh
 
 
 def _refine(
-    scenes: list[Scene], fineness: float, on_mesh: Meshing, watch: Watch | None, rough: Rough | None
+    scenes: list[Scene], fineness: float, meshing: Meshing, watch: Watch | None, rough: Rough | None
 ) -> _Refinement:
-    """Refine until every estimate is known and meets its tolerance, of differences too, or no mesh is finer.
+    """Refine until every error estimate meets its tolerance, those of contrasts too, or no mesh may be finer.
 
-    Scenes that share a mesh are solved again together on the finer one. Where that has no answer, the coarser mesh's
-    is the answer if it `_stands`.
+    Scenes that share a mesh share the finer one. Where that has no state, `_coarser_counts` decides which answer stays.
     """
-    surfaces, kind = compared_sets(scenes), scenes[0].solve.kinematics
+    contrast_sets, kind = compared_sets(scenes), scenes[0].solve.kinematics
     answers: dict[int, Answer] = {}
-    best: dict[int, Answer] = {}  # of each, by its estimate
-    lost: dict[int, SolveFailure] = {}  # what finer meshes made of scenes whose coarser answers stand
+    best: dict[int, Answer] = {}  # of each scene the answer with the smallest estimate
+    failures: dict[int, SolveFailure] = {}  # on finer meshes, of scenes whose coarser answers count
     work: dict[float | Lines, list[int]] = {fineness: list(range(len(scenes)))}
-    last: float | Lines = fineness
+    mesh: float | Lines = fineness
     while True:
-        for last, todo in work.items():
-            solved = on_mesh.answers([scenes[i] for i in todo], last, watch)
+        for mesh, todo in work.items():
+            solved = meshing.answers([scenes[i] for i in todo], mesh, watch)
             for i, answer in zip(todo, solved, strict=True):
                 failure = _loss(answer, answers.get(i))
                 if failure is not None:
-                    lost[i] = failure
+                    failures[i] = failure
                     continue
                 answers[i] = answer
                 best[i] = min(answer, best.get(i, answer), key=_estimate)
-        limits = last != FIRST
-        missed = [0.0 if i in lost else _error_by_tolerance(answers[i], limits=limits) for i in range(len(scenes))]
-        apart = [
-            contrast_error([p for i in together if isinstance(p := answers[i], Prediction)]) for together in surfaces
+        limits_known = mesh != FIRST_FINENESS
+        errors = [
+            0.0 if i in failures else _error_by_tolerance(answers[i], limits_known=limits_known)
+            for i in range(len(scenes))
         ]
-        # What has no state on a finer mesh stays as it is, or there would be no end.
+        contrasts = [
+            contrast_error([p for i in together if isinstance(p := answers[i], Prediction)])
+            for together in contrast_sets
+        ]
+        # A scene without a state on a finer mesh is not refined again, or the loop would not end.
         refinable = [
-            [i for i in together if isinstance(answers[i], Prediction) and i not in lost] for together in surfaces
+            [i for i in together if isinstance(answers[i], Prediction) and i not in failures]
+            for together in contrast_sets
         ]
-        wanted = _error_reductions(scenes, missed, refinable, apart)
-        work = _finer({i: answers[i] for i in sorted(wanted)}, wanted, DEFAULT[kind])
+        reductions = _error_reductions(scenes, errors, refinable, contrasts)
+        work = _finer({i: answers[i] for i in sorted(reductions)}, reductions, DEFAULT_FINENESS[kind])
         if not work:
             break
         for answer in answers.values():
             if rough is not None and isinstance(answer, Prediction):
                 rough(answer)
-    answers |= {i: best[i] for i, miss in enumerate(missed) if miss > 1.0}
+    answers |= {i: best[i] for i, miss in enumerate(errors) if miss > 1.0}
     if kind == "finite":  # where a fine mesh may lose its way
-        lost |= _fallen_back(scenes, answers, fineness, on_mesh)
-    of = {i: off for together, off in zip(surfaces, apart, strict=True) for i in together}
-    warnings = [_sentences(of.get(i), missed[i], answers[i], lost.get(i)) for i in range(len(scenes))]
-    return _Refinement([answers[i] for i in range(len(scenes))], warnings, last)
+        failures |= _fall_back(scenes, answers, fineness, meshing)
+    contrast_of = {i: off for together, off in zip(contrast_sets, contrasts, strict=True) for i in together}
+    warnings = [_sentences(contrast_of.get(i), errors[i], answers[i], failures.get(i)) for i in range(len(scenes))]
+    return _Refinement([answers[i] for i in range(len(scenes))], warnings, mesh)
 
 
 def _error_reductions(
-    scenes: Sequence[Scene], missed: Sequence[float], surfaces: Sequence[Sequence[int]], apart: Sequence[ContrastError]
+    scenes: Sequence[Scene],
+    errors: Sequence[float],
+    contrast_sets: Sequence[Sequence[int]],
+    contrasts: Sequence[ContrastError],
 ) -> dict[int, float]:
-    """Return by what the errors of scenes to be solved again have to fall: what is compared shares a mesh.
+    """Return by what factor the error of each scene that is solved again has to fall.
 
-    `missed` are the errors of all by their tolerances, `apart` those of differences within each of the sets `surfaces`.
+    `errors` are those of all scenes by their tolerances, `contrasts` those of differences within each of
+    `contrast_sets`. Surfaces that are compared are refined together.
     """
-    out = {i: miss for i, miss in enumerate(missed) if miss > 1.0}
-    for together, off in zip(surfaces, apart, strict=True):
+    out = {i: miss for i, miss in enumerate(errors) if miss > 1.0}
+    for together, off in zip(contrast_sets, contrasts, strict=True):
         tolerance = min((t for i in together if (t := scenes[i].solve.contrast_tolerance)), default=np.inf)
         if tolerance < np.inf and (off.share > tolerance or any(i in out for i in together)):
-            out |= {i: max(missed[i], off.share / tolerance) for i in together}
+            out |= {i: max(errors[i], off.share / tolerance) for i in together}
     return out
 
 
 def _finer(
-    answers: Mapping[int, Answer], wanted: Mapping[int, float], default: float
+    answers: Mapping[int, Answer], reductions: Mapping[int, float], default: float
 ) -> dict[float | Lines, list[int]]:
-    """Return the scenes to be solved again on each finer mesh, none where none may be finer.
+    """Return the scenes to be solved again by the finer mesh that each needs; none where no mesh may be finer.
 
-    `answers` are those of scenes whose errors have to fall by what is `wanted` of each. What had a mesh together keeps
-    one together. A refusal is asked once more at the `default` fineness.
+    The errors of these `answers` have to fall by `reductions`. Scenes that share a mesh share the finer one. A scene
+    without a state is solved once more at the `default` fineness.
     """
-    on: dict[FingerMesh | None, list[int]] = {}
+    members: dict[FingerMesh | None, list[int]] = {}
     for i, answer in answers.items():
-        on.setdefault(answer.geometry if isinstance(answer, Prediction) else None, []).append(i)
+        members.setdefault(answer.geometry if isinstance(answer, Prediction) else None, []).append(i)
     out: dict[float | Lines, list[int]] = {}
-    for mesh, together in on.items():
+    for mesh, together in members.items():
         finer: float | Lines | None = default
         if mesh is not None:
-            nested = [(wanted[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
+            nested = [(reductions[i], one.nested) for i in together if isinstance(one := answers[i], Prediction)]
             parts = [miss * one.shares for miss, one in nested if one is not None and one.shares is not None]
             unknown = any(one is None for _, one in nested)
             finer = refine_lines(mesh, None if unknown or not parts else np.max(parts, axis=0))
@@ -259,87 +270,93 @@ def _finer(
     return out
 
 
-def _fallen_back(
-    scenes: list[Scene], answers: dict[int, Answer], first: float, on_mesh: Meshing
+def _fall_back(
+    scenes: list[Scene], answers: dict[int, Answer], first_fineness: float, meshing: Meshing
 ) -> dict[int, SolveFailure]:
-    """Put answers of coarser meshes in place of what the `first` mesh has none of; return what that made of them.
+    """Solve scenes without a state at `first_fineness` on a coarser mesh; return the failures that this replaces.
 
-    Where friction is steep any one mesh may have no state, and the next finer one is asked at last.
+    Under steep friction a single mesh may have no state by chance, and a slightly finer one is tried at last.
     """
-    lost: dict[int, SolveFailure] = {}
+    replaced: dict[int, SolveFailure] = {}
     for i, scene in enumerate(scenes):
         if isinstance(failure := answers[i], SolveFailure) and _is_doubtful(scene, failure):
-            answer = on_mesh.answers([scene], first / NEXT)[0]
-            if _stands(answer, failure):
-                answers[i], lost[i] = answer, failure
+            answer = meshing.answers([scene], first_fineness / FINENESS_RATIO)[0]
+            if _coarser_counts(answer, failure):
+                answers[i], replaced[i] = answer, failure
         if isinstance(answers[i], NotConverged) and scene.friction.mu > STEEP:
-            answers[i] = on_mesh.answers([scene], first * NEXT)[0]
-    return lost
+            answers[i] = meshing.answers([scene], first_fineness * FINENESS_RATIO)[0]
+    return replaced
 
 
 def _is_doubtful(scene: Scene, failure: SolveFailure) -> bool:
-    """Return whether there may be a state nevertheless: none was found, or the limit is as near as limits are known."""
+    """Return whether a state may exist despite the failure: not converged, or a limit within its accuracy."""
     if isinstance(failure, NotConverged):
         return True
     limit = failure.limit_mu
-    return limit is not None and float(scene.friction.mu) <= (1.0 + KNOWN) * limit
+    return limit is not None and float(scene.friction.mu) <= (1.0 + LIMIT_ACCURACY) * limit
 
 
-def _stands(coarser: Answer, failure: SolveFailure) -> bool:
-    """Return whether the answer of a coarser mesh counts where a finer one has none.
+def _coarser_counts(coarser: Answer, failure: SolveFailure) -> bool:
+    """Return whether the answer of a coarser mesh counts where a finer mesh has no state.
 
-    Where the finer one is sure that there is none it is not; nor near a limit at which numbers grow so that the coarser
-    mesh knows little of them: then the limit is the answer.
+    It does not where the finer mesh shows that no state exists, nor where its own error estimate is too large, as close
+    to a limit: then the limit is the answer.
     """
     if not isinstance(coarser, Prediction) or not _is_doubtful(coarser.scene, failure):
         return False
-    return isinstance(failure, NotConverged) or coarser.error_estimate <= WORTH
+    return isinstance(failure, NotConverged) or coarser.error_estimate <= USABLE_ESTIMATE
 
 
 def _loss(answer: Answer, coarser: Answer | None) -> SolveFailure | None:
-    """Return why the answer of a coarser mesh, if there is one, counts in place of this one; None where it does not."""
+    """Return the failure for which the answer of the coarser mesh counts in place of this one, or None."""
     failure = answer if isinstance(answer, SolveFailure) else None
     if isinstance(answer, Prediction) and answer.nested is None and _estimate(coarser) < 1.0:
         failure = NOT_NESTED
-    return failure if failure is not None and coarser is not None and _stands(coarser, failure) else None
+    return failure if failure is not None and coarser is not None and _coarser_counts(coarser, failure) else None
 
 
 def _estimate(answer: Answer | None) -> float:
-    """Return the error estimate of an answer; 1 where nothing is known."""
+    """Return the error estimate of an answer, 1 where it is not known."""
     return answer.error_estimate if isinstance(answer, Prediction) and answer.nested is not None else 1.0
 
 
-def _sentences(off: ContrastError | None, missed: float, answer: Answer, lost: SolveFailure | None) -> tuple[str, ...]:
-    """Return what is to be said of an answer for what the finest mesh has left undone."""
+def _sentences(
+    contrast: ContrastError | None, error: float, answer: Answer, failure: SolveFailure | None
+) -> tuple[str, ...]:
+    """Return the warnings of an answer from the finest mesh."""
     warnings: list[str] = []
-    if lost is not None:
+    if failure is not None:
         warnings.append("A finer mesh did not find this state: this is the coarser one's, and its error estimate.")
-        if lost.limit_mu is not None:
-            warnings.append(NEAR_LIMIT.format(lost.limit_mu, 100.0 * KNOWN))
+        if failure.limit_mu is not None:
+            warnings.append(NEAR_LIMIT.format(failure.limit_mu, 100.0 * LIMIT_ACCURACY))
     if isinstance(answer, Prediction) and answer.nested is None:
-        warnings.append(UNKNOWN)
-    elif missed > 1.0:
-        warnings.append(MISSES)
-    if off is not None and off.warning:
-        warnings.append(off.warning)
+        warnings.append(ERROR_UNKNOWN)
+    elif error > 1.0:
+        warnings.append(TOLERANCE_MISSED)
+    if contrast is not None and contrast.warning:
+        warnings.append(contrast.warning)
     return tuple(warnings)
 
 
-def _add_warnings(answer: Answer, more: tuple[str, ...]) -> Answer:
-    """Return the answer with more warnings."""
-    return replace(answer, warnings=(*answer.warnings, *more)) if more and isinstance(answer, Prediction) else answer
+def _add_warnings(answer: Answer, sentences: tuple[str, ...]) -> Answer:
+    """Return the answer with further warnings."""
+    return (
+        replace(answer, warnings=(*answer.warnings, *sentences))
+        if sentences and isinstance(answer, Prediction)
+        else answer
+    )
 
 
-def _error_by_tolerance(answer: Answer, *, limits: bool) -> float:
-    """Return an answer's error estimate by the tolerance of its scene; 4 where nothing is known of the error.
+def _error_by_tolerance(answer: Answer, *, limits_known: bool) -> float:
+    """Return an answer's error estimate by the tolerance of its scene, `ASSUMED_ERROR` where it is not known.
 
-    So it is of a refusal on a mesh whose `limits` are not known to 3 %.
+    A refusal counts as unknown unless `limits_known`: unless its mesh gives limits to 3 %.
     """
-    if isinstance(answer, NoSteadyState) and not limits:
-        return NOT_KNOWN
+    if isinstance(answer, NoSteadyState) and not limits_known:
+        return ASSUMED_ERROR
     if not isinstance(answer, Prediction):
         return 0.0
     if answer.nested is None:
-        return NOT_KNOWN
+        return ASSUMED_ERROR
     tolerance = answer.scene.solve.tolerance
     return 0.0 if tolerance is None else answer.error_estimate / tolerance

@@ -11,7 +11,7 @@ from daq_app.accuracy_page.figures import plates
 from daq_app.accuracy_page.page import Table, page, tables, write
 from daq_app.child_process import interpreter
 from solver import solve
-from solver.response.solution import DEFAULT
+from solver.response.solution import DEFAULT_FINENESS
 from solver.verification import estimates, targets
 from solver.verification.costs import Cost, shares
 from solver.verification.estimates import Estimate, GuaranteedCost
@@ -126,7 +126,7 @@ def test_time_is_drawn_against_the_error_that_is_guaranteed_and_against_the_true
 
 def test_what_is_timed_at_finite_strain_is_what_the_program_answers():
     scene = next(s for s in cases("finite") if s.title == "slipperiness 100")
-    timed_way = FiniteMethod(scene, DEFAULT["finite"], False)
+    timed_way = FiniteMethod(scene, DEFAULT_FINENESS["finite"], False)
     found = timed_way.numbers(timed_way.solve(scene))
     answer = solve(scene)
     assert found == pytest.approx([answer.sed_ending, answer.normal_force, answer.tangential_force], rel=1e-9)

@@ -12,7 +12,7 @@ from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium import LoadState
 from solver.equilibrium.load_stepping import settled
 from solver.response import answers
-from solver.response.solution import UNKNOWN
+from solver.response.solution import ERROR_UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 from solver.verification.methods import FiniteMethod
 from tests.solver.finite_examples import published
@@ -169,4 +169,4 @@ def test_an_answer_that_the_nested_mesh_has_not_is_solved_on_a_finer_one_or_said
     monkeypatch.setattr(answers, "solve_nested", lost)
     found = solve(Scene(friction=Friction(0.3), loading=Loading(0.5, "+x"), solve=Solve("finite", evidence="quick")))
     assert (found.error_estimate < 0.01) == known
-    assert (UNKNOWN in found.warnings) == (not known)
+    assert (ERROR_UNKNOWN in found.warnings) == (not known)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver import Friction, Loading, Material, Relaxation, Scene, SceneError, Solve, solve
-from solver.accuracy.residual_overstress import relaxing
+from solver.accuracy.residual_overstress import relaxing_scene
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
 
@@ -103,5 +103,5 @@ def test_a_relaxing_finger_solved_as_settled_is_told_what_it_still_holds_and_one
 )
 def test_what_tissues_would_still_hold_is_what_a_course_in_small_steps_on_a_finer_mesh_has(kinematics, surface):
     settled = solve(replace(scene(surface), solve=Solve(kinematics)))
-    marched = solve(replace(relaxing(settled.scene), solve=Solve(kinematics, "history")))
+    marched = solve(replace(relaxing_scene(settled.scene), solve=Solve(kinematics, "history")))
     assert entry(settled, "viscosity")["estimate"] == pytest.approx(still_held(settled, marched), rel=0.1)

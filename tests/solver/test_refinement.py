@@ -7,7 +7,7 @@ import pytest
 
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import adaptivity, refinement
-from solver.accuracy.refinement import MOST, NestedGrid, adjoint, refine_lines
+from solver.accuracy.refinement import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
 from solver.continuation.small_states import WIDE
 from solver.continuation.small_states import settled as settled_state
 from solver.equilibrium import Newton
@@ -94,13 +94,13 @@ def test_refined_lines_contain_the_old_ones_and_no_more_than_a_mesh_may_have():
         assert set(mesh.lines.arcs) < set(lines.arcs)
         assert np.all(np.diff(lines.arcs) > 0.0)
         assert np.all(np.diff(lines.skin) < 0.0)
-        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.dofs <= MOST
+        assert LinearFinger.of(SLIDES["slip"], replace(COARSE, fineness=lines)).body.dofs <= MOST_UNKNOWNS
     assert len(few.arcs) < len(many.arcs)
     assert len(halves.arcs) == 2 * len(mesh.lines.arcs) - 1
 
 
 def test_refinement_comes_to_an_end(monkeypatch):
-    monkeypatch.setattr(refinement, "MOST", 4000)
+    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 4000)
     scene, dofs = scenes()[9], []
     asked = replace(scene, solve=replace(scene.solve, tolerance=1e-4, evidence="quick"))
     tight = solve(asked, rough=lambda rough: dofs.append(rough.dofs))
@@ -117,7 +117,7 @@ def test_refinement_comes_to_an_end(monkeypatch):
 
 
 def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monkeypatch):
-    monkeypatch.setattr(refinement, "MOST", 3000)
+    monkeypatch.setattr(refinement, "MOST_UNKNOWNS", 3000)
     asked = Solve("finite", contrast_tolerance=0.0005)
     surfaces = [Scene(friction=Friction(mu), loading=Loading(2.0, "+x"), solve=asked) for mu in (0.2, 0.25, 0.9)]
     rounds = []

@@ -75,7 +75,7 @@ def test_a_state_as_near_its_limit_as_limits_are_known_is_told_by_a_coarser_mesh
 
 def test_a_number_of_which_little_is_known_near_its_limit_gives_way_to_the_limit(monkeypatch):
     meshing(monkeypatch, NoSteadyState("beyond", limit_mu=0.299), missed=far_off)
-    monkeypatch.setattr(solution, "WORTH", 1e-6)
+    monkeypatch.setattr(solution, "USABLE_ESTIMATE", 1e-6)
     with pytest.raises(NoSteadyState, match=r"^Beyond\.$"):
         solve(stiffening(0.3, 0.01))
 
