@@ -60,7 +60,8 @@ def numbers(state: AnalystState) -> tuple[tuple[str, str], ...]:
         return ()
     lines: list[tuple[str, str]] = []
     if (stroke := row.stroke) is not None:
-        interval = "" if stroke.mu_interval is None else f"  [{stroke.mu_interval[0]:.3f}, {stroke.mu_interval[1]:.3f}]"
+        ends = stroke.mu_dynamic_interval
+        interval = "" if ends is None else f"  [{ends[0]:.3f}, {ends[1]:.3f}]"
         lines += [
             (tr("µ over the steady window"), _value(stroke, "mu_dynamic", "{:.3f}" + interval)),
             (tr("µ at its greatest"), _value(stroke, "mu_max", "{:.3f}")),
@@ -230,7 +231,7 @@ def _value(of: StrokeFinding | PredictionFinding, name: str, form: str, factor: 
 
 
 def _friction_line(s: StrokeFinding) -> tuple[str, ...]:
-    low, high = s.mu_interval or (None, None)
+    low, high = s.mu_dynamic_interval or (None, None)
     tau = None if s.tau_max is None else 1000.0 * s.tau_max
     return (
         tr("stroke {number}", number=s.number) if s.trial is None else str(s.trial),

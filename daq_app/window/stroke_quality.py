@@ -187,5 +187,5 @@ class Judge:
 def _warm() -> None:
     """Load what the analysis needs, and let this process go behind window and recorder."""
     give_way()
-    for name in ("scipy.linalg.lapack", "scipy.special"):
+    for name in ("scipy.signal", "scipy.special"):
         import_module(name)

@@ -126,9 +126,9 @@ def known_error(prediction: Prediction, error: float | None) -> float | None:
     return None if prediction.nested is None else error
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class TrialPrediction:
-    """What the model says of one trial, or of one stroke of a recording without trials.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialNumbers:
+    """The numbers that the model gives of one trial, or of one stroke of a recording without trials.
 
     A number is None where `reasons` says why, under the number's name.
     """
@@ -157,8 +157,6 @@ class TrialPrediction:
     reasons: Annotated[Mapping[str, str], Meaning("", "for each number left out, why")] = field(
         default_factory=dict[str, str]
     )
-    prediction: Prediction | None = None  # all that the solver found
-    opposite: Prediction | None = None  # that slid the other way
     alternatives: tuple[Alternative, ...] = ()  # the same trial predicted otherwise, where that was asked for
     interval: SedInterval | None = None  # of `sed`, where it was asked for
     opposite_interval: SedInterval | None = None  # of `opposite_sed`
@@ -168,6 +166,14 @@ class TrialPrediction:
     opposite_error: float | None = None
     matching_depth_error: float | None = None
     matching_depth_interval: Ends | None = None  # that friction and the measured force make of it [mm]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class TrialPrediction(TrialNumbers):
+    """The numbers of one trial with all that the solver found."""
+
+    prediction: Prediction | None = None  # all that the solver found
+    opposite: Prediction | None = None  # that slid the other way
 
     @property
     def responses(self) -> Mapping[str, Response]:

@@ -5,12 +5,13 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from sessions.prediction import Response
-from sessions.prediction.stored import Alternative, Ends, SedInterval
+from sessions.prediction.stored import Ends, TrialNumbers
 from sessions.statistics.correlations import Relation
 from sessions.statistics.multiverse import PathFinding
 from sessions.statistics.psychometric import Psychometric
 from sessions.statistics.rivals import Rival
 from sessions.statistics.scores import MeanScore
+from sessions.strokes import Stroke
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -86,38 +87,17 @@ class Trace:
     every: int  # one reading in so many is kept
 
 
-@dataclass(frozen=True, slots=True)
-class StrokeFinding:
-    """One stroke. A number is None where honesty allows none; `reasons` then says why under the number's name."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StrokeFinding(Stroke):
+    """A stroke in a report: `number` counts all strokes from 1, in order of time, and `reasons` are sentences."""
 
-    number: int  # from 1, in order of time
-    trial: int | None
+    within: int = 1  # its number within its trial, from 1; without trials within the recording
     experiment: str  # "" where the session has no plan
     index: int | None
     code: str
-    onset: float | None  # [s, device time]; None where the recording begins in contact
-    lift: float | None
-    steady: tuple[float, float] | None
-    direction: int | None
-    speed: float | None  # [mm/s]
-    speed_error: float | None  # standard error of speed [mm/s]
-    mu_static: float | None
-    mu_dynamic: float | None
-    mu_interval: tuple[float, float] | None  # of mu_dynamic
-    mu_max: float | None
-    tau_max: float | None  # [MPa]
-    normal_force: float | None  # mean over the steady window [N]
-    tangential_force: float | None  # likewise [N]
-    flaws: tuple[str, ...]
-    reasons: dict[str, str]
     trace: Trace | None
-    bootstrap: dict[str, tuple[float, float]]  # intervals by the number's name; see `Report.interval_kind`
-    break_away: float | None = None  # where T/N stops climbing [s, device time]
-    slide_onset: float | None = None  # from when the centre of pressure slides [s, device time]
-    heading: float | None = None  # from +x towards +y [degrees]
+    bootstrap: dict[str, Ends]  # intervals by the number's name; see `Report.interval_kind`
     direction_agrees: float | None = None  # share of the bootstrap's repeats with that direction [-]
-    within: int = 1  # its number within its trial, from 1; without trials within the recording
-    decided: dict[str, str] = field(default_factory=dict[str, str])  # what a person decided of it, with who and why
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,43 +108,15 @@ class History:
     sed: Numbers  # [MPa]
 
 
-@dataclass(frozen=True, slots=True)
-class PredictionFinding:
-    """What the model says of one trial. A number is None where `reasons` says why under the number's name."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PredictionFinding(TrialNumbers):
+    """The prediction of a trial in a report: its `stroke` is that stroke's number."""
 
-    trial: int | None  # None for a stroke of a recording without trials
-    stroke: int | None  # number of its stroke; None where the trial has none
     experiment: str
     index: int | None
     code: str
-    mu: float | None  # that the model got [-]
-    mu_rule: str  # which mu the model got: "maximum" or "mean over steady window"
-    tau_max: float | None  # [MPa]
-    indentation: float | None  # [mm]
-    direction: int | None
-    sed: float | None  # [MPa], averaged over the ending
-    error_estimate: float | None  # relative, of sed
     responses: Mapping[str, Response]  # every quantity at the ending by its name; none where there is no prediction
-    normal_per_mm: float | None  # [N/mm]
-    normal_force: float | None  # normal_per_mm times the finger's width [N]
-    tangential_force: float | None  # likewise [N]
-    measured_normal: float | None  # [N]
-    measured_tangential: float | None  # [N]
-    matching_depth: float | None  # at which model and measured normal force are equal [mm]
-    opposite_sed: float | None  # at the same depth, slid the other way [MPa]
-    wall_s: float | None
     history: History | None
-    reasons: dict[str, str]
-    sed_interval: tuple[float, float] | None = None  # that the uncertainty of friction alone makes [MPa]
-    interval_by: str = ""  # "derivatives" or "sampling"
-    opposite_interval: SedInterval | None = None  # of opposite_sed, likewise
-    opposite_error: float | None = None  # relative, of opposite_sed
-    normal_force_error: float | None = None  # relative, estimated by the solver
-    tangential_force_error: float | None = None  # likewise
-    matching_depth_error: float | None = None  # likewise
-    normal_force_interval: Ends | None = None  # that the uncertainty of friction makes [N]
-    tangential_force_interval: Ends | None = None  # likewise [N]
-    matching_depth_interval: Ends | None = None  # that friction and the force measured make [mm]
     peak_rate: float | None = None  # of an SA-II afferent, an illustration [imp/s]
     settled_rate: float | None = None  # likewise
     peak_rate_interval: Ends | None = None  # that the interval of the SED makes of it, every parameter as given
@@ -172,7 +124,6 @@ class PredictionFinding:
     row: tuple[tuple[float, float], ...] = ()  # SED [MPa] of the same ending at arc positions along the skin [mm]
     doubt: str = ""  # why no finger can be in the state of the model's numbers, as `Alternative.doubt`
     opposite_doubt: str = ""  # likewise of the state slid the other way
-    alternatives: tuple[Alternative, ...] = ()  # the trial in each variant, where they were asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from sessions.prediction.scenes import doubt_of
 from sessions.prediction.stored import model_facts
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, Field, History, PredictionFinding, StrokeFinding, Trace, same_fields
-from sessions.statistics.scores import bounds, by_key
+from sessions.statistics.scores import by_key
 from sessions.strokes.analysis import Analysis
 from sessions.strokes.bootstrap import NUMBERS
 from sessions.strokes.forces import in_face_frame
@@ -39,13 +39,12 @@ def strokes(recording: Recording, analysis: Analysis) -> tuple[StrokeFinding, ..
             "experiment": "" if trial is None else trial.block,
             "index": None if trial is None else trial.stimulus.index,
             "code": "" if trial is None else trial.stimulus.code,
-            "mu_interval": stroke.mu_dynamic_interval,
             "reasons": _reasons(stroke, position, analysis.flaws),
             "trace": _trace(stroke),
             "bootstrap": {name: ends for name in NUMBERS if (ends := getattr(intervals, name)) is not None},
             "direction_agrees": intervals.direction_agrees,
             "within": stroke.number,
-            "decided": dict(stroke.decided),
+            "curve": None,
         }
         findings.append(StrokeFinding(**{**same_fields(stroke, StrokeFinding), **numbers}))
     return tuple(findings)
@@ -154,7 +153,7 @@ def predictions(
         replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
         for row in prediction.trials
     )
-    return tuple(_with_more(finding_of(row), row, rates.get(row.trial)) for row in rows)
+    return tuple(_with_rates(finding_of(row), rates.get(row.trial)) for row in rows)
 
 
 def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:
@@ -238,28 +237,17 @@ def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:
     return tuple((arc, sed) for arc, sed in pairs if np.isfinite(sed))
 
 
-def _with_more(finding: PredictionFinding, row: TrialPrediction, firing: Firing | None) -> PredictionFinding:
-    """Return the finding with the intervals of its SED, and with an afferent's rates."""
-    interval = row.interval
-    if interval is not None:
-        ends = bounds(interval.low, interval.high)
-        finding = replace(
-            finding,
-            sed_interval=ends,
-            interval_by="" if ends is None else interval.method or "",
-            reasons=finding.reasons if ends else {**finding.reasons, "sed_interval": interval.reason},
-            normal_force_interval=interval.normal_force,
-            tangential_force_interval=interval.tangential_force,
-        )
-    if firing is not None:
-        finding = replace(
-            finding,
-            peak_rate=float(firing.rate.max()),
-            settled_rate=firing.settled_rate,
-            peak_rate_interval=firing.peak_interval,
-            settled_rate_interval=firing.settled_interval,
-        )
-    return finding
+def _with_rates(finding: PredictionFinding, firing: Firing | None) -> PredictionFinding:
+    """Return the finding with an afferent's rates."""
+    if firing is None:
+        return finding
+    return replace(
+        finding,
+        peak_rate=float(firing.rate.max()),
+        settled_rate=firing.settled_rate,
+        peak_rate_interval=firing.peak_interval,
+        settled_rate_interval=firing.settled_interval,
+    )
 
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:

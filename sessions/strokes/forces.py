@@ -1,9 +1,15 @@
 """Forces at the stimulus's face: the wrench in the face frame, its zero-phase filter, ratio and centre of pressure.
 
-Filter and peaks stand here since `scipy.signal` takes ten times as long to load as a session to analyse.
+The filter is SciPy's compiled loop, loaded without the rest of `scipy.signal`, whose import takes ten times as long as
+the analysis of a session. A SciPy that is laid out otherwise is asked by its front door.
 """
 
 from dataclasses import dataclass
+from functools import cache
+from importlib.machinery import PathFinder
+from importlib.util import find_spec, module_from_spec
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,24 +23,41 @@ def low_pass(values: Array, cut_off: float, rate: float, padding: int) -> Array:
     """Return values (n, k) through a second-order Butterworth low-pass, forwards and then backwards.
 
     One pass is 3 dB down at `cut_off` [Hz], by the bilinear transform for readings at `rate` [Hz]. Both ends are
-    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them. The
-    recursion y[i] + a y[i-1] + b y[i-2] = g (x[i] + 2 x[i-1] + x[i-2]) is a triangular system with three diagonals.
+    carried on by `padding` < n readings, turned about the end; the filter begins settled on the first of them.
     """
-    from scipy.linalg.lapack import dtbtrs  # slow to load, and the window's live feed has no need of it
-
     bent = float(np.tan(np.pi * cut_off / rate))
     whole = 1.0 + np.sqrt(2.0) * bent + bent * bent
     gain = bent * bent / whole
-    a, b = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
+    back, further = 2.0 * (bent * bent - 1.0) / whole, (1.0 - np.sqrt(2.0) * bent + bent * bent) / whole
+    sections = np.array([[gain, 2.0 * gain, gain, 1.0, back, further]])
+    compiled = _compiled_filter()
+    if compiled is None:
+        from scipy import signal
+
+        return signal.sosfiltfilt(sections, values, axis=0, padlen=padding)
     first, last = 2.0 * values[:1] - values[padding:0:-1], 2.0 * values[-1:] - values[-2 : -padding - 2 : -1]
-    rows = np.concatenate([first, values, last])
-    diagonals = np.tile([[1.0], [a], [b]], len(rows))
+    rows = np.ascontiguousarray(np.concatenate([first, values, last]).T)  # (k, n + 2 padding), filtered in place
+    settled = np.array([1.0 - gain, gain - further])  # what the filter holds of a value that never changed
     for _ in range(2):
-        before = np.concatenate([rows[:1], rows[:1], rows])
-        right = gain * (before[2:] + 2.0 * before[1:-1] + before[:-2])
-        right[:2] -= np.array([[a + b], [b]]) * rows[0]  # as if the first reading had stood for ever
-        rows = dtbtrs(diagonals, right, uplo="L", diag="U")[0][::-1]
-    return rows[padding : len(rows) - padding]
+        compiled(sections, rows, (rows[:, :1] * settled)[:, None, :])
+        rows = np.ascontiguousarray(rows[:, ::-1])
+    return rows.T[padding : len(rows[0]) - padding]
+
+
+@cache
+def _compiled_filter() -> Any:  # noqa: ANN401 - compiled, without types
+    """Return the loop of `scipy.signal.sosfilt`, None where this SciPy has it elsewhere."""
+    package = find_spec("scipy")
+    folder = Path(package.origin).parent / "signal" if package is not None and package.origin else Path()
+    spec = PathFinder.find_spec("scipy.signal._sosfilt", [str(folder)])
+    if spec is None or spec.loader is None:
+        return None
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except ImportError:  # a SciPy whose libraries it must find first
+        return None
+    return getattr(module, "_sosfilt", None)
 
 
 def peaks(values: Array) -> tuple[NDArray[np.intp], Array]:

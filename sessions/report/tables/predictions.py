@@ -76,9 +76,9 @@ def _sed(notes: Notes, of: _Estimate, *, star: bool) -> Cell:
 
 
 def _stroked_sed(p: PredictionFinding, notes: Notes) -> Cell:
-    why, without = p.reasons.get("sed"), p.reasons.get("sed_interval")
-    estimate = _Estimate(p.sed, p.error_estimate, why, p.sed_interval, without, p.doubt)
-    return _sed(notes, estimate, star=p.interval_by == "sampling")
+    ends, without, star = _of(p.interval)
+    estimate = _Estimate(p.sed, p.error_estimate, p.reasons.get("sed"), ends, without, p.doubt)
+    return _sed(notes, estimate, star=star)
 
 
 def _with(error: float | None, least: int, unit: float = 1.0) -> Callable[[float], str]:
@@ -103,7 +103,7 @@ def afferent_table(report: Report) -> Table | None:
 
     def row(p: PredictionFinding) -> Row:
         firing = ((p.peak_rate, p.peak_rate_interval), (p.settled_rate, p.settled_rate_interval))
-        why, without = p.reasons.get("sed"), p.reasons.get("sed_interval") if published else _SED_ALONE
+        why, without = p.reasons.get("sed"), _of(p.interval)[1] if published else _SED_ALONE
         rates = (notes.estimate(rate, places(1), why, ends, without) for rate, ends in firing)
         return (_stroked_sed(p, notes) if published else _responding(p, shown, notes), *rates)
 
@@ -204,7 +204,9 @@ def force_table(report: Report) -> Table | None:
 
     def row(p: PredictionFinding) -> Row:
         intervals = {} if p.stroke is None else strokes.get(p.stroke, {})
-        normal = p.normal_force_interval
+        normal, tangential = (
+            (None, None) if p.interval is None else (p.interval.normal_force, p.interval.tangential_force)
+        )
         per_mm = None if normal is None or not report.width else (normal[0] / report.width, normal[1] / report.width)
 
         def cell(name: str, error: float | None, ends: Ends | None, without: str | None, decimals: int = 2) -> Cell:
@@ -212,12 +214,12 @@ def force_table(report: Report) -> Table | None:
             estimate = _Estimate(getattr(p, name), error, p.reasons.get(name), ends, without, doubt)
             return _cell(notes, estimate, places(decimals), decimals)
 
-        why = p.reasons.get("sed_interval")
+        why = _of(p.interval)[1]
         return (
             cell("normal_per_mm", p.normal_force_error, per_mm, why, 4),
             cell("normal_force", p.normal_force_error, normal, why),
             cell("measured_normal", None, intervals.get("normal_force"), _SHORT),
-            cell("tangential_force", p.tangential_force_error, p.tangential_force_interval, why),
+            cell("tangential_force", p.tangential_force_error, tangential, why),
             cell("measured_tangential", None, intervals.get("tangential_force"), _SHORT),
             _depth(p, notes),
             cell("matching_depth", p.matching_depth_error, p.matching_depth_interval, why or _ROUGH),
@@ -251,7 +253,7 @@ def direction_table(report: Report) -> Table | None:
         ratio, ends = _ratio(p, back)
         opposite = _Estimate(p.opposite_sed, p.opposite_error, why, back, without, p.opposite_doubt)
         doubt = p.doubt or p.opposite_doubt
-        unknown = doubt or without or p.reasons.get("sed_interval")
+        unknown = doubt or without or _of(p.interval)[1]
         return (
             _depth(p, notes),
             direction(p.direction),
@@ -275,9 +277,10 @@ def _ratio(p: PredictionFinding, back: Ends | None) -> tuple[float | None, Ends 
     if p.sed is None or p.opposite_sed is None or p.direction is None:
         return None, None
     upper, lower = (p.sed, p.opposite_sed) if p.direction < 0 else (p.opposite_sed, p.sed)
-    if back is None or p.sed_interval is None:
+    ahead = _of(p.interval)[0]
+    if back is None or ahead is None:
         return upper / lower, None
-    over, under = (p.sed_interval, back) if p.direction < 0 else (back, p.sed_interval)
+    over, under = (ahead, back) if p.direction < 0 else (back, ahead)
     return upper / lower, (over[0] / under[1], over[1] / under[0])
 
 
