@@ -81,9 +81,9 @@ class NestedNumbers:
     """A scene on the nested mesh, every element in four: its `all_numbers`, SED of the ending first."""
 
     numbers: Array  # (COUNT,)
-    of_edges: Array  # (COUNT,) what they change by when edges of contact move by a node of that mesh
+    of_edges: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
     row: Array  # (r,) SED of the row of receptors [MPa]
-    row_of_edges: Array  # (r,) and what that changes by likewise
+    row_of_edges: Array  # (m, r) its changes likewise
     shares: Array | None = None  # (a + b,) of the SED's error in each column and row of the mesh, where it is too large
 
 

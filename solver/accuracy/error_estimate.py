@@ -7,10 +7,11 @@ at most 1 + 1/4 + 1/16 + ... = 4/3 of the change from H to h (Roache 1994).
 Two meshes may agree by chance on where contact states change: an edge of contact, of stick or of slip at the bound lies
 anywhere between two nodes. Each edge is moved by one node of h to either side at otherwise fixed contact states, and
 the linearised body is solved again. A number depends on the place of an edge by a parabola about the true place, so
-that a third of the larger change counts. Edges err independently, and their changes are added as squares.
+that a third of the larger change counts. Their sum is the bound for one number.
 
 Much of the error is common to all surfaces of one finger and cancels in their differences. The rest is estimated in the
-same way, since each surface has its own edges of contact.
+same way, but for edges: the worst pair of surfaces counts, and edges of two surfaces err independently, so that their
+changes are added as squares.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,11 +41,11 @@ _PARTS_OF_EDGES = np.where(np.arange(COUNT) == WIDTH, WIDTH_FROM_EDGES, FROM_EDG
 
 
 def half_width(change: Array, edges: Array, part: Array | float = FROM_EDGES) -> Array:
-    """Return the error estimate of numbers from their `change` to the nested mesh.
+    """Return the error estimate of numbers (...) from their `change` to the nested mesh.
 
-    `edges` is their change there when edges of contact move by a node, of which a `part` counts.
+    `edges` (m, ...) are their changes there as one edge of contact after the other moves, of which a `part` counts.
     """
-    return FROM_HALVING * np.abs(change) + part * edges
+    return FROM_HALVING * np.abs(change) + part * edges.sum(axis=0)
 
 
 PARTS = np.array([0.48, 0.68])  # of the usual steps: 12 and 17 of 25, about a half and two thirds
@@ -159,7 +160,6 @@ class NestedState(NamedTuple):
     numbers: NestedNumbers
     finger: Finger[Patches]
     state: EquilibriumState
-    edges: Array  # (m,) what its SED changes by as each edge of contact moves by a node [MPa]
 
 
 def nested_state(
@@ -170,12 +170,10 @@ def nested_state(
     `steps` are its load steps where it depends on its load path. None where no equilibrium exists with an edge moved,
     as at a friction limit.
     """
-    of_edges = np.linalg.norm(changes, axis=0)
-    if np.isinf(of_edges).any():
+    if np.isinf(changes).any():
         return None
     numbers = values[:COUNT] if steps is None else steps.extrapolate(values[:COUNT])
-    nested = NestedNumbers(numbers, of_edges[:COUNT], values[COUNT:], of_edges[COUNT:])
-    return NestedState(nested, finger, state, changes[:, 0])
+    return NestedState(NestedNumbers(numbers, changes[:, :COUNT], values[COUNT:], changes[:, COUNT:]), finger, state)
 
 
 def _move_edges(
@@ -299,9 +297,9 @@ def contrast_error(predictions: Sequence[Prediction]) -> ContrastError:
     count = len(COMPARED)
     numbers = np.abs([(o.sed_ending, o.normal_force, o.tangential_force, o.indentation) for o, _ in known])
     change = np.abs([nested.numbers[:count] for _, nested in known]) - numbers
-    edges = np.array([nested.of_edges[:count] for _, nested in known])
+    edges = np.array([np.linalg.norm(nested.of_edges[:, :count], axis=0) for _, nested in known])
     pairs = np.array(list(combinations(range(len(known)), 2))).T
-    worst = half_width(change[pairs[0]] - change[pairs[1]], np.hypot(edges[pairs[0]], edges[pairs[1]]))
+    worst = half_width(change[pairs[0]] - change[pairs[1]], np.hypot(edges[pairs[0]], edges[pairs[1]])[None])
     off_by, mean = worst.max(axis=0), numbers.mean(axis=0)
     shares = off_by / np.maximum(
         np.maximum(np.ptp(numbers, axis=0), LEAST_RANGE * mean / WARNING_SHARE), np.finfo(float).tiny
@@ -351,7 +349,7 @@ def estimate_errors(
     (corrected,), (edges,) = edge_changes(
         finer, [(there, forces)], lambda states: np.array([numbers(finer, one) for one in states])
     )
-    error = half_width(corrected - value, np.linalg.norm(edges, axis=0))
+    error = half_width(corrected - value, edges)
     if fewer:
         if len(fewer) != len(PARTS):
             raise ValueError(f"fewer has {len(fewer)} states; give one after each of {PARTS.tolist()} of the steps")

@@ -123,7 +123,7 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
 
     `numbers` (COUNT,) are the scene's on the mesh of the answer.
     """
-    nested, finger, state, edges = on_nested
+    nested, finger, state = on_nested
     tolerance = scene.solve.tolerance
     missed = tolerance is not None and errors(scene, numbers, nested, steps).sed > tolerance
     if not missed and scene.solve.contrast_tolerance is None:
@@ -132,8 +132,7 @@ def with_shares(scene: Scene, numbers: Array, on_nested: NestedState, steps: Ste
     parts *= FROM_HALVING * abs(float(nested.numbers[0] - numbers[0])) / max(float(parts.sum()), np.finfo(float).tiny)
     before = np.flatnonzero(np.diff(state.state))
     columns = np.searchsorted(finger.geometry.lines.arcs, (finger.arcs[before] + finger.arcs[before + 1]) / 2.0) - 1
-    size = max(float(np.linalg.norm(edges)), np.finfo(float).tiny)
-    np.add.at(parts, columns, FROM_EDGES * edges**2 / size)
+    np.add.at(parts, columns, FROM_EDGES * nested.of_edges[:, 0])
     whole = float(parts.sum())
     return replace(nested, shares=parts / whole if whole > 0.0 else None)
 

@@ -110,19 +110,19 @@ def course_errors(prediction: Prediction) -> CourseNumbers:
     times = np.concatenate([[0.0], course.time])[[0, *ends]]
     of_quantities = np.concatenate([np.zeros((1, len(NAMES))), edges[:, len(NUMBERS) :]])
     with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is not there
-        rate_edges = np.hypot(of_quantities[1:], of_quantities[:-1]) / np.diff(times)[:, None]
+        rate_edges = (of_quantities[1:] + of_quantities[:-1]) / np.diff(times)[:, None]
 
     def error(name: str, changed_by_edges: Array) -> Array:
         value, nested_value, *few = (getattr(one, name) for one in (usual, finer, *fewer))
         by_steps = sum(abs(one - value) / (1.0 / part - 1.0) for one, part in zip(few, PARTS.tolist(), strict=True))
-        return half_width(nested_value - few[0], changed_by_edges) + by_steps
+        return half_width(nested_value - few[0], changed_by_edges[None]) + by_steps
 
     return CourseNumbers(error("at", edges), error("rate", rate_edges))
 
 
 def _of_edges(scene: Scene, nested: Finger[Any], state: EquilibriumState) -> Array:
-    """Return what the numbers at an instant change by when edges of contact move by a node (5 + q,)."""
+    """Return the changes of the numbers at an instant (5 + q,), summed over edges of contact that move by a node."""
     by_force = scene.normal_force is not None
     forces = ForceLoad(float(state.normal.sum()), None, state.load.travel) if by_force else None
-    changes = np.linalg.norm(edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0], axis=0)
+    changes = edge_changes(nested.newton, [(state, forces)], nested.all_numbers)[1][0].sum(axis=0)
     return np.concatenate([changes[_PLACES], changes[len(_PLACES) + 2 :]])

@@ -77,7 +77,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
     if in_steps:
         state = end(scene, nested)
     (finer,), (edges,) = edge_changes(nested.newton, [(state, forces_of(scene, state.load))], row_numbers(nested))
-    errors = half_width(finer - values.ravel(), np.linalg.norm(edges, axis=0))
+    errors = half_width(finer - values.ravel(), edges)
     if in_steps:
         usual, *fewer = row_numbers(coarse)([end(scene, coarse, times) for times in (1.0, *PARTS.tolist())])
         errors += Steps.of(usual, np.array(fewer), scene.solve.tolerance).bound

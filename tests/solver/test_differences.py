@@ -13,7 +13,7 @@ from solver.scene.published import STICKINESS, scene
 
 def surface(numbers, nested, edges=(0.0, 0.0, 0.0, 0.0)):
     names = ("sed_ending", "normal_force", "tangential_force", "indentation")
-    known = SimpleNamespace(numbers=np.array(nested), of_edges=np.array(edges))
+    known = SimpleNamespace(numbers=np.array(nested), of_edges=np.array([edges]))
     return SimpleNamespace(nested=known, **dict(zip(names, numbers, strict=True)))
 
 
