@@ -1,4 +1,4 @@
-"""Prediction: what one run of the solver found, with the audits that vouch for it."""
+"""The prediction of one scene: numbers with error estimates, the model, audits, and the state itself."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -19,18 +19,18 @@ ROW: Array = 0.25 * np.arange(-32.0, 25.0)  # arc positions of the row of recept
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """The same ending at arc positions along the skin, the reference ending being the one at 0."""
+    """Receptors alike at arc positions along the skin; the reference ending is the one at 0."""
 
     arc: Array  # (r,) from first touch, positive towards the tip, on the undeformed skin [mm]
     sed: Array  # (r,) SED averaged over each ending [MPa]; nan where the finger ends before it
-    error: Array  # (r,) estimated, of each, relative, but for what edges of contact add; nan where nothing is known
+    error: Array  # (r,) error estimate of each, relative; nan where unknown
 
 
 class Response(NamedTuple):
     """One quantity at the ending, averaged over it, in its own unit."""
 
     value: float
-    error: float  # estimated; nan where nothing is known
+    error: float  # its estimate; nan where unknown
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,16 +46,16 @@ class Skin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkinLine:
-    """m points of the skin's surface, by which values at the nodes that are drawn are read along it."""
+    """m points of the skin's surface, at which fields of a picture are interpolated."""
 
     arc: Array  # (m,) along the skin at rest, 0 over the reference ending, towards the tip [mm]
-    nodes: Indices  # (m, 9) that are drawn
+    nodes: Indices  # (m, 9) of the picture
     shape: Array  # (m, 9) shape functions there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class History:
-    """The course in time: pre-indentation over 1 s, then sliding. m instants."""
+    """The load path in time: pre-indentation over 1 s, then sliding. m instants."""
 
     time: Array  # (m,) [s]
     bone_x: Array  # (m,) travel of the bone along the surface [mm]
@@ -70,7 +70,7 @@ class History:
 
 
 def sed_alone(sed: Array) -> Array:
-    """Return the responses (m, q) of a course of which the SED (m,) alone is known; nan for the others."""
+    """Return responses (m, q) with the SED (m,) alone, nan for the others."""
     out = np.full((len(sed), len(NAMES)), np.nan)
     out[:, NAMES.index(SED.name)] = sed
     return out
@@ -78,7 +78,7 @@ def sed_alone(sed: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NestedNumbers:
-    """A scene on the nested mesh, every element in four: its `all_numbers`, SED of the ending first."""
+    """The `all_numbers` of a scene on the nested mesh, which divides every element into four; SED first."""
 
     numbers: Array  # (COUNT,)
     of_edges: Array  # (m, COUNT) their changes as each of m edges of contact moves by a node of that mesh
@@ -104,40 +104,40 @@ class Prediction:
     newton_iterations: int  # solutions of a linear system with trial contact states
     wall_s: float  # the solve alone: this scene's, and its part of what scenes solved together share [s]
     setup_s: float  # mesh and tables; shared by scenes solved together [s]
-    estimate_s: float  # what the error estimate took beside the solve, likewise [s]
+    estimate_s: float  # time for the error estimate beside the solve, likewise [s]
     row: Row
     responses: Mapping[str, Response]  # every quantity of `solver.quantities` at the ending, by its name
-    model: Mapping[str, Any]  # what was modelled, what was left out, and the evidence that it could be
+    model: Mapping[str, Any]  # assumptions, omitted effects, and the evidence on these
     audits: Mapping[str, float]  # checks; residuals relative unless their name says otherwise
     skin: Skin
     geometry: FingerMesh
     displacement: Array  # (nodes, 2) relative to the bone [mm]
     history: History | None = None
-    evidence_s: float | None = None  # what marching and measuring the evidence in `model` took [s]; None: nothing was
+    evidence_s: float | None = None  # time for marching and measuring the evidence in `model` [s]; None: none was asked
     sed_point_error: float = 1.0  # estimated, of sed_point, relative [-]
     normal_force_error: float | None = None  # estimated, of normal_force, relative [-]; None: it was given
     tangential_force_error: float | None = None  # likewise of tangential_force; 0 where there is no friction
     indentation_error: float | None = None  # likewise of indentation; None where that was given
     shift_error: float | None = None  # estimated, of shift [mm]; None where there is none
     contact_width_error: float | None = None  # estimated, of contact_width, relative [-]
-    nested: NestedNumbers | None = None  # what errors are estimated from; None where the nested mesh has no such state
+    nested: NestedNumbers | None = None  # on the nested mesh, for the error estimates; None without a state there
     warnings: tuple[str, ...] = field(default=())  # one sentence each
 
     @property
     def sed_ending_corrected(self) -> float:
-        """SED averaged over the ending on the nested mesh [MPa], the best value there is; nan where it has none."""
+        """SED averaged over the ending on the nested mesh [MPa], the best value; nan without a state there."""
         return float("nan") if self.nested is None else float(self.nested.numbers[0])
 
     @property
     def mesh(self) -> Mesh:
-        """The mesh that the displacements are of."""
+        """The mesh of the displacements."""
         return self.geometry.mesh
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `daq-app solve --json` prints: plain numbers, lists and strings."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in ("history", "nested")}
         plain: dict[str, Any] = {k: value for k, value in values.items() if isinstance(value, int | float | None)}
-        if self.nested is None:  # nothing is known
+        if self.nested is None:  # errors are unknown
             plain |= {name: None for name in plain if name == "error_estimate" or name.endswith("_error")}
         plain["title"] = self.scene.title
         plain["sed_ending_corrected"] = None if self.nested is None else self.sed_ending_corrected

@@ -1,4 +1,4 @@
-"""From a state of a finger to its prediction: numbers with errors, skin, history, and what was left out."""
+"""Make a prediction of a solved state: numbers with error estimates, skin, history and omitted effects."""
 
 from dataclasses import dataclass
 
@@ -26,15 +26,15 @@ class SceneSolution:
     state: EquilibriumState
     displacement: Array  # (nodes, 2) [mm]
     audits: dict[str, float]
-    steps: Steps | None  # of a course, where the state depends on its way
-    way: Way | None  # of a course that was asked for
-    warnings: tuple[str, ...] = ()  # of this kinematics alone
+    steps: Steps | None  # where the state depends on its load path
+    way: Way | None  # the load path, where the scene asks for it
+    warnings: tuple[str, ...] = ()  # of its kinematics
     wall_s: float = 0.0
     setup_s: float = 0.0
 
     @property
     def elastic_way(self) -> tuple[Instant, ...] | None:
-        """The way, where it can be drawn from forces alone: nothing relaxes on it."""
+        """The load path, where nothing relaxes on it, so that forces alone determine its pictures."""
         return None if self.way is None or self.way.tissue is not None else tuple(self.way.instants)
 
 
@@ -51,7 +51,7 @@ def prediction(
     sed, normal, tangential, depth, shift, width, point = numbers[:FORCES_AND_PLACES].tolist()
     driven = scene.driven(depth)
     left = model(driven, finger, state, solved.displacement, width)
-    held = scene.loading.dragged and state.load.path_dependent  # a finger that slides may have shifted by anything
+    held = scene.loading.dragged and state.load.path_dependent  # the shift of a sliding finger is arbitrary
     numbers[4] = shift if held else 0.0
     off = errors(scene, numbers, nested, solved.steps)
     return Prediction(
@@ -89,7 +89,7 @@ def prediction(
 
 
 def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
-    """Return the skin that may touch in a state of contact."""
+    """Return positions, tractions and contact states of the skin that may touch."""
     condensed, touching = finger.newton.condensed, state.touching
     place, length = state.place(condensed), np.empty(len(state.state))
     tributary(np.ascontiguousarray(place[:, 0]), condensed.middle, length)
@@ -104,7 +104,7 @@ def skin_of(finger: Finger[Patches], state: EquilibriumState) -> Skin:
 
 
 def history(scene: Scene, finger: Finger[Patches], way: Way) -> History:
-    """Return a course as arrays; at small strain the finger at rest comes first."""
+    """Return a load path as arrays; at small strain it begins with the finger at rest."""
     relaxing = way.tissue is not None
     first = 0 if isinstance(finger, LinearFinger) else 1
     instants = way.instants[first:]

@@ -1,8 +1,8 @@
-"""Slides near a predicted one, on its mesh and from its state: their SED, and derivatives by friction and load.
+"""Slides close to a predicted one, on its mesh and from its state: their SED, and derivatives by friction and load.
 
-A nearby slide costs a few small systems, and its SED differs for its load alone. For the derivatives the last system is
-solved once more for each parameter, every contact state kept, which is exact as long as no state changes. At a kink,
-where a node is about to change its state, they are those of the side on which the states stay.
+A nearby slide costs a few small systems, and mesh errors cancel in its difference from the prediction. For derivatives,
+the last system is solved once more for each parameter at fixed contact states, which is exact until a state changes. At
+a kink, where a node is about to change its state, they are one-sided.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,7 +34,7 @@ MU, TAU_MAX, DEPTH = range(3)
 
 
 class By(NamedTuple):
-    """The derivatives of one number, by the unit of what is named."""
+    """The derivatives of one number by each parameter."""
 
     mu: float  # coefficient of friction [-]
     tau_max: float  # traction bound [MPa]; 0 where nothing slips at the bound
@@ -44,7 +44,7 @@ class By(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Derivatives:
-    """Those of the numbers of one settled slide."""
+    """The derivatives of the numbers of one settled slide."""
 
     sed: By  # averaged over the ending [MPa]
     normal: By  # force of the surface on the finger along +y [N/mm]
@@ -64,7 +64,7 @@ def of_slide(finger: Finger[Patches], scene: Scene, state: EquilibriumState) -> 
     rows = np.array([*ending, up, drag_along(scene) * along, [0.0, 0.0, 1.0]]) + 0.0  # never -0
     if scene.normal_force is None:
         return _derivatives([By(mu, tau, depth, None) for mu, tau, depth in rows.tolist()])
-    rows[:, 2] /= up[2]  # the depth makes up for what friction changes of the force
+    rows[:, 2] /= up[2]  # the depth changes so that the force stays
     rows[:, :2] -= rows[:, 2:] * up[:2]
     derivatives = _derivatives([By(mu, tau, None, force) for mu, tau, force in rows.tolist()])
     return replace(derivatives, normal=By(0.0, 0.0, None, 1.0))
@@ -77,9 +77,9 @@ def _derivatives(rows: Sequence[By]) -> Derivatives:
 
 
 def of_skin(newton: Newton, state: EquilibriumState) -> Array:
-    """Return how the skin (2 k, 3) of a slide follows mu, tau_max and depth, its contact linearised as Newton does.
+    """Return the derivatives of a slide's skin (2 k, 3) by mu, tau_max and depth, by Newton's linearised contact.
 
-    Raises ValueError where a state is no slide, or has no tangent: it lies at a limit.
+    Raises ValueError for a state that is no slide, and where it has no tangent, at a limit.
     """
     load, size = state.load, len(state.state)
     if load.sense == 0 or (state.state == STICK).any():
@@ -106,7 +106,7 @@ def of_skin(newton: Newton, state: EquilibriumState) -> Array:
 
 
 def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
-    """Return how the normal force of a frictionless press follows each tissue's stiffness (r,): d log N / d log E.
+    """Return the derivatives d log N / d log E (r,) of a frictionless press's normal force by each tissue's stiffness.
 
     Regions stand in the order of the mesh; a rigid bone has 0. With u the displacements, w their derivative by the
     depth and K the stiffness of one tissue, dN / d log E is w K u: without friction the contact's forces do no work on
@@ -122,9 +122,9 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
 
 
 def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
-    """Return how the responses of endings change (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
+    """Return the derivatives of endings' responses (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
 
-    By steps in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
+    By complex steps (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
     """
     perturbed = cast("Array", displacement[:, :, None] + 1j * IMAGINARY * steps)
     return endings.responses(perturbed).imag / IMAGINARY
@@ -135,7 +135,7 @@ def drag_along(scene: Scene) -> int:
     return -(scene.loading.direction or 1)
 
 
-GOOD = 1e-8  # tolerance of the displacements [mm]: far less than a difference of friction that anybody could tell
+GOOD = 1e-8  # tolerance of the displacements [mm], far below the effect of any measurable difference of friction
 NUMBERS = {name: state for state, name in STATE_NAMES.items()}
 
 
@@ -158,15 +158,14 @@ class Nearby:
     def responses(self, scenes: Sequence[Scene]) -> Array:
         """Return every quantity (n, q, 2) of scenes that differ from its own in friction, depth or force alone.
 
-        First that averaged over the ending, then that in its middle. nan where no settled slide is found near this one;
-        how far there would be one is not looked for.
+        Averaged over the ending first, then in its middle. nan where this slide leads to no settled slide.
         """
         out = np.full((len(scenes), len(NAMES), 2), np.nan)
         near: dict[int, EquilibriumState] = {}
         for number, scene in enumerate(scenes):
             with suppress(NotConverged):
                 there = self._slide(scene)
-                # where a state touches at an end of the skin and this one does not, skin beyond may touch too
+                # where a state newly touches at an end of the skin, skin beyond may touch too
                 if not (there.touching & ~self.here.touching)[[0, -1]].any() and self._on_branch(there):
                     near[number] = there
         if near:
@@ -174,7 +173,7 @@ class Nearby:
         return out
 
     def _slide(self, scene: Scene) -> EquilibriumState:
-        """Return the settled slide of a scene that this one leads to. Raises NotConverged."""
+        """Return the settled slide of a scene, started from this one. Raises NotConverged."""
         if isinstance(self.finger, LinearFinger):
             return _small_slide(self.finger, scene, self.here.state)
         newton, here = self.finger.newton, self.here
@@ -184,7 +183,7 @@ class Nearby:
         return balanced(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
 
     def _on_branch(self, there: EquilibriumState) -> bool:
-        """Return whether a state at finite strain lies on the branch of this one, as far as this mesh can tell."""
+        """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""
         if not isinstance(self.finger, FiniteFinger):
             return True
         beyond = there.load.mu > self.here.load.mu or there.load.depth > self.here.load.depth
@@ -196,8 +195,8 @@ class Nearby:
 def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
     """Yield the slide of each prediction.
 
-    None where the finger is only pressed or held by a drag, so that its state depends on the way to it, and where the
-    state is not met again.
+    None where the finger is only pressed or held by a drag, so that its state depends on its load path, and where the
+    state is not recovered.
     """
     finger: Finger[Any] | None = None
     for prediction in predictions:
@@ -217,9 +216,9 @@ def nearby(predictions: Sequence[Prediction]) -> Iterator[Nearby | None]:
 
 
 def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
-    """Return d log N / d log E (n, 4) of presses that slide without friction at small strain, by tissue.
+    """Return d log N / d log E (n, 4) by tissue of frictionless slides at small strain.
 
-    Raises ValueError for others, and where a press is not met again.
+    Raises ValueError for others, and where a state is not recovered.
     """
     prediction: list[Array] = []
     for slide in nearby(predictions):
@@ -230,17 +229,17 @@ def stiffness_shares(predictions: Sequence[Prediction]) -> Array:
 
 
 def states(skin: Skin) -> NDArray[np.int64]:
-    """Return the states (k,) of a skin that slides: what still stuck slips once it has settled."""
+    """Return the contact states (k,) of sliding skin, with slip in place of stick."""
     return np.array([SLIP if state == "stick" else NUMBERS[state] for state in skin.state])
 
 
 def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
-    """Return the settled slide of a scene that a guess of its states leads to. Raises ContactLost."""
+    """Return the settled slide of a scene from a guess of its contact states. Raises ContactLost."""
     return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
 def _recover_slide(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:
-    """Return the settled slide of `prediction` at finite strain. Raises NotConverged where it is not met."""
+    """Return the settled slide of `prediction` at finite strain. Raises NotConverged where it is not recovered."""
     scene, skin, sense = prediction.scene, prediction.skin, -prediction.scene.loading.direction
     length = np.empty(len(skin.x))
     tributary(skin.x, finger.body.middle, length)

@@ -1,8 +1,8 @@
-"""How fast the quantities at the ending change in the parts of a course: press, break-away and slide; with errors.
+"""Mean rates of the quantities at the ending in press, break-away and slide of a load path, with error estimates.
 
-For its errors the course is marched again on the nested mesh, and on the answer's own in parts of its load steps
-(`solver.accuracy.error_estimate`). What edges of contact add is left out where tissues
-relax, since what is left of their past holds with no edge moved.
+For its errors the load path is marched again on the nested mesh, and in fewer steps on the answer's mesh
+(`solver.accuracy.error_estimate`). Edges of contact are left out where tissues relax, because their past holds for the
+given edges only.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ ALL = 1.0 - 1e-9  # part of the touching nodes that slips when all do [-]
 
 
 class Rates(NamedTuple):
-    """Mean rates of one quantity, in its unit per second; nan for a part that a course has not."""
+    """Mean rates of one quantity, in its unit per second; nan for a part that a load path does not have."""
 
     press: float  # from first touch until the bone moves along the surface
     break_away: float  # from then until all of the contact slips
@@ -34,7 +34,7 @@ class Rates(NamedTuple):
 
 
 def rates(history: History) -> Mapping[str, Rates]:
-    """Return the mean rates of every quantity, by its name; `solver.response.rates` has their errors."""
+    """Return the mean rates of every quantity by its name; `course_errors` returns their errors."""
     time = np.concatenate([[0.0], history.time])  # undeformed at first touch
     values = np.concatenate([np.zeros((1, len(NAMES))), history.responses])
     first, last, end = instants(history)
@@ -43,9 +43,9 @@ def rates(history: History) -> Mapping[str, Rates]:
 
 
 def instants(history: History) -> tuple[int, int, int]:
-    """Return how many instants there are up to the end of the press, up to full slip, and in all.
+    """Return the numbers of instants up to the end of the press, up to full slip, and in all.
 
-    They are one number where a course does not come so far.
+    A part that is not reached ends with the one before it.
     """
     count = len(history.time)
     moved = np.flatnonzero(np.abs(history.bone_x) > 0.0)
@@ -68,14 +68,14 @@ _PLACES = [0, 6, 1, 2, 5]  # of those among `Finger.all_numbers`, which quantiti
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CourseNumbers:
-    """A course in three instants and three parts, or how far that is off; nan where there is none, or not known."""
+    """The numbers of a load path at three instants and in three parts, or their errors; nan where there are none."""
 
     at: Array  # (3, 5 + q) of INSTANTS: NUMBERS, then every quantity at the ending, each in its own unit
     rate: Array  # (3, q) of the parts that end there, per second
 
 
 def course_numbers(course: History) -> CourseNumbers:
-    """Return the numbers of a course."""
+    """Return the numbers of a load path."""
     table = np.column_stack([*(getattr(course, name) for name in NUMBERS), course.responses])
     ends = instants(course)
     at = np.array(
@@ -85,7 +85,7 @@ def course_numbers(course: History) -> CourseNumbers:
 
 
 def course_errors(prediction: Prediction) -> CourseNumbers:
-    """Return how far the numbers of a prediction's history may be off; all nan where the nested mesh has no course."""
+    """Return the error estimates of a prediction's history, nan where the nested mesh has no such load path."""
     assert prediction.history is not None
     usual = course_numbers(prediction.history)
     scene, geometry = prediction.scene, prediction.geometry

@@ -1,4 +1,4 @@
-"""Every quantity along a row of receptors: of predictions at any depth, with errors; and of surveys, without."""
+"""Quantities along a row of receptors at any depth: of predictions with error estimates, of surveys without."""
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -55,7 +55,7 @@ def responses_along(predictions: Sequence[Prediction], arcs: Array = ROW, recept
 
 
 def row_along(prediction: Prediction, arcs: Array = ROW, receptor: Receptor | None = None) -> Row:
-    """Return the same of one prediction with errors, for which its nested mesh is solved again."""
+    """Return the same of one prediction with error estimates, for which its nested mesh is solved again."""
     values = responses_along([prediction], arcs, receptor)[0]
     try:
         errors = _row_errors(prediction, values, arcs, receptor or prediction.scene.receptor)
@@ -85,7 +85,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
 
 
 def _solve_nested(prediction: Prediction, sizing: Sizing) -> tuple[Finger[Any], EquilibriumState, Finger[Any]]:
-    """Return the nested finger, its state, and the finger on which a course in fewer steps is judged."""
+    """Return the nested finger, its state, and the finger on which load paths in fewer steps are judged."""
     scene, meshes = prediction.scene, Meshes()
     if scene.solve.kinematics == "small":
         finger = LinearFinger.of(scene, sizing)

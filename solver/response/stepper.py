@@ -1,9 +1,9 @@
 """The warm steppers of a live view: measured forces in, the state of the finger and its SED out.
 
-At small strain all that is ever asked of the finger is condensed once onto the skin that may touch: its stiffness, the
-skin's outline (a matrix) and the SED of every ending (a quadratic form of the skin's displacements). A reading is then
-one search for contact states, forces given. At finite strain depth and travel follow from the forces by Newton on a
-bordered system, usually in one iteration a reading. What one iteration leaves over, the next takes up.
+At small strain the finger is condensed once onto the skin that may touch: its stiffness, and the SED of the ending as a
+quadratic form of the skin's displacements. A reading is then one search for contact states under given forces. At
+finite strain, depth and travel follow from the forces by Newton's method on a bordered system, usually in one iteration
+a reading. The next iteration continues from its residual.
 """
 
 from abc import ABC, abstractmethod
@@ -28,7 +28,7 @@ LIGHT = 1e-7  # N/mm: less than this is no touch
 
 
 class Stepper(ABC):
-    """Follows one finger on one surface, reading by reading; holds the last state and memory of fixed size.
+    """Follows one finger on one surface, reading by reading, in memory of fixed size.
 
     >>> from solver import stepper
     >>> from solver.scene.published import SLIPPERINESS, scene
@@ -52,7 +52,7 @@ class Stepper(ABC):
 
     @property
     def travel(self) -> float:
-        """How far the bone has moved along +x while something stuck [mm]; sliding, which forces do not tell, adds 0."""
+        """Travel of the bone along +x while some skin stuck [mm]; forces do not determine the travel of a slide."""
         return 0.0 - self.state.load.travel
 
     def step(self, normal: float, tangential: float) -> float:
