@@ -122,7 +122,7 @@ def by_stiffness(finger: LinearFinger, state: EquilibriumState) -> Array:
 
 
 def slope(endings: Patches, displacement: Array, steps: Array) -> Array:
-    """Return the derivatives of endings' responses (q, r, c) at a `displacement` (nodes, 2) along `steps` (nodes, 2, c).
+    """Return the derivatives of endings' responses (q, r, c) at a `displacement` (nodes, 2) by `steps` (nodes, 2, c).
 
     By complex steps (Squire and Trapp 1998, SIAM Rev. 40, 110), exact to round-off.
     """
