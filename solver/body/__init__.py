@@ -14,7 +14,8 @@ from solver._kernels.compiling import HELD_X, HELD_Y
 from solver.arrays import Array, ElementArrays, ElementGeometry, Indices, Narrow, ShapeFunctions, inverse
 from solver.constitutive import PLAIN, Elasticity, LocalState
 from solver.mesh import Q2P1, Mesh, distinct
-from solver.tolerances import UNHELD
+
+UNHELD = 1e14  # stiffness by its inverse, largest numbers, from which a body is taken to move freely [-]
 
 
 class CondensedBody(Protocol):

@@ -17,7 +17,8 @@ from solver.constitutive import Elasticity, log1p, shape, slopes
 from solver.linalg import Elimination, Some, symbolic_factorization
 from solver.mesh import Mesh
 from solver.quantities import QUANTITIES
-from solver.tolerances import IMAGINARY
+
+IMAGINARY = 1e-30  # step of a complex derivative: its square is nothing [-]
 
 
 @dataclass(frozen=True, eq=False)  # without slots: memory for its tangent is set aside when first asked for

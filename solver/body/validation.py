@@ -9,9 +9,9 @@ from solver.arrays import Array
 from solver.constitutive import Elasticity, Prony
 from solver.mesh import Q2P1, Mesh, jacobians
 from solver.scene.tables import STIFFENING
-from solver.tolerances import CUT
 
 MOTIONS = ("x", "y", "turn")  # of a body as a whole
+CUT = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
 
 
 class BodyError(ValueError):

@@ -22,7 +22,7 @@ from solver.equilibrium.load_stepping import settled
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Scene
-from solver.tolerances import SHALLOW
+from solver.scene.tables import SHALLOW
 
 FINENESS = 7.0  # of both meshes, but where the skin folds
 MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact

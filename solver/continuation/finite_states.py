@@ -21,7 +21,6 @@ from solver.equilibrium.load_stepping import balanced, sliding_load
 from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
 from solver.scene import Scene
-from solver.tolerances import FORCE_MET
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +30,7 @@ class ForceSearch:
     few: int = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
     leading: float = 1e-3  # tolerance of states that only lead to others [mm]
     beyond: float = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
+    met: float = 1e-9  # relative difference within which a state has the normal force given
     searches: int = 20  # steps of a search for the depth at which a force is met
     furthest: float = 0.25  # of the depth, by which it may change in one
     crushed: float = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
@@ -160,7 +160,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
         state = load_stepping.settled(newton, state.load._replace(depth=depth), state)
-        if abs(state.force[1] / force - 1.0) < FORCE_MET:
+        if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.met:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
             break

@@ -10,8 +10,7 @@ from solver.equilibrium.load_stepping import slide_under, sliding_load
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
-from solver.scene.tables import Friction, SceneError
-from solver.tolerances import SHALLOW
+from solver.scene.tables import SHALLOW, Friction, SceneError
 
 FINENESS = 6.0  # good to some tenths of a per cent of the depth
 COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it

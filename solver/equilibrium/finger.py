@@ -31,7 +31,8 @@ from solver.mesh.mesher import FingerMesh, Sizing, finger_mesh
 from solver.prediction import ROW
 from solver.scene import Scene
 from solver.scene.tables import Material, Materials, SceneError
-from solver.tolerances import NO_ENERGY
+
+NO_ENERGY = 1e-14  # part of an energy that is left out of its quadratic form [-]
 
 Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them
 

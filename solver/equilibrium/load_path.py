@@ -20,10 +20,11 @@ from solver.failures import NotConverged, SolveFailure, beyond_friction, followe
 from solver.progress import report_progress
 from solver.scene import Scene
 from solver.scene.tables import Loading
-from solver.tolerances import ALL_SLIPS, SED_STILL
 
 PRESSING_TIME = 1.0  # of the pre-indentation [s]
 DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
+ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
+SED_STILL = 1e-10  # relative change of the ending's SED in a step from which on a slide at finite strain has settled
 CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
 Report = Callable[[str, float], None]  # called with what is being done, and the part of the course done, 0 to 1
 

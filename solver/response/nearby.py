@@ -17,6 +17,7 @@ from solver._kernels.compiling import SHEAR_LIMITED, SLIP, STICK
 from solver._kernels.contact_system import assemble_contact_system, bounded_length, tributary
 from solver.arrays import Array, ContactStates, SkinPosition
 from solver.body import Patches
+from solver.body.finite import IMAGINARY
 from solver.contact import STATE_NAMES
 from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
@@ -28,7 +29,6 @@ from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
 from solver.scene import Scene
 from solver.scene.tables import TISSUES
-from solver.tolerances import IMAGINARY
 
 MU, TAU_MAX, DEPTH = range(3)
 

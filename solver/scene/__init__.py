@@ -8,7 +8,8 @@ import math
 from dataclasses import dataclass, field, replace
 
 from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Materials, Receptor, SceneError, Solve
-from solver.tolerances import STIFFNESSES
+
+STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond, round-off swallows the softer one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

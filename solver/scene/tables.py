@@ -8,12 +8,12 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from solver.tolerances import FEEBLE, SHALLOW
-
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
 STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one on: steeper ones contradicted themselves
+SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as what there is to find
+FEEBLE = 1e-12  # least friction that is not none [-, MPa]: below, round-off is as large as the drag
 LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # that each kinematics has
 
 
