@@ -6,7 +6,7 @@ contradict the solution change all at once; where that goes round in circles, th
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled, subroutine
 from solver._kernels.contact_system import (
     COLUMNS,
     STEEP,
@@ -167,7 +167,7 @@ def solve_active_set(
     return UNSETTLED
 
 
-@compiled
+@subroutine
 def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -> None:
     """Fill how the surface's force along x and y follows steps, `sums` (2, 2 k) beside `loads` (2,), where asked."""
     if kind != DEPTH_GIVEN:
@@ -177,7 +177,7 @@ def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -
                 sums[i % 2, c] += body.stiffness[i, c]
 
 
-@compiled
+@subroutine
 def release(force: Array, compliance: Array, sums: Array, untouched: Array) -> None:
     """Fill how the surface's force follows forces, `sums` (2, 2 k), and the step `untouched` (2 k + m,) without it."""
     for i in range(force.shape[0]):
@@ -186,7 +186,7 @@ def release(force: Array, compliance: Array, sums: Array, untouched: Array) -> N
             untouched[c] -= force[i] * compliance[i, c]
 
 
-@compiled
+@subroutine
 def take_answer(
     system: ContactSystem, count: int, by_forces: bool, states: ContactStates, mu: float, answer: Array
 ) -> None:
@@ -200,7 +200,7 @@ def take_answer(
                 answer[2 * i, c] = states.sense[i] * mu * answer[2 * i + 1, c]
 
 
-@compiled
+@subroutine
 def look_ahead(
     position: SkinPosition, steps: Array, motion: Array, loose: bool, ahead: Array, above: Array, slip: Array
 ) -> None:
@@ -231,7 +231,7 @@ def hold(state: Narrow) -> None:
             state[i] = STICK
 
 
-@compiled
+@subroutine
 def resist(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
     """Fill the `reaction` (k, 2) of the surface to `steps` (2 k, 4); False where a number is not finite."""
     whole = 0.0
@@ -244,7 +244,7 @@ def resist(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
     return np.isfinite(whole)
 
 
-@compiled
+@subroutine
 def follow(compliance: Array, answer: Array, untouched: Array, steps: Array, reaction: Array) -> bool:
     """Fill the `reaction` (k, 2) of the surface and the step to equilibrium; False where a number is not finite."""
     size, whole = steps.shape[0], 0.0
@@ -259,7 +259,7 @@ def follow(compliance: Array, answer: Array, untouched: Array, steps: Array, rea
     return np.isfinite(whole)
 
 
-@compiled
+@subroutine
 def change_states(states: ContactStates, changes: StateChanges, slip: Array, entered: Narrow, one_by_one: bool) -> None:
     """Change all states that contradict the solution, or the worst one alone.
 
@@ -283,7 +283,7 @@ def change_states(states: ContactStates, changes: StateChanges, slip: Array, ent
         state[i], sense[i] = wanted[i], turned[i]
 
 
-@compiled
+@subroutine
 def met_before(states: ContactStates, seen: Narrow, known: int) -> bool:
     """Return whether the states are among the first `known` of those `seen` (n, 2, k), and add them to these.
 
@@ -302,7 +302,7 @@ def met_before(states: ContactStates, seen: Narrow, known: int) -> bool:
     return met
 
 
-@compiled
+@subroutine
 def balance(
     state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, stuck: bool, motion: Array
 ) -> bool:

@@ -5,7 +5,7 @@ First the length of skin that each node of it stands for.
 
 import numpy as np
 
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled, subroutine
 from solver.arrays import (
     Array,
     CondensedArrays,
@@ -155,7 +155,7 @@ def add_bound(
                 right[3] += slope * steps[x, 3]
 
 
-@compiled
+@subroutine
 def solve(matrix: Array, right: Array, size: int) -> bool:
     """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
 
@@ -207,7 +207,7 @@ def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
         p += 1
 
 
-@compiled
+@subroutine
 def assemble_force_system(
     compliance: Array,
     skin: Skin,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from solver._kernels import contact_system
 from solver._kernels import elements as element_loops
 from solver._kernels import skin as skin_loops
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive import LAWS, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
@@ -122,14 +122,19 @@ def test_a_tangent_without_stiffness_cannot_be_eliminated():
     assert not condensed.inside.factorise(np.zeros_like(condensed.system.tangent))
 
 
+@compiled
+def solved(matrix, right, size):
+    return contact_system.solve(matrix, right, size)
+
+
 def test_the_system_of_contact_is_solved_as_a_dense_solver_solves_it():
     rng = np.random.default_rng(0)
     for size in range(1, 12):
         matrix, right = rng.normal(size=(size, size)) + 4.0 * np.eye(size), rng.normal(size=(size, 4))
         solution = right.copy()
-        assert contact_system.solve(np.r_[matrix.ravel(), 7.0], solution, size)
+        assert solved(np.r_[matrix.ravel(), 7.0], solution, size)
         np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
-    assert not contact_system.solve(np.zeros(4), np.ones((2, 4)), 2)
+    assert not solved(np.zeros(4), np.ones((2, 4)), 2)
 
 
 def test_tributary_lengths_add_up_and_agree_with_the_plain_ones():
@@ -251,10 +256,10 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
     before = (
         "import numpy as np\n"
         "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
-        "from solver.arrays import ContactStates, LoadArguments, StateChanges\n"
+        "from solver.arrays import ContactStates, LoadArguments, Skin, StateChanges\n"
         "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
         "contact_system.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
-        "contact_system.solve(np.eye(2).ravel(), np.zeros((2, 4)), 2)\n"
+        "contact_system.bounded_length(zero, Skin(states, states, zero), states, 0.1, zero)\n"
         "states = ContactStates(states, states.copy(), np.zeros((3, 2)))\n"
         "changes = StateChanges(states.state.copy(), states.sense.copy(), zero.copy())\n"
         "active_set.contradictions(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1), changes)\n"
