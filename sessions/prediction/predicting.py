@@ -9,7 +9,7 @@ from sessions.prediction.scenes import Prepared, Progress, opposite, prepared_ca
 from sessions.prediction.stored import ERROR_NOT_KNOWN, SessionPrediction, TrialPrediction, known_error
 from sessions.strokes import Analysis
 from solver import Finger, Prediction, Scene, SolveFailure, solve_many
-from solver.equilibrium.expected_depth import matching_depths
+from solver.continuation.small_states import matching_depths
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 

@@ -1,33 +1,38 @@
 """Settled states of a scene at small strain on one mesh, or why there is none and how far there would be one.
 
+Also the depth to which a normal force presses the finger, for which meshes are made.
+
 As the coefficient of friction grows, so does the force with which the drag presses the finger down, until the finger
 yields less than it is pressed: the forces of the settled state grow without bound at a finite coefficient, and beyond
 it there is no settled state: the drag wedges the finger into the surface. The limit is reached by following the state
 as the coefficient grows.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import log2, sqrt
 
 import numpy as np
-from numpy.linalg import LinAlgError
 
 from solver.arrays import Array
-from solver.body.linear import LinearBody
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.expected_depth import DEEPEST, within_reach
-from solver.equilibrium.finger import LinearFinger, settled_moduli
+from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import march, slide_or_hold
 from solver.equilibrium.load_stepping import forces_of, slide_beside, slide_under, sliding_load
 from solver.equilibrium.load_stepping import settled as full_slip
 from solver.failures import ContactLost, NoSteadyState, NotConverged
-from solver.mesh.mesher import Sizing, finger_mesh
+from solver.mesh.mesher import Sizing
 from solver.scene import Scene
+from solver.scene.tables import SHALLOW, Friction, SceneError
 
 WIDE = 16.0  # margin at which nearly all the palmar skin may touch
 FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
+ROUGH = 6.0  # of the mesh on which depths under a force are looked for, good to some tenths of a per cent of the depth
+COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it
+NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
+DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +70,13 @@ def continue_in_friction(
         except ContactLost:
             step /= 2.0
             continue
+        under_force = first is not None
         if further.reaches_end:  # the skin that may touch ends: what lies beyond is not known
-            step, unknown = step / 2.0, first is not None
-            continue
-        if first is not None and not further.load.depth > 0.0:  # pressed by a surface that it does not reach
+            step, unknown = step / 2.0, under_force
+        elif under_force and not further.load.depth > 0.0:  # pressed by a surface that it does not reach
             step /= 2.0
-            continue
-        state, reached, step = further, aim, 2.0 * step
+        else:
+            state, reached, step = further, aim, 2.0 * step
     if reached == load.mu:
         return state, reached
     return None, 0.0 if unknown else reached
@@ -94,9 +99,7 @@ class Bodies:
 
     def build_for(self, depth: float, fineness: float) -> Newton:
         """Return a body with a mesh of its own."""
-        scene = self._scene
-        mesh = finger_mesh(scene.finger, scene.receptor, Sizing(fineness, depth, margin=WIDE)).mesh
-        return Newton(LinearBody.of(mesh, settled_moduli(scene.materials), checked=True).condensed)
+        return LinearFinger.of(self._scene, Sizing(fineness, depth, margin=WIDE)).newton
 
 
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
@@ -188,12 +191,14 @@ def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibri
     )
 
 
-def followed_under(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
-    """Return full slip under the normal force of a scene, continued from mu = 0 as `continue_in_friction` does.
+def follow_friction(scene: Scene, finger: LinearFinger) -> tuple[EquilibriumState | None, float]:
+    """Return full slip at the depth or normal force of a scene, as `continue_in_friction` does from mu = 0.
 
     Raises NoSteadyState where that force presses the finger to its bone.
     """
-    load, force = sliding_load(scene), scene.normal_force or 0.0
+    load, force = sliding_load(scene), scene.normal_force
+    if force is None:
+        return continue_in_friction(finger.newton, load)
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
         first = slide_under(finger.newton, load._replace(mu=0.0), force, deepest)
@@ -259,7 +264,7 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
-        reached, _ = continue_in_friction(finger.newton, sliding_load(scene))
+        reached, _ = follow_friction(scene, finger)
         if reached is None:
             raise
         return reached
@@ -282,10 +287,7 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
         why = str(lost)
     if direction == 0:
         raise _no_answer(scene, why, 0.0)
-    if scene.normal_force is None:
-        reached, limit = continue_in_friction(finger.newton, sliding_load(scene))
-    else:
-        reached, limit = followed_under(scene, finger)
+    reached, limit = follow_friction(scene, finger)
     if reached is None:
         raise _no_answer(scene, why, limit)
     return reached
@@ -303,7 +305,7 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
             f"No settled state was found at {at}, from any first guess: {why}; ask for less friction or depth."
         )
     limit_force = limit_depth = None
-    with suppress(LinAlgError, ContactLost):  # of stiffnesses that a mesh for less depth does not stand
+    with suppress(NotConverged):  # stiffnesses that a mesh for less depth does not stand
         limit_force, limit_depth = limits(scene, sliding_load(scene))
     known = ((limit_force, "N/mm"), (limit_depth, "mm"))
     elsewhere = " and ".join(f"{limit:.3g} {unit}" for limit, unit in known if limit is not None)
@@ -318,3 +320,81 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
     return NoSteadyState(
         f"{message}.", limit_mu=limit_mu, limit_indentation=limit_depth, limit_normal_force=limit_force
     )
+
+
+def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> tuple[float | None, ...]:
+    """Return for each scene the indentation [mm] at which its settled normal force is the given one [N/mm].
+
+    Found directly, with the depth as an unknown and the force given. All scenes share the finger, materials and
+    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state.
+    """
+    if not scenes:
+        return ()
+    deepest = DEEPEST * scenes[0].finger.pulp_thickness()
+    finger = _finger(scenes[0].frictionless_press(deepest))
+    pressed = [_pressed(finger, scene, force, deepest) for scene, force in zip(scenes, normal_forces, strict=True)]
+    return tuple(None if state is None else state.load.depth for state in pressed)
+
+
+def expected_depth(scene: Scene) -> float:
+    """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
+    force = scene.normal_force
+    if force is None:
+        return scene.loading.depth
+    deepest = DEEPEST * scene.finger.pulp_thickness()
+    try:
+        finger = _finger(scene.frictionless_press(deepest))
+    except (SceneError, NotConverged):  # who makes the meshes that count will tell
+        return deepest
+    state = _pressed(finger, scene, force, deepest)
+    drag = scene.tangential_force or 0.0
+    held = scene.loading.direction == 0 or scene.loading.dragged
+    if held and (state is None or drag < NEARLY * abs(state.force[0])):
+        # Then it goes about as deep as one that slides with so much drag and no more.
+        friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
+        state = _pressed(finger, replace(scene, friction=friction), force, deepest)
+    if state is None:
+        return deepest
+    # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
+    highest = float(finger.body.condensed.rest[state.touching, 1].max())
+    return max(state.load.depth, COVERED * highest, SHALLOW)
+
+
+def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
+    """Raise SolveFailure where a given force has led to a `depth` [mm] that no model of the tissue reaches.
+
+    `most` is the normal force [N/mm] that the tissue carries down to the bone, where that is known.
+    """
+    force, room = scene.normal_force, scene.finger.pulp_thickness()
+    if force is None or SHALLOW <= depth < room:
+        return
+    if depth < 0.0:
+        raise NotConverged(
+            f"Under a normal force of {force:.3g} N/mm the drag holds the bone {-depth:.3g} mm above first touch: ask "
+            "for more force, or less friction or drag."
+        )
+    if depth < SHALLOW:
+        raise NotConverged(
+            f"A normal force of {force:.3g} N/mm presses the finger {depth:.1g} mm deep only: below {SHALLOW:g} mm "
+            "round-off is as large as what there is to find; ask for more."
+        )
+    carried = "" if most is None else f": with this friction the {room:.3g} mm of tissue carry up to {most:.3g} N/mm"
+    raise NoSteadyState(
+        f"A normal force of {force:.3g} N/mm would press the finger {depth:.3g} mm deep, to its bone{carried}; "
+        "ask for less."
+    )
+
+
+@lru_cache(maxsize=1)
+def _finger(bare: Scene) -> LinearFinger:
+    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it."""
+    return LinearFinger.of(bare, Sizing(ROUGH, bare.loading.depth))
+
+
+def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
+    """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
+    try:
+        state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
+    except ContactLost:
+        return None
+    return None if state.reaches_end or state.load.depth > deepest else state

@@ -19,9 +19,8 @@ from solver.arrays import Array
 from solver.body import Patches
 from solver.continuation.existence import doubts
 from solver.continuation.finite_states import settled
-from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined
+from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined, within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
-from solver.equilibrium.expected_depth import within_reach
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_path import Instant, end, march
 from solver.equilibrium.load_stepping import forces_of

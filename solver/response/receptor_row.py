@@ -17,9 +17,8 @@ from solver.body.linear import Elastic, LinearPatches
 from solver.body.receptor import endings
 from solver.continuation.existence import sound
 from solver.continuation.finite_states import roughly
-from solver.continuation.small_states import WIDE, direct, nearest
+from solver.continuation.small_states import WIDE, direct, expected_depth, nearest
 from solver.equilibrium import EquilibriumState
-from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger, finite_laws, settled_moduli
 from solver.equilibrium.load_path import end
 from solver.equilibrium.load_stepping import forces_of

@@ -10,7 +10,7 @@ from solver.accuracy.error_estimate import ContrastError, compared_sets, contras
 from solver.accuracy.omitted_effects import COARSE, Answers, measure_differences
 from solver.accuracy.refinement import refine_lines
 from solver.accuracy.residual_overstress import with_viscosity
-from solver.equilibrium.expected_depth import expected_depth
+from solver.continuation.small_states import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import Instant
 from solver.failures import NoSteadyState, NotConverged, SolveFailure

@@ -15,8 +15,8 @@ import numpy as np
 from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.body import Endings, Patches, Probes
+from solver.continuation.small_states import expected_depth
 from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
-from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_stepping import corrected
 from solver.failures import ContactLost

@@ -8,8 +8,7 @@ import numpy as np
 
 from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.arrays import Array
-from solver.continuation.small_states import WIDE, settled
-from solver.equilibrium.expected_depth import expected_depth
+from solver.continuation.small_states import WIDE, expected_depth, settled
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure

@@ -7,9 +7,8 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
 from solver.accuracy.error_estimate import errors
-from solver.continuation.small_states import nearest, settled
+from solver.continuation.small_states import expected_depth, nearest, settled
 from solver.equilibrium import EQUILIBRIUM
-from solver.equilibrium.expected_depth import expected_depth
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.prediction import COUNT, NestedNumbers
