@@ -76,7 +76,6 @@ class RateWatch:
         return False
 
     def _find(self, rate: float, most: float) -> None:
-        """Take another rate for true."""
         if abs(rate / self.nominal - 1.0) < self._vague:
             self.rate = self.nominal = rate
         else:

@@ -197,5 +197,4 @@ def _resolved(host: str, deadline: Deadline) -> str:
 
 
 def _reason(error: OSError) -> str:
-    """Return why an operation failed, in the system's words."""
     return (error.strerror or type(error).__name__).lower()

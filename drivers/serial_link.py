@@ -107,7 +107,6 @@ def port_of(address: Address) -> str:
 
 
 def _reason(error: Exception, baud: int) -> str:
-    """Return why a port did not open and what to do."""
     number = getattr(error, "errno", None)
     text = str(error)
     if number in (errno.EAGAIN, errno.EBUSY) or "exclusively lock" in text:

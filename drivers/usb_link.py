@@ -89,7 +89,6 @@ def devices(vendor: int, product: int) -> Sequence[Any]:
 
 
 def _reason(error: OSError) -> str:
-    """Return why it failed and what to do."""
     match error.errno:
         case errno.EBUSY:
             return "another program has it; end that program"

@@ -144,7 +144,6 @@ class Bench:
         return wrench + white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
     def _planted(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
-        """Return the truth of a stroke, its times on the bench's axis."""
         start, stop = course.steady
         travel = course.position(np.array([start, stop]))
         limit = 3.0 * self.settings.noise_force
@@ -294,7 +293,6 @@ class DirectTransducer:
 
     @property
     def _due(self) -> int:
-        """Readings from 0 that have been taken by now."""
         return int(self.now() * RATE) + 1
 
     def _is_lost(self, time: Array) -> NDArray[np.bool_]:

@@ -84,7 +84,6 @@ class LabJackU6Box:
             time.sleep(_NAP)
 
     def _switch_on(self) -> None:
-        """Forget what power-off forgets."""
         self._answer: bytes | None = None
         self._scan: tuple[list[int], int, float] | None = None  # channels, readings a packet, scans a second
         self._streams = False

@@ -221,7 +221,6 @@ class Electronics:
         return float(self._faults.instants(np.array([age]))[0])
 
     def _age(self, time: float) -> float:
-        """Return how far the box's own clock has come at `time`."""
         return float(self._faults.aged(np.array([time]))[0])
 
     def readings(self, ticks: list[int]) -> list[bytes]:

@@ -110,7 +110,6 @@ class SerialFtBox(LineBox):
             self._say(port, record)
 
     def _age(self, time: float) -> float:
-        """Return how far the box's own clock has come at `time`."""
         return float(self.faults.aged(np.array([time]))[0])
 
     def _ended(self, record: int) -> float:

@@ -201,6 +201,5 @@ def serve_digital_ft(*, seed: int = 0, factor: float = 1.0, script: Path | None 
 
 
 def _scripted(script: Path | None, seed: int) -> tuple[ScriptedBench, Faults]:
-    """Return the bench and the faults of a script, or of the usual timetable."""
     timetable = usual_timetable() if script is None else load_timetable(script)
     return ScriptedBench(seed, timetable), Faults(timetable.faults, seed=seed, repeat=timetable.repeat)

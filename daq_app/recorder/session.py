@@ -25,7 +25,7 @@ from sessions.plan.study import StudyError, study_key
 from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, Setting, provenance
 from sessions.recording.head import certificate_for, simulated_sentence, software_versions, without_home
 from sessions.recording.manifest import is_sealed
-from sessions.recording.rescue import fold_log
+from sessions.recording.recovery import fold_log
 from sessions.recording.storage import RESERVE, check_room, need, unsafe
 from sessions.run import resuming
 from sessions.run.runner import STOPPED, Ending, Operator, Resumed, Status, run_session
@@ -138,7 +138,7 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     folder = Path(request.folder)
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
-    fold_log(Recording.open(folder))  # fails while another recorder writes: its transducer is left alone then
+    fold_log(folder, Recording.open(folder).events)  # fails while another recorder writes, whose transducer is left
     recording = Recording.open(folder)
     resuming.check_resumable(recording)
     _folder_settings(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))

@@ -111,7 +111,6 @@ def _info(place: _Where, stored: wire.StoredCalibration, status: int | None, mea
 
 
 def _where(address: Address) -> _Where:
-    """Return what a digital-ft address says. Raises SetupError when it is not one."""
     check_options(address, _OPTIONS)
     parity = address.options.get("parity", "even")
     if parity not in ("even", "none"):

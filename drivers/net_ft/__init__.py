@@ -56,7 +56,6 @@ def identify_net_ft(address: Address, deadline: Deadline) -> TransducerInfo:
 
 
 def _where(address: Address) -> _Where:
-    """Return what a net-ft address says. Raises SetupError when it is not one."""
     check_options(address, _OPTIONS)
     if not address.host:
         raise SetupError(f"{address.uri} names no host; write for example net-ft://192.168.1.1")

@@ -93,7 +93,6 @@ class SettingsWatch:
 
 
 def _units(info: TransducerInfo) -> str:
-    """Return how many counts make a newton and a newton millimetre."""
     force, torque = 1.0 / info.calibration.matrix[0, 0], 1.0 / info.calibration.matrix[3, 3]
     return f"{force:.6g} counts a N and {torque:.6g} a N mm"
 
@@ -319,14 +318,12 @@ class NetFtTransducer(ThreadedTransducer):
         return f"{self.info.uri} sent no reading within {seconds:.1f} s; check its power and network cable"
 
     def _answers(self) -> bool:
-        """Tell whether somebody answers on the web page."""
         try:
             return self._who() is not None
         except SetupError:
             return True
 
     def _fell_silent(self, seconds: float) -> str:
-        """Return why a running stream was given up."""
         if self._answers():
             return (
                 f"{self.info.uri} has sent nothing for {seconds:.1f} s though its web page still answers; "

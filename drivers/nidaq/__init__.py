@@ -199,7 +199,6 @@ class TaskConversation:
 
 
 def _sentence(error: Exception) -> str:
-    """Return the first line of the library's explanation."""
     lines = str(error).splitlines()
     return (lines[0] if lines else type(error).__name__).rstrip(".")
 

@@ -123,7 +123,6 @@ def _is_simulated(address: Address, said: str) -> bool:
 
 
 def _where(address: Address) -> _Where:
-    """Return what a serial-ft address says. Raises SetupError when it is not one."""
     check_options(address, _OPTIONS)
     port = port_of(address)
     form = address.options.get("format", "binary")

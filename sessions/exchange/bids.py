@@ -113,10 +113,9 @@ def _dataset(recording: Recording, kind: str, software: Mapping[str, str]) -> di
     }
     what = "Recording" if kind == "raw" else "Strokes, friction and predictions"
     name = f"{what} of {recording.plan.subject}, protocol {recording.plan.protocol}"
-    simulated = recording.simulated_sentence
     return {
-        **({"SIMULATED": simulated} if simulated else {}),
-        "Name": f"SIMULATED: {name}" if simulated else name,
+        **recording.mark,
+        "Name": f"SIMULATED: {name}" if recording.simulated else name,
         "BIDSVersion": VERSION,
         "DatasetType": kind,
         "GeneratedBy": [by],
@@ -171,7 +170,7 @@ def _write_readings(recording: Recording, folder: Path, names: _Names, progress:
                 write_json(
                     folder / f"{stem}.json",
                     {
-                        **({"SIMULATED": recording.simulated_sentence} if recording.simulated else {}),
+                        **recording.mark,
                         "SamplingFrequency": recording.info.rate,
                         "StartTime": (int(block.received_ns[0]) - first_ns) * 1e-9,
                         "PhysioType": "generic",
@@ -259,9 +258,8 @@ def _write_table(stem: Path, table: Table, recording: Recording, more: Mapping[s
             # Tabs and line ends have no place in a cell, and a BIDS table knows no quotes.
             cells = (MISSING if cell is None or cell == "" else re.sub(r"[\t\r\n]+", " ", str(cell)) for cell in row)
             file.write("\t".join(cells) + "\n")
-    head = {"SIMULATED": recording.simulated_sentence} if recording.simulated else {}
     described = {column.heading: _described(column) for column in columns_written if column.heading not in _KNOWN}
-    sidecar = {**head, "Description": table.meaning, **(more or {}), **described}
+    sidecar = {**recording.mark, "Description": table.meaning, **(more or {}), **described}
     write_json(stem.with_name(f"{stem.name}.json"), sidecar)
 
 
@@ -270,9 +268,8 @@ def _described(column: Column) -> dict[str, str]:
 
 
 def _readme(recording: Recording) -> str:
-    simulated = recording.simulated_sentence
     lines = [
-        *([simulated, ""] if simulated else []),
+        *([recording.simulated_sentence, ""] if recording.simulated_sentence else []),
         f"# Session of {recording.plan.subject}, protocol {recording.plan.protocol}",
         "",
         "A subject strokes surfaces over a six-axis force transducer and judges each of them.",

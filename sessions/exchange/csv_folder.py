@@ -35,8 +35,7 @@ def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     write_json(folder / DESCRIPTION_FILE, description(recording))
     for name, document in (("analysis.json", source.analysis), ("prediction.json", source.prediction)):
         if document is not None:
-            head = {"SIMULATED": recording.simulated_sentence} if recording.simulated_sentence else {}
-            write_json(folder / name, {**head, **document})
+            write_json(folder / name, {**recording.mark, **document})
     for name, content in side_files(recording.folder).items():
         (folder / name).write_bytes(content)
     (folder / README).write_text(_readme(recording, contents), encoding="utf-8")
@@ -98,10 +97,8 @@ def _rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def _readme(recording: Recording, contents: Sequence[tuple[str, str, Sequence[Column]]]) -> str:
-    """Return the page that describes every file and column."""
-    simulated = recording.simulated_sentence
     lines = [
-        *([simulated, ""] if simulated else []),
+        *([recording.simulated_sentence, ""] if recording.simulated_sentence else []),
         f"# Session of {recording.plan.subject}, protocol {recording.plan.protocol}",
         "",
         "Comma-separated values, UTF-8, a point in every decimal number; an empty cell is a number that is not known,",

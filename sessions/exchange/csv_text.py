@@ -15,8 +15,7 @@ import numpy as np
 
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
-from sessions.exchange.column_meanings import AXES
-from sessions.exchange.session_tables import Column
+from sessions.exchange.session_tables import AXES, Column
 from sessions.file_access import LARGEST_TABLE, read_limited, remedy
 from sessions.prediction.press_curves import DisplacementLog
 

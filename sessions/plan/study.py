@@ -337,7 +337,6 @@ def _study(connection: sqlite3.Connection, folder: Path) -> Study:
 
 @contextmanager
 def _reading(folder: Path) -> Generator[sqlite3.Connection]:
-    """Lend a connection that changes nothing."""
     path = folder / STUDY_FILE
     with name_failure(StudyError, f"{path} cannot be read", failures=DATABASE_FAILURES):
         path.open("rb").close()  # says why it cannot be read, which SQLite does not

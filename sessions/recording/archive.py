@@ -8,7 +8,7 @@ from sessions.file_access import json_value, put_in_place, read_limited, remedy,
 from sessions.recording.derived import ABSENT, unlike
 from sessions.recording.manifest import changed_files, description, head_of_manifest, is_sealed, list_in_manifest
 from sessions.recording.reader import Recording
-from sessions.recording.rescue import fold_log
+from sessions.recording.recovery import fold_log
 from sessions.recording.schema import DESCRIPTION_FILE, LIVE_FILE, MANIFEST_FILE, SEALED_FILE, RecordingError
 from sessions.recording.sealed_copy import differences, write_copy
 from sessions.recording.storage import release_reserve
@@ -24,7 +24,7 @@ def seal(folder: Path) -> None:
     """
     if is_sealed(folder):
         raise RecordingError(f"{folder} is sealed already: {MANIFEST_FILE} lists its files")
-    fold_log(Recording.open(folder))
+    fold_log(folder, Recording.open(folder).events)
     release_reserve(folder)
     recording = Recording.open(folder)
     new = folder / f".{SEALED_FILE}.part"

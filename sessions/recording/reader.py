@@ -21,8 +21,8 @@ from sessions.plan.plan import SessionPlan
 from sessions.recording import schema
 from sessions.recording.head import Provenance, info_from_dict
 from sessions.recording.log import LoggedEvent, TrialRecord, event_data, health_of, trial_records
+from sessions.recording.recovery import torn_log
 from sessions.recording.schema import RecordingError
-from sessions.recording.wal_recovery import log_tail
 
 # Kinds of events that sealing, resuming and restoring add, each with a sentence on what is missing.
 TELL_LOSSES = frozenset({"log_torn", "not_restored"})
@@ -222,7 +222,6 @@ def _end(events: Iterable[LoggedEvent]) -> Mapping[str, Any] | None:
 def _blocks(
     connection: sqlite3.Connection, losses: list[str], between: tuple[int, int | None] | None
 ) -> Iterator[ReadingBlock]:
-    """Yield the undamaged blocks of an open file."""
     condition, limits = "", ()
     if between is not None:
         condition = " WHERE received_last_ns >= ?" + ("" if between[1] is None else " AND received_first_ns < ?")
@@ -303,19 +302,6 @@ def _event(number: int, row: Sequence[object]) -> LoggedEvent:
     if schema.event_crc(LoggedEvent(number, time_ns, kind, trial, readings, {}), text) != crc:
         raise ValueError("CRC-32 differs")
     return LoggedEvent(number, time_ns, kind, trial, readings, event_data(kind, text))
-
-
-def torn_log(path: Path) -> Iterator[str]:
-    """Name what a crash tore off the end of the live file's write-ahead log."""
-    log = _side_file(path, "-wal")
-    if log.is_file():
-        with log.open("rb", buffering=0) as file:
-            torn = log_tail(file).torn_bytes
-        if torn:
-            yield (
-                f"the last {torn} bytes of the write-ahead log hold no whole commit and are left out:"
-                " they had not been acknowledged, or were damaged since"
-            )
 
 
 @contextmanager

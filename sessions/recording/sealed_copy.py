@@ -213,7 +213,6 @@ def _trials(recording: Recording) -> Iterator[DataSet]:
 
 
 def _empty_readings(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Make the data sets of the readings, which grow block by block."""
     data_sets: dict[str, h5py.Dataset] = {}
     for name, kind in COLUMNS.items():
         width = (6,) if name == "raw" else ()

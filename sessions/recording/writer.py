@@ -19,7 +19,7 @@ from sessions.recording.head import info_to_dict, json_text, simulated_sentence,
 from sessions.recording.log import LoggedEvent
 from sessions.recording.manifest import is_sealed
 from sessions.recording.reader import Recording
-from sessions.recording.rescue import fold_log, identities, rescued
+from sessions.recording.recovery import fold_log, identities, rescued
 from sessions.recording.schema import RecordingError
 from sessions.recording.storage import release_reserve, take_reserve
 
@@ -119,7 +119,7 @@ class SessionWriter:
         """
         if is_sealed(folder):
             raise RecordingError(f"{folder} is sealed: nothing is added to it; begin a new session")
-        fold_log(Recording.open(folder))
+        fold_log(folder, Recording.open(folder).events)
         path = folder / schema.LIVE_FILE
         with name_failure(RecordingError, f"{folder} cannot be gone on in"):
             if reserve:
@@ -301,7 +301,6 @@ class SessionWriter:
         return rows
 
     def _fail(self, error: sqlite3.Error) -> NoReturn:
-        """Refuse everything from now on."""
         safe = self._acknowledged
         self._failure = (
             f"the disk took no more ({error}): the first {safe.readings} readings and {safe.events} events are safe; "
@@ -322,7 +321,6 @@ class FleetingWriter(SessionWriter):
 
 
 def _prepare(connection: sqlite3.Connection, head: Mapping[str, str], *, durable: bool) -> None:
-    """Lay out the tables and write the head, in one commit."""
     connection.execute(f"PRAGMA application_id={schema.APPLICATION_ID}")
     _make_durable(connection)
     connection.execute("BEGIN IMMEDIATE")

@@ -50,25 +50,9 @@ def event_from_data(kind: str, data: Mapping[str, Any]) -> steps.Event:
 
 def line_of(command: steps.Command) -> Line | None:
     """Return how a command is logged; None for one that leaves no trace of its own."""
-    match command:
-        case steps.StartTake(trial, take):
-            return "take_started", trial, {"take": take}
-        case steps.KeepTake(trial, take):
-            return "take_kept", trial, {"take": take}
-        case steps.DiscardTake(trial, take, reason):
-            return "take_discarded", trial, {"take": take, "reason": reason}
-        case steps.RestoreTake(trial, take):
-            return "take_restored", trial, {"take": take}
-        case steps.LeaveOut(trial, reason):
-            return "left_out", trial, {"reason": reason}
-        case steps.Tell(sentence):
-            return "told", None, {"sentence": sentence}
-        case _:
-            return _question_line(command)
-
-
-def _question_line(command: steps.Command) -> Line | None:
-    """Return how it is logged that something was asked for."""
+    if (kind := _COMMANDS.get(type(command))) is not None:
+        data = msgspec.structs.asdict(command)
+        return kind, data.pop("trial", None), data
     match command:
         case steps.ShowInstruction(block):
             return "instruction_shown", None, {"block": block.name}
@@ -99,6 +83,14 @@ def _kind(cls: type[steps.Event]) -> str:
     return _RECORDED_AS.get(cls) or re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
 
 
+_COMMANDS: dict[type[steps.Command], str] = {  # whose line holds all that the command does
+    steps.StartTake: "take_started",
+    steps.KeepTake: "take_kept",
+    steps.DiscardTake: "take_discarded",
+    steps.RestoreTake: "take_restored",
+    steps.LeaveOut: "left_out",
+    steps.Tell: "told",
+}
 _RECORDED_AS: dict[type[steps.Event], str] = {steps.MagnitudeEstimate: "number_given", steps.PairedChoice: "chosen"}
 _EVENTS: dict[str, type[steps.Event]] = {_kind(cls): cls for cls in get_args(steps.Event)}
 

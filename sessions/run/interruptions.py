@@ -11,7 +11,6 @@ class Interruptions:
     """Whether somebody wants the program to stop."""
 
     def __init__(self) -> None:
-        """Start with nobody wanting it."""
         self.heard = False
         self._at_once = False
 

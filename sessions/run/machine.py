@@ -91,7 +91,6 @@ def trial_in_hand(state: State) -> int | None:
 
 
 def _went_on(state: State, event: steps.Event) -> Step:
-    """Follow the plan."""
     match state, event:
         case Idle(place), steps.Begin():
             return Mounting(place), _asking_for(place, new_block=True)
@@ -266,7 +265,6 @@ def _stroke_over(place: Place) -> Step:
 
 
 def _further_stroke(place: Place, strokes: int) -> tuple[steps.Command, ...]:
-    """Say so where a stroke is one more than allowed."""
     allowed = place.block.strokes_allowed
     if strokes <= allowed:
         return ()
@@ -347,7 +345,6 @@ def _discarding(state: State, reason: str) -> tuple[steps.Command, ...]:
 
 
 def _refusal(state: State, event: steps.Event) -> steps.Refuse:
-    """Say what came, and what is waited for."""
     waiting: dict[type[State], str] = {
         Idle: "the session has not begun",
         Mounting: "a stimulus is to be mounted",
@@ -361,27 +358,4 @@ def _refusal(state: State, event: steps.Event) -> steps.Refuse:
         Closing: "every trial is done",
         Ended: "the session has ended",
     }
-    return steps.Refuse(f"{WORDS[type(event)]} means nothing now: {waiting[type(state)]}")
-
-
-WORDS: dict[type[steps.Event], str] = {
-    steps.Abort: "abort",
-    steps.Begin: "begin",
-    steps.StimulusMounted: "a mounted stimulus",
-    steps.Zeroed: "a measured zero",
-    steps.ContactOnset: "a touch",
-    steps.FingerLifted: "a lift",
-    steps.Settled: "a finger that stays off",
-    steps.StrokeDone: "a stroke reported by hand",
-    steps.Scored: "a score",
-    steps.MagnitudeEstimate: "a number",
-    steps.PairedChoice: "a choice",
-    steps.Note: "a note",
-    steps.Redo: "redo",
-    steps.UndoRedo: "the undoing of a redo",
-    steps.Skip: "skip",
-    steps.Pause: "pause",
-    steps.Resume: "resume",
-    steps.RestOver: "the end of a rest",
-    steps.Finish: "finish",
-}
+    return steps.Refuse(f"{steps.WORDS[type(event)]} means nothing now: {waiting[type(state)]}")

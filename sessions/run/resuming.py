@@ -145,7 +145,8 @@ def continued(recording: Recording, last: ReadingBlock, clock: Clock, now: datet
     gap_ns = elapsed_ns - round((last_ns - at_ns) / float(recording.provenance["clock"]["factor"]))
     offset_ns = last_ns + max(gap_ns, LEAST_GAP_NS) - clock.now_ns()
     duration = gap_ns * 1e-9 if elapsed_ns >= 0 else None
-    gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, _text(now))
+    resumed_utc = now.astimezone(UTC).isoformat(timespec="milliseconds")
+    gap = Gap(last_ns, None if duration is None else max(duration, 0.0), offset_ns, resumed_utc)
     return ContinuedClock(clock, offset_ns), gap
 
 
@@ -191,7 +192,3 @@ def resumed_data(gap: Gap, info: TransducerInfo | None, software: Mapping[str, s
 def _of_takes(commands: Sequence[Command]) -> list[Line]:
     lines = [line_of(command) for command in commands]
     return [line for line in lines if line is not None and line[0] in OF_TAKES]
-
-
-def _text(now: datetime) -> str:
-    return now.astimezone(UTC).isoformat(timespec="milliseconds")

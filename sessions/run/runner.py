@@ -198,7 +198,9 @@ class _Run:
             for event in self._watch.feed(block):
                 self._take(event)
         if isinstance(self._state, Taring) and self._due("zero", self.settings.zero_patience):
-            self._show(Tell("the zero cannot be measured while something moves or touches; take hands off"))
+            zero_missing = Tell("the zero cannot be measured while something moves or touches; take hands off")
+            self.writer.event("told", trial_in_hand(self._state), {"sentence": zero_missing.sentence})
+            self.operator.show(zero_missing)
         self._report_losses()
 
     def _going_on(self, block: ReadingBlock) -> ReadingBlock:
@@ -258,10 +260,6 @@ class _Run:
         )
         self._due_ns["zero"] = self.clock.now_ns() + round(settings.zero_patience * 1e9)
 
-    def _show(self, command: Tell) -> None:
-        self.writer.event("told", trial_in_hand(self._state), {"sentence": command.sentence})
-        self.operator.show(command)
-
     def _report_losses(self, *, now: bool = False) -> None:
         """Write down what the driver lost, repeated or found wrong since the last report."""
         if self.transducer is None:
@@ -320,7 +318,6 @@ class _Run:
         return end
 
     def _last_readings(self) -> Health:
-        """Stop the transducer and take what had still arrived."""
         if self.transducer is None:
             return Health()
         self.transducer.stop()

@@ -141,6 +141,28 @@ Event = (
     | MagnitudeEstimate | PairedChoice | Note | Redo | UndoRedo | Skip | Pause | Resume | RestOver | Abort | Finish
 )  # fmt: skip
 
+WORDS: dict[type[Event], str] = {
+    Abort: "abort",
+    Begin: "begin",
+    StimulusMounted: "a mounted stimulus",
+    Zeroed: "a measured zero",
+    ContactOnset: "a touch",
+    FingerLifted: "a lift",
+    Settled: "a finger that stays off",
+    StrokeDone: "a stroke reported by hand",
+    Scored: "a score",
+    MagnitudeEstimate: "a number",
+    PairedChoice: "a choice",
+    Note: "a note",
+    Redo: "redo",
+    UndoRedo: "the undoing of a redo",
+    Skip: "skip",
+    Pause: "pause",
+    Resume: "resume",
+    RestOver: "the end of a rest",
+    Finish: "finish",
+}
+
 # ---- what is to be done
 
 
@@ -272,7 +294,6 @@ ANSWER_EVENTS: dict[Answer, type[AnswerEvent] | None] = {
     "choice": PairedChoice,
     "none": None,
 }
-IN_WORDS: dict[type[AnswerEvent], str] = {Scored: "a score", MagnitudeEstimate: "a number", PairedChoice: "a choice"}
 
 
 def answer_problem(answer: AnswerEvent, expected: Answer) -> str | None:
@@ -287,7 +308,7 @@ def answer_problem(answer: AnswerEvent, expected: Answer) -> str | None:
     if expected_kind is None:
         return "this trial asks for no answer"
     if not isinstance(answer, expected_kind):
-        return f"this trial asks for {IN_WORDS[expected_kind]}, not for {IN_WORDS[type(answer)]}"
+        return f"this trial asks for {WORDS[expected_kind]}, not for {WORDS[type(answer)]}"
     if answer.corrections is not None and answer.corrections < 0:
         return f"an answer is corrected a number of times; {answer.corrections} is none"
     match answer:

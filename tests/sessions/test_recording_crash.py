@@ -13,7 +13,7 @@ from recordings import begun, readings
 from told_session import Session
 
 from sessions.recording import Recording, RecordingError
-from sessions.recording.wal_recovery import log_tail
+from sessions.recording.recovery import log_tail
 
 resource = pytest.importorskip("resource", reason="limits a file's size, which needs POSIX")
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills a process of its own, which needs fork")

@@ -16,8 +16,8 @@ from recordings import PLAN, begun, change, ended, readings, rows
 
 from sessions.recording import LoggedEvent, Recording, RecordingError
 from sessions.recording.log import trial_records
+from sessions.recording.recovery import log_tail
 from sessions.recording.schema import FORMAT, FORMAT_VERSION
-from sessions.recording.wal_recovery import log_tail
 
 
 def hashes(folder):

@@ -169,13 +169,14 @@ def test_a_session_beside_which_nothing_can_be_written_is_rescued_in_the_users_h
 
 
 def test_a_session_that_can_be_written_nowhere_is_never_called_safe(tmp_path, monkeypatch):
-    from sessions.recording import rescue
+    from sessions.recording import recovery
 
     safe = []
     writer = begun(tmp_path / "s")
     writer.safe = safe.extend
     writer.event("started")
-    monkeypatch.setattr(rescue, "sync_folder", lambda _: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    full = OSError(28, "No space left on device")
+    monkeypatch.setattr(recovery, "sync_folder", lambda _: (_ for _ in ()).throw(full))
     shutil.rmtree(tmp_path / "s")
     with pytest.raises(RecordingError, match=r"could be written nowhere else .*No space left.*look for the folder"):
         writer.event("note")

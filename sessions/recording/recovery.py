@@ -1,0 +1,200 @@
+"""What becomes of a live file after a crash, its log torn, and of one whose name is gone, written anew.
+
+SQLite leaves a torn tail of its write-ahead log out without a word; a recording names it. Layout of the log: the SQLite
+documentation, "WAL-mode File Format".
+"""
+
+import errno
+import itertools
+import os
+import sqlite3
+import struct
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from sessions.file_access import sync_folder
+from sessions.recording.log import LoggedEvent
+from sessions.recording.schema import LIVE_FILE, RecordingError, event_row
+
+HEADER = struct.Struct(">8I")  # magic, version, page size, checkpoint number, two salts, two check sums
+FRAME = struct.Struct(">6I")  # page number, pages after a commit (else 0), two salts, two check sums
+BIG_ENDIAN_SUMS = 0x377F0683
+LITTLE_ENDIAN_SUMS = 0x377F0682
+PAGE_SIZES = frozenset(2**power for power in range(9, 17))  # that SQLite knows [bytes]
+_HOLE = (0, 0, 0, 0, 0, 0)  # a frame where nothing was ever written
+
+
+@dataclass(frozen=True, slots=True)
+class LogTail:
+    """What a write-ahead log holds."""
+
+    commits: int  # whole commits not yet folded into the file
+    torn_bytes: int  # bytes after the last whole commit that were written in this run of the log
+
+
+def log_tail(log: BinaryIO) -> LogTail:
+    """Follow the frames of a write-ahead log as SQLite's recovery does, a frame in memory at a time."""
+    size = log.seek(0, os.SEEK_END)
+    head = _read(log, 0, HEADER.size)
+    if len(head) < HEADER.size:
+        return LogTail(0, size)
+    magic, _, page_size, _, salt_1, salt_2, sum_1, sum_2 = HEADER.unpack(head)
+    order = ">" if magic == BIG_ENDIAN_SUMS else "<"
+    sums = _sums(head[:-8], order, (0, 0))
+    if magic not in (BIG_ENDIAN_SUMS, LITTLE_ENDIAN_SUMS) or sums != (sum_1, sum_2) or page_size not in PAGE_SIZES:
+        return LogTail(0, size)
+    commits, position, end = 0, HEADER.size, HEADER.size
+    mislabelled = None
+    while position + FRAME.size + page_size <= size:
+        frame = _read(log, position, FRAME.size + page_size)
+        _, pages, *salts, frame_1, frame_2 = FRAME.unpack_from(frame)
+        sums = _sums(frame[:8], order, sums)
+        sums = _sums(frame[FRAME.size :], order, sums)
+        if sums != (frame_1, frame_2):
+            break
+        if salts != [salt_1, salt_2]:  # the sums, which leave salts out, go on: damaged, and not of an earlier run
+            mislabelled = position
+            break
+        position += FRAME.size + page_size
+        if pages:
+            commits, end = commits + 1, position
+    return LogTail(commits, _of_this_run(log, end, page_size, (salt_1, salt_2), mislabelled) - end)
+
+
+def _of_this_run(log: BinaryIO, start: int, page_size: int, salts: tuple[int, int], mislabelled: int | None) -> int:
+    """Return where the last frame carrying `salts` ends, or the one that does not and should, from `start` on.
+
+    Frames after it were left over from an earlier run of the log: those of one run lie together, at its head.
+    """
+    size = log.seek(0, os.SEEK_END)
+    step = FRAME.size + page_size
+    position = end = start
+    while position + FRAME.size <= size:
+        frame = FRAME.unpack(_read(log, position, FRAME.size))
+        if frame == _HOLE and position != mislabelled:
+            position = max(position + step, start + (_next_data(log, position) - start) // step * step)
+            continue
+        position += step
+        if position - step == mislabelled or frame[2:4] == salts:
+            end = position
+    return min(end, size) if end < position else size
+
+
+def _read(log: BinaryIO, position: int, count: int) -> bytes:
+    log.seek(position)
+    return log.read(count)
+
+
+def _next_data(log: BinaryIO, position: int) -> int:
+    """Return where the file holds data again at or after `position`, where the system can tell holes from data."""
+    try:
+        return os.lseek(log.fileno(), position, os.SEEK_DATA)
+    except (OSError, AttributeError) as none:  # no data up to the end; or no system that tells
+        ended = isinstance(none, OSError) and none.errno == errno.ENXIO
+        return log.seek(0, os.SEEK_END) if ended else position
+
+
+def _sums(data: bytes, order: str, sums: tuple[int, int]) -> tuple[int, int]:
+    """Continue the log's running check sums over `data`, whose length is a multiple of 8."""
+    first, second = sums
+    for a, b in struct.iter_unpack(order + "2I", data):
+        first = (first + a + second) & 0xFFFFFFFF
+        second = (second + b + first) & 0xFFFFFFFF
+    return first, second
+
+
+def torn_log(path: Path) -> Iterator[str]:
+    """Name what a crash tore off the end of the live file's write-ahead log."""
+    log = path.with_name(f"{path.name}-wal")
+    if log.is_file():
+        with log.open("rb", buffering=0) as file:
+            torn = log_tail(file).torn_bytes
+        if torn:
+            yield (
+                f"the last {torn} bytes of the write-ahead log hold no whole commit and are left out:"
+                " they had not been acknowledged, or were damaged since"
+            )
+
+
+Identity = tuple[int, int] | None  # device and inode, as `os.stat` tells; None where there is no such file
+SIDES = ("", "-wal")  # the live file, and its log, which holds the newest commits
+
+
+def identities(path: Path) -> tuple[Identity, ...]:
+    """Return which files lie at the names of a live file and of its write-ahead log."""
+    return tuple(_identity(path.with_name(path.name + side)) for side in SIDES)
+
+
+def rescued(source: sqlite3.Connection, path: Path) -> Path:
+    """Write all that an open live file holds into a new folder, and return the path of the file there.
+
+    SQLite reads by the files it holds open, so that names which are gone or name other files do not matter. The folder
+    is made beside that of `path`, in the user's home or in the system's temporary folder, the first that takes it.
+    Raises RecordingError where none does.
+    """
+    why: list[str] = []
+    for folder in _new_folders(path.absolute().parent):
+        new = folder / path.name
+        try:
+            folder.mkdir(parents=True)
+            with closing(sqlite3.connect(new, isolation_level=None)) as target:
+                source.backup(target)
+            for place in (folder, folder.parent):
+                sync_folder(place)
+        except (OSError, sqlite3.Error) as error:
+            why.append(f"{folder}: {error}")
+            with suppress(OSError):
+                new.unlink(missing_ok=True)
+                folder.rmdir()
+        else:
+            return new
+    raise RecordingError(
+        f"{path} was removed, renamed or replaced, and what it held could be written nowhere else ({'; '.join(why)});"
+        " the session has ended: look for the folder under another name or in the trash"
+    )
+
+
+def _identity(path: Path) -> Identity:
+    try:
+        there = path.stat()
+    except OSError:
+        return None
+    return there.st_dev, there.st_ino
+
+
+def _new_folders(session: Path) -> Iterator[Path]:
+    """Yield a folder that is not there yet in each place, the best place first."""
+    for place in (session.parent, Path.home(), Path(tempfile.gettempdir())):
+        numbers = itertools.chain([""], (f"-{number}" for number in itertools.count(2)))
+        names = (place / f"{session.name}-rescued{number}" for number in numbers)
+        yield next(folder for folder in names if not folder.exists())
+
+
+def fold_log(folder: Path, events: Sequence[LoggedEvent]) -> None:
+    """Fold a log that a crash left into the live file with these events. Raises RecordingError while somebody writes.
+
+    Folding loses sight of a torn tail, so that an event is added to tell of it.
+    """
+    live = folder / LIVE_FILE
+    if not live.with_name(f"{live.name}-wal").exists():
+        return
+    number, time_ns, readings = (
+        (last.number, last.time_ns, last.readings) if (last := next(reversed(events), None)) else (0, 0, 0)
+    )
+    torn = [
+        LoggedEvent(number + i, time_ns, "log_torn", None, readings, {"sentence": sentence})
+        for i, sentence in enumerate(torn_log(live), 1)
+    ]
+    try:
+        with closing(sqlite3.connect(live, timeout=0.5, isolation_level=None)) as connection:
+            for event in torn:
+                connection.execute("INSERT INTO events VALUES (?,?,?,?,?,?,?)", event_row(event))
+            connection.execute("PRAGMA journal_mode=DELETE")
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"{live} is in use ({error}); end the program that still writes it, or reads it"
+        ) from error
