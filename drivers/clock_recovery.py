@@ -135,7 +135,7 @@ _SPREAD = 0.05  # how far the true rate may lie from the stated one [-]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Paced:
+class Placement:
     """Where n records lie."""
 
     sequence: NDArray[np.int64]  # (n,) from 1; a missing number is a lost or broken record
@@ -170,7 +170,7 @@ class ClockRecovery:
         self._held_until_ns = 0
         self._looked_ns, self._held_late = 0, 0.0  # how late they were when that was last looked at [s]
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
         if len(damaged) == 0:
             return _NONE
@@ -198,7 +198,7 @@ class ClockRecovery:
             return self.release()
         return _NONE
 
-    def release(self) -> Paced:
+    def release(self) -> Placement:
         """Place what was kept back, as at the end of the stream."""
         if not self._held_damaged:
             return _NONE
@@ -229,7 +229,7 @@ class ClockRecovery:
         steady = self._time + (int(damaged.sum()) + len(damaged)) * self._period
         return (received_ns - self._zero_ns) * 1e-9 - steady
 
-    def _placed(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+    def _placed(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
         """Place records whose numbers follow on, and let the clock lead."""
         slots = np.cumsum(damaged + 1)
         count = int(slots[-1])
@@ -246,10 +246,10 @@ class ClockRecovery:
         change = 1.0 + max(-0.002, min(0.002, _LEAD * share * late))
         longest, shortest = self._period_of_times * (1.0 + _SPREAD), self._period_of_times * (1.0 - _SPREAD)
         self._period = max(shortest, min(longest, self._period * change))
-        return Paced(sequence, time)
+        return Placement(sequence, time)
 
 
-_NONE = Paced(np.empty(0, np.int64), np.empty(0))
+_NONE = Placement(np.empty(0, np.int64), np.empty(0))
 
 
 class ScanCount:
@@ -271,7 +271,7 @@ class ScanCount:
         self._sequence = 0
         self._behind: float | None = None  # arrival minus time of the last scan before [s]
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
         """Place n scans that arrived together, with those lost before each (n,)."""
         if not len(damaged):
             return _NONE
@@ -285,9 +285,9 @@ class ScanCount:
         self.lost += int(sequence[-1]) - self._sequence - len(damaged)
         self._sequence = int(sequence[-1])
         self.watch.take(self._sequence, received_ns)
-        return Paced(sequence, (sequence - 1) / self._rate)
+        return Placement(sequence, (sequence - 1) / self._rate)
 
-    def release(self) -> Paced:
+    def release(self) -> Placement:
         """Place what was kept back: nothing ever is."""
         return _NONE
 

@@ -69,12 +69,12 @@ class Deadline:
         if self.left <= 0.0:
             raise LinkLost(f"it was not ready within {self._seconds:.2g} s; check its power, the cable and the address")
 
-    def bound(self, link: Link) -> "BoundLink":
+    def bound(self, link: Link) -> "_BoundLink":
         """Return the link, whose use ends by this deadline."""
-        return BoundLink(link, self)
+        return _BoundLink(link, self)
 
 
-class BoundLink:
+class _BoundLink:
     """A link that raises LinkLost once a deadline is over, and Stopped at a stop."""
 
     def __init__(self, link: Link, deadline: Deadline) -> None:
@@ -82,12 +82,10 @@ class BoundLink:
         self._deadline = deadline
 
     def send(self, data: bytes) -> None:
-        """Send `data`."""
         self._deadline.check()
         self._link.send(data)
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return what arrived next, or None when nothing came within `timeout` real seconds."""
         until = time.monotonic() + timeout
         while True:
             self._deadline.check()
@@ -97,5 +95,4 @@ class BoundLink:
                 return data
 
     def close(self) -> None:
-        """Give the port back."""
         self._link.close()

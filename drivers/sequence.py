@@ -20,7 +20,7 @@ Relation = Literal["same", "next", "frozen", "behind", "off"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Accounted:
+class Accounting:
     """The verdict on a batch of records: k of them are kept."""
 
     kept: NDArray[np.intp]  # (k,) their positions in the batch
@@ -67,20 +67,20 @@ class SequenceAccount:
         received_ns: Sequence[int],
         *,
         end: bool = False,
-    ) -> Accounted:
+    ) -> Accounting:
         """Judge a batch of n records: their numbers (n,), counters (n,) and when they arrived (n) [ns].
 
         With `end` no further batch will come, and nothing is held back.
         """
         if len(numbers) == 0:
-            return Accounted(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), undecided=False)
+            return Accounting(np.empty(0, np.intp), np.empty(0, np.int64), np.empty(0, np.int64), undecided=False)
         return self._on_the_line(numbers, counters, received_ns) or self._one_by_one(
             [_Record(*record) for record in zip(numbers.tolist(), counters.tolist(), received_ns, strict=True)], end
         )
 
     def _on_the_line(
         self, numbers: NDArray[np.uint32], counters: NDArray[np.uint32], received_ns: Sequence[int]
-    ) -> Accounted | None:
+    ) -> Accounting | None:
         """Return the verdict when every record lies ahead on the line, gaps or not, and None otherwise."""
         last = self._last
         if last is None or self.step is None:
@@ -94,9 +94,9 @@ class SequenceAccount:
         self.lost += int(sequence[-1]) - self._sequence - len(numbers)
         self._sequence, self._counter = int(sequence[-1]), int(counter[-1])
         self._last = _Record(int(numbers[-1]), int(counters[-1]), received_ns[-1])
-        return Accounted(np.arange(len(numbers)), sequence, counter, undecided=False)
+        return Accounting(np.arange(len(numbers)), sequence, counter, undecided=False)
 
-    def _one_by_one(self, records: list[_Record], end: bool) -> Accounted:
+    def _one_by_one(self, records: list[_Record], end: bool) -> Accounting:
         kept: list[int] = []
         places: list[tuple[int, int]] = []
         undecided: int | None = None
@@ -130,7 +130,7 @@ class SequenceAccount:
             self._reject(records[undecided])
             undecided = None
         table = np.array(places, np.int64).reshape(-1, 2)
-        return Accounted(np.array(kept, np.intp), table[:, 0], table[:, 1], undecided=undecided is not None)
+        return Accounting(np.array(kept, np.intp), table[:, 0], table[:, 1], undecided=undecided is not None)
 
     def _relation(self, before: _Record, record: _Record, *, learning: bool = False) -> Relation:
         """Say how `record` lies to `before`; when `learning`, a number one ahead may come after any number of ticks."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.clock_recovery import Paced, RateWatch, rate_of_least_late, rate_words
+from drivers.clock_recovery import Placement, RateWatch, rate_of_least_late, rate_words
 from drivers.deadline import CONNECTING, ENDING, TICK, Deadline, Link, Stopped
 from drivers.readings import ReadingBlock, RecordDecoder, Records
 from drivers.threaded import ThreadedTransducer
@@ -41,11 +41,11 @@ class Numbering(Protocol):
         """What has been found of the stream's rate."""
         ...
 
-    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Paced:
+    def take(self, damaged: NDArray[np.int64], received_ns: int) -> Placement:
         """Place n records that arrived together, broken ones counted before each (n,), and any kept back before."""
         ...
 
-    def release(self) -> Paced:
+    def release(self) -> Placement:
         """Place what was kept back, as at the end of the stream."""
         ...
 
@@ -265,7 +265,7 @@ class StreamingTransducer(ThreadedTransducer):
         if end:
             self._hand_on(self._numbering.release())
 
-    def _hand_on(self, paced: Paced) -> None:
+    def _hand_on(self, paced: Placement) -> None:
         """Return a block of all arrivals that the numbering has placed."""
         if not len(paced.sequence):
             return

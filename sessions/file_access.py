@@ -24,35 +24,23 @@ MOST_PACKED = 300  # how many times a packed table may grow [-]: readings grow t
 # What opening or reading a database raises; the second where the name of a damaged table is no text.
 DATABASE_FAILURES = (sqlite3.Error, UnicodeDecodeError, OSError)
 
-_FULL = "free space on the disk"
-_DENIED = "permit reading and writing there"
-_FAILING = "check the disk and its cable"
-_BUSY = "end the program that uses it"
 _DAMAGED = "restore it from a copy"
-_TOO_LARGE = "give the file that was meant"
-_MISSING = "restore it from a copy, or give another name"
 _OTHER = "check its name, its disk and who may use it"
-_BY_ERRNO = {
-    errno.ENOSPC: _FULL,
-    errno.EDQUOT: _FULL,
-    errno.EACCES: _DENIED,
-    errno.EPERM: _DENIED,
-    errno.EROFS: _DENIED,
-    errno.EIO: _FAILING,
-    errno.EBUSY: _BUSY,
-    errno.EFBIG: _TOO_LARGE,
-    errno.ENOENT: _MISSING,
-}
-_BY_SQLITE = {
-    sqlite3.SQLITE_FULL: _FULL,
-    sqlite3.SQLITE_PERM: _DENIED,
-    sqlite3.SQLITE_READONLY: _DENIED,
-    sqlite3.SQLITE_AUTH: _DENIED,
-    sqlite3.SQLITE_IOERR: _FAILING,
-    sqlite3.SQLITE_BUSY: _BUSY,
-    sqlite3.SQLITE_LOCKED: _BUSY,
-    sqlite3.SQLITE_CANTOPEN: _OTHER,
-}
+_REMEDIES: tuple[tuple[str, tuple[int, ...], tuple[int, ...]], ...] = (  # for what the system and SQLite tell
+    ("free space on the disk", (errno.ENOSPC, errno.EDQUOT), (sqlite3.SQLITE_FULL,)),
+    (
+        "permit reading and writing there",
+        (errno.EACCES, errno.EPERM, errno.EROFS),
+        (sqlite3.SQLITE_PERM, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_AUTH),
+    ),
+    ("check the disk and its cable", (errno.EIO,), (sqlite3.SQLITE_IOERR,)),
+    ("end the program that uses it", (errno.EBUSY,), (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)),
+    ("give the file that was meant", (errno.EFBIG,), ()),
+    ("restore it from a copy, or give another name", (errno.ENOENT,), ()),
+    (_OTHER, (), (sqlite3.SQLITE_CANTOPEN,)),
+)
+_BY_ERRNO = {number: words for words, numbers, _ in _REMEDIES for number in numbers}
+_BY_SQLITE = {code: words for words, _, codes in _REMEDIES for code in codes}
 
 
 def read_limited(path: Path, most: int = LARGEST_DOCUMENT) -> bytes:

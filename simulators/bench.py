@@ -16,7 +16,7 @@ from simulators.stroke import CONTACT_AREA, PRESS, RELEASE, Course, Stroke, Surf
 Array = NDArray[np.float64]
 
 
-def white_noise(seed: int, times: Array, channels: int = 6) -> Array:
+def _white_noise(seed: int, times: Array, channels: int = 6) -> Array:
     """Return noise (n, channels) of mean 0 and standard deviation 1 at `times` (n,) [s].
 
     Instants in the same microsecond share their noise. The hash is SplitMix64 (Steele, Lea, Flood, 2014), keyed by
@@ -95,7 +95,7 @@ class Bench:
         self._drift_size = limits * draw.uniform(0.3, 1.0, 6)
         self._drift_rate = 2 * np.pi / draw.uniform(*self.settings.drift_period, 6)
         self._drift_phase = draw.uniform(0.0, 2 * np.pi, 6)
-        white_noise(seed, np.zeros(1))  # the first noise loads much: now, and not in the thread that sends readings
+        _white_noise(seed, np.zeros(1))  # the first noise loads much: now, and not in the thread that sends readings
 
     def mount(self, surface: Surface) -> None:
         """Put a stimulus on the transducer; later strokes rub on it."""
@@ -141,7 +141,7 @@ class Bench:
         settings = self.settings
         wrench = self.exerted(times) * np.array(settings.gains) + np.array(settings.offset)
         wrench += self._drift_size * np.sin(self._drift_rate * times[:, None] + self._drift_phase)
-        return wrench + white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
+        return wrench + _white_noise(self.seed, times) * np.repeat([settings.noise_force, settings.noise_torque], 3)
 
     def _planted(self, begun: float, course: Course, surface: Surface) -> PlantedStroke:
         start, stop = course.steady

@@ -102,13 +102,7 @@ class DigitalFtBox(LineBox):
     def _send_due(self, port: PseudoTerminal, now: float) -> None:
         if self._streaming_since is None:
             return
-        since, age = self.faults.aged(np.array([self._streaming_since, now])).tolist()
-        due = int((age - since) * self._rate)
-        if due - self._sent > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
-            self._sent = due - _BURST
-        numbers = np.arange(self._sent, due, dtype=np.float64)
-        times = self.faults.instants(since + numbers / self._rate)
-        self._sent = due
+        times, self._sent = self.faults.due(self._streaming_since, now, self._rate, self._sent, _BURST)
         port.say(b"".join(self.faults.route(now, zip(times.tolist(), self._packets(times), strict=True))))
 
     def _packets(self, times: Array) -> list[bytes]:

@@ -103,6 +103,16 @@ class Faults:
         """Tell of `times` (n,) [s] whether a fault of the box itself is on."""
         return np.array([self.active(kind, time) for time in times.tolist()], np.bool_)
 
+    def due(self, begun: float, now: float, rate: float, done: int, most: int = 2**31) -> tuple[Array, int]:
+        """Return when (n,) [s] the next records of a stream begun at `begun` [s] were due by `now`, and their number.
+
+        `done` were sent before, and count in that number. The device's own clock gives `rate` records a second. Of
+        more than `most` at one go the first are left out: a line would have carried on while the computer was busy.
+        """
+        since, age = self.aged(np.array([begun, now])).tolist()
+        total = max(int((age - since) * rate), done)
+        return self.instants(since + np.arange(max(done, total - most), total) / rate), total
+
     def sensed(self, bench: Bench, times: Array) -> Array:
         """Return the wrench (n, 6) that a device which drifts or is wrongly calibrated feels at `times` (n,) [s]."""
         wrench = bench.wrench(times)

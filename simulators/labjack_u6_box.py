@@ -161,10 +161,7 @@ class LabJackU6Box:
         if not self._streams or self._scan is None:
             return
         gauges, _, rate = self._scan
-        since, age = self._faults.aged(np.array([self._begun, self.now()])).tolist()
-        due = int((age - since) * rate)
-        times = self._faults.instants(since + np.arange(self._done, due) / rate)
-        self._done = max(due, self._done)
+        times, self._done = self._faults.due(self._begun, self.now(), rate, self._done)
         room = (ROOM - len(self._buffer)) // len(gauges)
         if self._missed and self._report is None and room > ROOM // len(gauges) // 2:
             # One scan of ones stands for those lost; the guide counts it among them.

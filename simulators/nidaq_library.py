@@ -111,10 +111,7 @@ class _Task:
         library, faults = self._library, self._library.faults
         if self._begun is None or faults.active("lose", library.now()):
             raise DaqError(OVERFLOW)
-        since, age = faults.aged(np.array([self._begun, library.now()])).tolist()
-        due = int((age - since) * self.timing.samp_clk_rate)
-        times = faults.instants(since + np.arange(self._delivered, due) / self.timing.samp_clk_rate)
-        self._delivered = due
+        times, self._delivered = faults.due(self._begun, library.now(), self.timing.samp_clk_rate, self._delivered)
         volts = faults.sensed(library.bench, times) @ library.gauges.T
         for time, six in zip(times.tolist(), volts, strict=True):
             if faults.active("stall", time):

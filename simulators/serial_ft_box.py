@@ -98,24 +98,14 @@ class SerialFtBox(LineBox):
         """Send the records whose last byte would be through by now, and whatever was delayed until now."""
         if self._streaming_since is None:
             return
-        since = self._age(self._streaming_since)
-        count = int((self._age(now) - since) / self._period) - self._sent
-        if count > _BURST:  # the computer was busy for long: a line would have carried on meanwhile
-            self._sent += count - _BURST
-            count = _BURST
-        numbers = self._sent + np.arange(max(count, 0), dtype=np.float64)
-        times = self.faults.instants(since + numbers * self._period)
-        self._sent += len(times)
+        times, self._sent = self.faults.due(self._streaming_since, now, 1.0 / self._period, self._sent, _BURST)
         for record in self.faults.route(now, zip(times.tolist(), self._records(times), strict=True)):
             self._say(port, record)
 
-    def _age(self, time: float) -> float:
-        return float(self.faults.aged(np.array([time]))[0])
-
     def _ended(self, record: int) -> float:
         """Return when the last byte of a record of this stream is through."""
-        since = 0.0 if self._streaming_since is None else self._age(self._streaming_since)
-        return float(self.faults.instants(np.array([since + record * self._period]))[0])
+        since = self.faults.aged(np.array([self._streaming_since or 0.0]))
+        return float(self.faults.instants(since + record * self._period)[0])
 
     def _on_byte(self, port: PseudoTerminal, byte: int) -> None:
         if byte == 0x17:

@@ -174,7 +174,7 @@ class Course:
         sliding = np.maximum(time - self.slip, 0.0)
         rate = 2 * np.pi * 1.3  # of the wandering [rad/s]
         sway = stroke.speed * stroke.speed_wander / rate * np.sin(rate * sliding + stroke.phases[2])
-        travelled = stroke.speed * _risen(sliding, SPEED_UP) + sway * minimum_jerk(sliding / 0.3)
+        travelled = stroke.speed * _jerk_integral(sliding, SPEED_UP) + sway * minimum_jerk(sliding / 0.3)
         rolled = ROLL * self.ratio(time) / self.mu if self.holds else 0.0
         return travelled + rolled - 0.5 * stroke.speed * stroke.slide
 
@@ -189,7 +189,7 @@ def minimum_jerk(phase: Array) -> Array:
     return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
-def _risen(time: Array, rise: float) -> Array:
+def _jerk_integral(time: Array, rise: float) -> Array:
     """Return the integral of `minimum_jerk(t / rise)` from 0 to `time` >= 0 [s]."""
     u = np.minimum(time / rise, 1.0)
     return rise * u**4 * (2.5 - 3.0 * u + u**2) + np.maximum(time - rise, 0.0)

@@ -50,7 +50,7 @@ def open_digital_ft(address: Address, clock: Clock, deadline: Deadline) -> Strea
         bound = deadline.bound(link)
         word = hold(bound)
         stored = _stored(place, bound)
-        conversation = DigitalConversation(place.number, stored)
+        conversation = _DigitalConversation(place.number, stored)
         rate = measured_rate(link, conversation, clock, _MEASURED, deadline, wire.STREAM_RATE)
     info = _info(place, stored, word, rate)
     return StreamingTransducer(info, partial(_line, place), conversation, clock, opening=deadline)
@@ -124,7 +124,7 @@ def _where(address: Address) -> _Where:
     )
 
 
-class DigitalConversation:
+class _DigitalConversation:
     """Requests, answers and streams of one transducer with one of its calibrations."""
 
     def __init__(self, number: int, stored: wire.StoredCalibration) -> None:
@@ -134,11 +134,9 @@ class DigitalConversation:
         self._word = 0  # the status word, which can only be read while nothing streams
 
     def decoder(self) -> RecordDecoder:
-        """Return a decoder for a stream about to begin."""
         return wire.StreamDecoder(self._word)
 
     def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        """Return what numbers the stream: its records carry neither number nor time."""
         return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
@@ -162,13 +160,12 @@ class DigitalConversation:
                 "the transducer did not take the gains and offsets of its calibration; switch it off and on"
             )
         start, started = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
-        heard = _heard(link, start, started, _PATIENCE[-1] * _ANSWER)
+        heard = _response(link, start, started, _PATIENCE[-1] * _ANSWER)
         if started not in heard:
             raise LinkLost("the transducer does not begin to stream; switch it off and on")
         return heard.partition(started)[2]
 
     def end(self, link: Link) -> None:
-        """Let the stream end by sending into it."""
         with contextlib.suppress(LinkLost):  # whoever is gone streams no more
             link.send(wire.JAM)
             deadline = time.monotonic() + _END
@@ -190,7 +187,7 @@ def hold(link: Link) -> int:
 def status_word(link: Link) -> int | None:
     """Return the status word, or None when there is no answer: it is not there, or it streams."""
     request = wire.read_registers(wire.STATUS, 1)
-    answer = wire.answer_in(_heard(link, request, b""), request)
+    answer = wire.answer_in(_response(link, request, b""), request)
     return struct.unpack(">H", answer)[0] if isinstance(answer, bytes) else None
 
 
@@ -214,7 +211,7 @@ def _done(link: Link, request: bytes, what: str) -> None:
 def _answer(link: Link, request: bytes, what: str) -> bytes:
     """Return the answer to a request, asking again where none comes. Raises LinkLost or DeviceFault for want of one."""
     for times in _PATIENCE:
-        answer = wire.answer_in(_heard(link, request, b"", times * _ANSWER), request)
+        answer = wire.answer_in(_response(link, request, b"", times * _ANSWER), request)
         if times > 1.0:  # answers say not to what: one more to the same request must not be taken for another's
             while link.receive(_ANSWER) is not None:
                 pass
@@ -225,7 +222,7 @@ def _answer(link: Link, request: bytes, what: str) -> bytes:
     raise LinkLost(f"the transducer was asked {what} and did not answer; check the cable")
 
 
-def _heard(link: Link, request: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
+def _response(link: Link, request: bytes, expected: bytes, patience: float = _ANSWER) -> bytes:
     """Return what comes after a request, up to an answer to it, or to the bytes expected where there are some."""
     deadline = time.monotonic() + _ANSWER
     while link.receive(0.0) and time.monotonic() < deadline:

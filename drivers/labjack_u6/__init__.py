@@ -43,7 +43,7 @@ def open_labjack_u6(address: Address, clock: Clock, deadline: Deadline) -> Strea
     with at(address), contextlib.closing(link):
         constants = _constants(deadline.bound(link))
     scans = wire.scan_clock(place.rate)
-    conversation = GaugeConversation(identity.serial, constants, scans)
+    conversation = _GaugeConversation(identity.serial, constants, scans)
     info = _info(place, place.calibration, identity, constants, scans)
     return StreamingTransducer(info, partial(_again, place, identity.serial), conversation, clock, opening=deadline)
 
@@ -141,7 +141,7 @@ def _where(address: Address) -> _Where:
     )
 
 
-class GaugeConversation:
+class _GaugeConversation:
     """Requests and streams of one converter. Each request is answered before anything else comes."""
 
     def __init__(self, serial: int, constants: wire.Constants, clock: wire.ScanClock) -> None:
@@ -150,11 +150,9 @@ class GaugeConversation:
         self._scan_clock = clock
 
     def decoder(self) -> RecordDecoder:
-        """Return a decoder for a stream about to begin."""
         return wire.StreamDecoder(self._constants)
 
     def numbering(self, rate: float, factor: float) -> ScanCount:
-        """Return what numbers the scans: the converter's own clock."""
         return ScanCount(rate, factor, wrap=_WRAP)
 
     def begin(self, link: Link) -> bytes:
@@ -163,15 +161,15 @@ class GaugeConversation:
         identity = _identity(link)
         if identity.serial != self._serial:
             raise DeviceFault(f"converter {identity.serial} answers where {self._serial} was; open it anew")
-        wire.check_configured(_said(link, wire.configure_stream(self._scan_clock)))
-        if code := wire.normal_error(_said(link, wire.START), 0xA9):
+        wire.check_configured(_reply(link, wire.configure_stream(self._scan_clock)))
+        if code := wire.normal_error(_reply(link, wire.START), 0xA9):
             raise DeviceFault(f"the converter does not stream: {wire.meaning(code)}; pull its plug and put it in again")
         return b""
 
     def end(self, link: Link) -> None:
         """Let the stream end and drop what it had still sent."""
         with contextlib.suppress(LinkLost):  # whoever is gone streams no more
-            code = wire.normal_error(_said(link, wire.STOP), 0xB1)
+            code = wire.normal_error(_reply(link, wire.STOP), 0xB1)
             if code not in (0, wire.STREAM_IS_OFF):
                 raise DeviceFault(f"the converter does not stop: {wire.meaning(code)}; pull its plug")
             while link.receive(0.002):
@@ -180,15 +178,15 @@ class GaugeConversation:
 
 def _identity(link: Link) -> wire.Identity:
     """Return who answers. Raises LinkLost or DeviceFault when nobody does."""
-    return wire.parse_identity(_said(link, wire.read_identity()))
+    return wire.parse_identity(_reply(link, wire.read_identity()))
 
 
 def _constants(link: Link) -> wire.Constants:
     """Return the converter's own calibration. Raises LinkLost or DeviceFault when it has none."""
-    return wire.parse_constants(_said(link, wire.read_memory(0)), _said(link, wire.read_memory(2)))
+    return wire.parse_constants(_reply(link, wire.read_memory(0)), _reply(link, wire.read_memory(2)))
 
 
-def _said(link: Link, request: bytes) -> bytes | None:
+def _reply(link: Link, request: bytes) -> bytes | None:
     link.send(request)
     return link.receive(_ANSWER)
 

@@ -155,7 +155,7 @@ def _info(place: _Where, configuration: Configuration) -> TransducerInfo:
         counter_rate=configuration.ticks,
         calibration=configuration.calibration(),
         settings=configuration.settings,
-        status=configuration.family.status,
+        status=configuration.status,
     )
 
 

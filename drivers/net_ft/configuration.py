@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.calibration import Calibration
-from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT, Family
+from drivers.net_ft.wire import AXIA, COUNTER_RATE, NET_FT
 from drivers.notation import FORCE, TORQUE, number, parse_xml, unit
-from drivers.transducer import SetupError
+from drivers.transducer import SetupError, StatusTable
 
 _FILTERS = ("off", "838", "326", "152", "73", "35", "18", "8", "5", "1500", "2000", "2500", "3000")  # by code [Hz]
 
@@ -21,7 +21,7 @@ class Configuration:
     """What the box says of itself and of the configuration in force."""
 
     product: str
-    family: Family
+    status: StatusTable
     ticks: float  # of the box's own sampling in a second [Hz]
     serial: str  # of the calibration in force; empty where the box states none
     model: str  # of the transducer, as the box states it, which is not always right
@@ -47,8 +47,8 @@ def parse_configuration(page: bytes) -> Configuration:
     """Return what netftapi2.xml says. Raises SetupError where a needed element is missing, double or makes no sense."""
     elements = _elements(page)
     product = _one(elements, "prodname")
-    family = AXIA if "axia" in product.lower() else NET_FT
-    ticks = _ticks(_optional(elements, "setadcrate")) if family is AXIA else COUNTER_RATE
+    status = AXIA if "axia" in product.lower() else NET_FT
+    ticks = _ticks(_optional(elements, "setadcrate")) if status is AXIA else COUNTER_RATE
     force, torque = _one(elements, "scfgfu"), _one(elements, "scfgtu")
     rated = _ratings(elements)
     settings = {
@@ -56,17 +56,17 @@ def parse_configuration(page: bytes) -> Configuration:
         "filter": _filter(_optional(elements, "setuserfilter")),
         "stored bias [gauge counts]": " ".join(re.split(r"[;,\s]+", _optional(elements, "setbias"))),
         "tool transform": _transform(elements),
-        "status at opening": _status(_optional(elements, "runstat"), family),
+        "status at opening": _status(_optional(elements, "runstat"), status),
         "records in a datagram, when buffered": _optional(elements, "comrdtbsiz"),
     }
-    if family is AXIA:
+    if status is AXIA:
         settings["time"] = (
             "its counter is taken to tick at its converter's rate, which no manual says: held against this computer's "
             "clock while it streams"
         )
     return Configuration(
         product=product,
-        family=family,
+        status=status,
         ticks=ticks,
         serial=_optional(elements, "cfgcalsn"),
         model=_optional(elements, "mfgtxdmdl"),
@@ -175,7 +175,7 @@ def _transform(elements: Mapping[str, list[str]]) -> str:
     return f"{' '.join(values)} [{units}]"
 
 
-def _status(text: str, family: Family) -> str:
+def _status(text: str, table: StatusTable) -> str:
     if not re.fullmatch(r"0x[0-9a-fA-F]{1,8}", text):
         return text
-    return "; ".join(family.status.words(int(text, 16))) or "healthy"
+    return "; ".join(table.words(int(text, 16))) or "healthy"

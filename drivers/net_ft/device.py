@@ -24,7 +24,7 @@ _ENDING = 0.3  # for a look under way when the watch ends; the look itself takes
 _TRANSFORM = "tool transform"  # name of the setting that turns and shifts what the box measures
 
 
-class SettingsWatch:
+class _SettingsWatch:
     """Compares the page with what was read at opening, on a thread of its own."""
 
     def __init__(self, info: TransducerInfo, who: Callable[[], TransducerInfo | None], clock: Clock) -> None:
@@ -40,11 +40,9 @@ class SettingsWatch:
         self._thread = threading.Thread(target=self._run, name=f"settings of {info.serial}", daemon=True)
 
     def start(self) -> None:
-        """Look from now on."""
         self._thread.start()
 
     def end(self) -> None:
-        """Look no more."""
         self._over.set()
         self._look.set()
         self._thread.join(_ENDING)
@@ -183,7 +181,7 @@ class NetFtTransducer(ThreadedTransducer):
         self._undecided: list[tuple[bytes, int]] = []
         self._zero: int | None = None  # counter of the first reading
         self._wrong_length = 0
-        self._settings = SettingsWatch(self.info, self._who, self.clock)
+        self._settings = _SettingsWatch(self.info, self._who, self.clock)
         self._unconfirmed: deque[tuple[int, int]] = deque()  # when the last of so many readings came, units unsure [ns]
 
     def run(self) -> None:

@@ -86,16 +86,7 @@ _AXIA = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Family:
-    """What differs between the boxes that speak this wire."""
-
-    name: str
-    status: StatusTable
-
-
-NET_FT = Family("Net F/T", StatusTable(_NET_FT, SUMMARY))
-AXIA = Family("Ethernet Axia", StatusTable(_AXIA, SUMMARY))
+NET_FT, AXIA = StatusTable(_NET_FT, SUMMARY), StatusTable(_AXIA, SUMMARY)  # the boxes that speak this wire
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,8 +126,6 @@ def is_latched(answer: bytes) -> bool:
 class Units:
     """How the TCP port counts."""
 
-    force: int  # code of the unit
-    torque: int
     counts_per_force: int
     counts_per_torque: int
     scales: tuple[int, ...]  # full counts in one of the six 16-bit counts
@@ -146,9 +135,9 @@ def parse_units(answer: bytes) -> Units | None:
     """Return what answers READ_UNITS, None where it is no answer.
 
     >>> parse_units(bytes.fromhex("1234 02 03 000F4240 000F4240 05DC 05DC 05DC 000A 000A 000A"))
-    Units(force=2, torque=3, counts_per_force=1000000, counts_per_torque=1000000, scales=(1500, 1500, 1500, 10, 10, 10))
+    Units(counts_per_force=1000000, counts_per_torque=1000000, scales=(1500, 1500, 1500, 10, 10, 10))
     """
     if len(answer) != _UNITS.size or answer[:2] != _HEADER.to_bytes(2, "big"):
         return None
-    _, force, torque, per_force, per_torque, *scales = _UNITS.unpack(answer)
-    return Units(force, torque, per_force, per_torque, tuple(scales))
+    _, _, _, per_force, per_torque, *scales = _UNITS.unpack(answer)
+    return Units(per_force, per_torque, tuple(scales))

@@ -50,12 +50,12 @@ def open_nidaq(address: Address, clock: Clock, deadline: Deadline) -> StreamingT
     api = library()
     device, info = _device_info(api, address)
     rate = address.number("rate", _DEFAULT_RATE, 1, 100_000)
-    link = TaskLink(api, device, rate)
+    link = _TaskLink(api, device, rate)
     link.close()
     return StreamingTransducer(
         replace(info, rate=link.rate, counter_rate=link.rate, settings={**info.settings, "gauges": link.gauges}),
-        lambda _: TaskLink(api, device, rate),
-        TaskConversation(),
+        lambda _: _TaskLink(api, device, rate),
+        _TaskConversation(),
         clock,
         opening=deadline,
     )
@@ -104,7 +104,7 @@ def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # n
     return str(device.name), info
 
 
-class TaskLink:
+class _TaskLink:
     """One acquisition as a link: what is received are volts of whole readings, as bytes of float64."""
 
     def __init__(self, library: Any, device: str, rate: float) -> None:  # noqa: ANN401 - nidaqmx is not always there
@@ -144,7 +144,6 @@ class TaskLink:
             raise LinkLost(f"{self._where}: {_sentence(error)}") from None
 
     def receive(self, timeout: float) -> bytes | None:
-        """Return what has arrived, or None when nothing came within `timeout` real seconds."""
         deadline = time.monotonic() + timeout
         while True:
             try:
@@ -159,13 +158,12 @@ class TaskLink:
             time.sleep(_NAP)
 
     def close(self) -> None:
-        """Give the device back. Harmless when repeated."""
         if self._task is not None:
             task, self._task = self._task, None
             task.close()
 
 
-class VoltsDecoder:
+class _VoltsDecoder:
     """Turns volts into records; nothing is ever broken or numbered."""
 
     malformed = 0
@@ -177,24 +175,20 @@ class VoltsDecoder:
         return Records(volts, status.astype(np.int64), np.zeros(len(volts), np.int64))
 
 
-class TaskConversation:
+class _TaskConversation:
     """Begins and ends acquisitions."""
 
     def decoder(self) -> RecordDecoder:
-        """Return a decoder for a stream about to begin."""
-        return VoltsDecoder()
+        return _VoltsDecoder()
 
     def numbering(self, rate: float, factor: float) -> ScanCount:
-        """Return what numbers the readings: the device's own clock."""
         return ScanCount(rate, factor)
 
     def begin(self, link: Link) -> bytes:
-        """Let readings come."""
         link.send(b"start")
         return b""
 
     def end(self, link: Link) -> None:
-        """Let them end."""
         link.send(b"stop")
 
 

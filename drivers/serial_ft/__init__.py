@@ -49,7 +49,7 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
     Raises SetupError, LinkLost or DeviceFault with the reason.
     """
     place = _where(address)
-    conversation = ControllerConversation(binary=place.binary)
+    conversation = _ControllerConversation(binary=place.binary)
     with at(address):
         link, baud = _answering(place, deadline)
         with contextlib.closing(link):
@@ -157,18 +157,16 @@ def _above_zero(address: Address, option: str) -> float:
     return value
 
 
-class ControllerConversation:
+class _ControllerConversation:
     """Prompts, settings and streams of one controller."""
 
     def __init__(self, *, binary: bool) -> None:
         self._binary = binary
 
     def decoder(self) -> RecordDecoder:
-        """Return a decoder for the records asked for."""
         return wire.BinaryDecoder() if self._binary else wire.AsciiDecoder()
 
     def numbering(self, rate: float, factor: float) -> ClockRecovery:
-        """Return what numbers the stream: its records carry neither number nor time."""
         return ClockRecovery(rate, factor)
 
     def begin(self, link: Link) -> bytes:
@@ -177,10 +175,10 @@ class ControllerConversation:
             raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
         output = wire.BINARY_OUTPUT if self._binary else wire.ASCII_OUTPUT
         for command in (output, *wire.SETTINGS):
-            if not _said(link, command + wire.RETURN, _ANSWER, settled=False).rstrip().endswith(wire.PROMPT):
+            if not _reply(link, command + wire.RETURN, _ANSWER, settled=False).rstrip().endswith(wire.PROMPT):
                 raise LinkLost(f"the controller does not answer to {command.decode()}; switch it off and on")
         for _ in range(_TRIES):
-            if wire.answered_record(_said(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self._binary):
+            if wire.answered_record(_reply(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self._binary):
                 break
         else:
             form = "binary" if self._binary else "ASCII"
@@ -218,7 +216,7 @@ class ControllerConversation:
 
 def prompted(link: Link, tries: int = _TRIES, patience: float = 0.2) -> bool:
     """Tell whether a controller answers with its prompt; a stream it was sending ends by this."""
-    return any(_said(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
+    return any(_reply(link, wire.RETURN, patience).rstrip().endswith(wire.PROMPT) for _ in range(tries))
 
 
 def banner(link: Link) -> str:
@@ -226,7 +224,7 @@ def banner(link: Link) -> str:
 
     Raises DeviceFault when no prompt follows: a controller that lost its memory waits for a Y.
     """
-    said = _said(link, wire.WARM_START, _BANNER)
+    said = _reply(link, wire.WARM_START, _BANNER)
     if not said.rstrip().endswith(wire.PROMPT):
         raise DeviceFault(
             "the controller started but gave no prompt; it may have lost its settings and wait for a Y: "
@@ -236,7 +234,7 @@ def banner(link: Link) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def _said(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
+def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True) -> bytes:
     """Return what the controller says to `request`, up to a prompt, or within `patience`.
 
     With `settled` only a prompt that nothing follows is one: in a binary record its byte means something else.

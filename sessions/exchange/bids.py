@@ -139,10 +139,10 @@ def _participants(recording: Recording, names: _Names) -> Table:
 def _events(recording: Recording) -> Table:
     events = recording.events
     first = events[0].time_ns if events else 0
-    number, time, trial, readings, data = event_columns(events)
+    number, time, kind, trial, readings, data = event_columns(events)
     onset = Column("onset", "", "s from the first event", tuple((e.time_ns - first) * 1e-9 for e in events))
     lasts = Column("duration", "", "s; n/a: an event is an instant, or its end is an event", (None,) * len(events))
-    kind = Column("trial_type", "", "what happened, see Levels of the program's manual", tuple(e.kind for e in events))
+    kind = Column("trial_type", "", "what happened, see Levels of the program's manual", kind.values)
     return Table("events", EACH_EVENT, (onset, lasts, kind, trial, number, time, readings, data))
 
 

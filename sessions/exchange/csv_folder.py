@@ -22,7 +22,7 @@ SIMULATED = Column("SIMULATED", "", "yes: transducer or subject were simulated",
 def write(source: ExportSource, folder: Path, progress: Progress) -> None:
     """Write the session into an empty folder."""
     recording = source.recording
-    session_tables = [*tables(source), _events(recording)]
+    session_tables = [*tables(source), Table("events", EACH_EVENT, event_columns(recording.events))]
     mark = (SIMULATED,) if recording.simulated_sentence else ()
     for table in session_tables:
         with _open(folder / f"{table.name}.csv") as file:
@@ -51,13 +51,6 @@ def read(path: Path) -> ExportedSession:
     head = head_of(json_object(read_limited(path / DESCRIPTION_FILE)))
     events = tuple(logged_event(row, "kind") for row in _rows_of(path / EVENTS))
     return ExportedSession("csv", path, head, events, lambda: _read_readings(path / READINGS), side_files(path))
-
-
-def _events(recording: Recording) -> Table:
-    events = recording.events
-    number, time, trial, readings, data = event_columns(events)
-    kind = Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events))
-    return Table("events", EACH_EVENT, (number, time, kind, trial, readings, data))
 
 
 def _open(path: Path) -> TextIO:

@@ -32,7 +32,7 @@ def _listed(name: str) -> Columns:
     return {column: (unit, meaning) for column, (unit, meaning) in _LISTED[name].items()}
 
 
-def predicted_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
+def _predicted_with(prediction: Mapping[str, Any], row: Mapping[str, Any]) -> dict[str, Cell]:
     """Return what one trial's prediction was made with, as cells of the columns behind `wall_s`."""
     options: Mapping[str, Any] = prediction.get("options") or {}
     area: Mapping[str, Any] = prediction.get("area") or {}
@@ -171,7 +171,7 @@ def _predictions(prediction: Mapping[str, Any]) -> Iterable[Table]:
             **_sed_interval("sed", row.get("interval")),
             **_sed_interval("opposite_sed", row.get("opposite_interval")),
             **_force_intervals(row.get("interval")),
-            **predicted_with(prediction, row),
+            **_predicted_with(prediction, row),
         }
         for row in prediction["trials"]
     ]
@@ -252,11 +252,12 @@ def trials(recording: Recording) -> Table:
     return _table("trials", "a row for each planned trial", rows, TRIAL)
 
 
-def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column, Column, Column]:
-    """Return number, time, trial, readings and data of each event."""
+def event_columns(events: Sequence[LoggedEvent]) -> tuple[Column, Column, Column, Column, Column, Column]:
+    """Return number, time, kind, trial, readings and data of each event."""
     return (
         Column("number", "", "from 1", tuple(e.number for e in events)),
         Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
+        Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
         Column("trial", "", "number of the trial it belongs to", tuple(e.trial for e in events)),
         Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
         Column("data", "", "what else is known, as JSON", tuple(json_text(dict(e.data)) for e in events)),

@@ -107,7 +107,7 @@ def test_an_answer_that_waited_for_a_busy_computer_is_heard():
                 time.sleep(timeout + 0.01)
             return self.comes.pop(0)
 
-    assert digital_ft._heard(Busy(), b"", wire.request(0x46, b"\x01")) == wire.request(0x46, b"\x01")
+    assert digital_ft._response(Busy(), b"", wire.request(0x46, b"\x01")) == wire.request(0x46, b"\x01")
 
 
 @needs_terminals

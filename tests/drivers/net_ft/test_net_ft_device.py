@@ -68,9 +68,7 @@ class MemoryLink:
 
 def opened(link, *, rate=200.0, clock=None, there=True, serial="FT1"):
     calibration = Calibration("FT1", "counts", np.diag([1e-6] * 3 + [1e-3] * 3), np.full(6, np.nan), "a test")
-    info = TransducerInfo(
-        "net-ft://box", "net-ft", "Net F/T", "FT1", False, rate, 7000.0, calibration, status=NET_FT.status
-    )
+    info = TransducerInfo("net-ft://box", "net-ft", "Net F/T", "FT1", False, rate, 7000.0, calibration, status=NET_FT)
 
     def who():
         """Return who answers: the box that was opened, and once all has come that it sent, the one of `serial`."""

@@ -59,7 +59,7 @@ def test_an_axia_says_in_its_own_bits_that_a_reading_is_invalid(served):
     block = streamed(transducer, 1.5)
     transducer.close()
     assert transducer.health.saturated == np.count_nonzero(block.status) > 0
-    assert AXIA.status.words(int(block.status.max())) == ("force or torque out of range",)
+    assert AXIA.words(int(block.status.max())) == ("force or torque out of range",)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_an_axia_says_in_its_own_bits_that_a_reading_is_invalid(served):
     ],
 )
 def test_the_status_words_of_an_axia_are_those_of_its_manual(status, words):
-    assert AXIA.status.words(status) == words
+    assert AXIA.words(status) == words
 
 
 def test_buffered_streaming_brings_the_same_readings_many_to_a_datagram(served):

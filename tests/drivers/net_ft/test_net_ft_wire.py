@@ -61,7 +61,7 @@ def test_a_record_is_36_bytes():
     ],
 )
 def test_a_status_word_is_told_in_words(status, words):
-    assert NET_FT.status.words(status) == words
+    assert NET_FT.words(status) == words
 
 
 @pytest.mark.parametrize(
@@ -73,15 +73,15 @@ def test_a_status_word_is_told_in_words(status, words):
 )
 def test_every_bit_of_the_makers_table_is_named_and_judged(family, saturated, notes, listed):
     for number in range(31):
-        (entry,) = family.status.entries(1 << number)
+        (entry,) = family.entries(1 << number)
         assert ("unknown" not in entry.words) == (number in listed)
         assert entry.verdict == ("saturated" if number in saturated else "note" if number in notes else "doubtful")
-        assert family.status.entries(1 << number | 1 << 31) == (entry,)
+        assert family.entries(1 << number | 1 << 31) == (entry,)
 
 
 def test_the_readings_of_a_box_with_too_little_gauge_excitation_are_doubtful():
-    assert NET_FT.status.words(0x80000100) == ("gauge excitation current too low",)
-    assert NET_FT.status.verdict(0x80000100) == "doubtful"
+    assert NET_FT.words(0x80000100) == ("gauge excitation current too low",)
+    assert NET_FT.verdict(0x80000100) == "doubtful"
 
 
 @pytest.mark.parametrize(
@@ -101,13 +101,13 @@ def test_the_readings_of_a_box_with_too_little_gauge_excitation_are_doubtful():
 )
 def test_a_latched_condition_does_not_make_a_reading_doubtful(family, status, doubtful):
     calibration = Calibration("FT1", "counts", np.eye(6), np.full(6, np.nan), "a test")
-    info = TransducerInfo("", "net-ft", "", "FT1", False, 1.0, 1.0, calibration, status=family.status)
+    info = TransducerInfo("", "net-ft", "", "FT1", False, 1.0, 1.0, calibration, status=family)
     assert info_from_dict(info_to_dict(info)).status.doubtful(np.array([status])).tolist() == [doubtful]
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_every_status_word_but_0_has_words(status):
-    assert bool(NET_FT.status.words(status)) == (status != 0)
+    assert bool(NET_FT.words(status)) == (status != 0)
 
 
 def test_counts_come_as_numbers_numpy_can_hold_exactly():
