@@ -72,8 +72,8 @@ def check_options(address: Address, allowed: frozenset[str]) -> None:
     """Raise SetupError when the address has an option that is not `allowed`."""
     for option in address.options:
         if option not in allowed:
-            known = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `without_tool`
-            raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {known}")
+            names = ", ".join(sorted(allowed | {"tool"}))  # which every transducer takes, see `without_tool`
+            raise AddressError(f"{address.uri}: unknown option {option!r}; allowed are {names}")
 
 
 @dataclass(frozen=True, slots=True)

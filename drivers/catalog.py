@@ -58,5 +58,5 @@ def _driver(address: Address) -> Driver:
     for driver in DRIVERS:
         if driver.name == address.scheme:
             return driver
-    known = ", ".join(f"{driver.name}://" for driver in DRIVERS)
-    raise AddressError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {known}")
+    schemes = ", ".join(f"{driver.name}://" for driver in DRIVERS)
+    raise AddressError(f"{address.uri}: there is no driver {address.scheme!r}; addresses begin with {schemes}")

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.transducer import LinkLost
@@ -74,25 +75,25 @@ class Deadline:
         return _BoundLink(link, self)
 
 
+@dataclass(eq=False)
 class _BoundLink:
     """A link that raises LinkLost once a deadline is over, and Stopped at a stop."""
 
-    def __init__(self, link: Link, deadline: Deadline) -> None:
-        self._link = link
-        self._deadline = deadline
+    link: Link
+    deadline: Deadline
 
     def send(self, data: bytes) -> None:
-        self._deadline.check()
-        self._link.send(data)
+        self.deadline.check()
+        self.link.send(data)
 
     def receive(self, timeout: float) -> bytes | None:
         until = time.monotonic() + timeout
         while True:
-            self._deadline.check()
+            self.deadline.check()
             remaining = until - time.monotonic()
-            data = self._link.receive(max(min(remaining, TICK, self._deadline.left), 0.0))
+            data = self.link.receive(max(min(remaining, TICK, self.deadline.left), 0.0))
             if data is not None or remaining <= TICK:
                 return data
 
     def close(self) -> None:
-        self._link.close()
+        self.link.close()

@@ -31,7 +31,7 @@ def unit(text: str, units: Mapping[str, float]) -> float | None:
     (1000.0, 112.98482902761668, None)
     """
     name = re.sub(r"[\s.·-]", "", text).lower()
-    return next((size for known, size in units.items() if known.lower() == name), None)
+    return next((size for spelling, size in units.items() if spelling.lower() == name), None)
 
 
 class _Builder(ElementTree.TreeBuilder):

@@ -124,17 +124,16 @@ def _where(address: Address) -> _Where:
     )
 
 
+@dataclass(eq=False)
 class _DigitalConversation:
     """Requests, answers and streams of one transducer with one of its calibrations."""
 
-    def __init__(self, number: int, stored: wire.StoredCalibration) -> None:
-        """Take a transducer whose calibration `number`, 1 to 16, was read as `stored`."""
-        self._number = number
-        self._stored = stored
-        self._word = 0  # the status word, which can only be read while nothing streams
+    number: int  # of the calibration, 1 to 16
+    stored: wire.StoredCalibration  # as it was read
+    word: int = 0  # the status word, which can only be read while nothing streams
 
     def decoder(self) -> RecordDecoder:
-        return wire.StreamDecoder(self._word)
+        return wire.StreamDecoder(self.word)
 
     def numbering(self, rate: float, factor: float) -> ClockRecovery:
         return ClockRecovery(rate, factor)
@@ -144,14 +143,14 @@ class _DigitalConversation:
 
         Raises LinkLost when it does not answer, DeviceFault when another transducer does or it refuses.
         """
-        self._word = hold(link)
-        first = wire.calibration_address(self._number)
+        self.word = hold(link)
+        first = wire.calibration_address(self.number)
         stored = read(link, first, wire.CALIBRATION_SIZE)
         serial = stored[:8].split(b"\0")[0].decode("ascii", "replace").strip()
-        expected = self._stored.calibration.serial
+        expected = self.stored.calibration.serial
         if serial != expected:
             raise DeviceFault(f"transducer {serial or 'without a name'} answers where {expected} was; open it anew")
-        wanted = self._stored.gains_and_offsets
+        wanted = self.stored.gains_and_offsets
         _done(link, wire.request(wire.UNLOCK, bytes([wire.UNLOCK_KEY])), "to be unlocked")
         _done(link, wire.write_registers(wire.GAINS_AND_OFFSETS, wanted), "its gains and offsets")
         _done(link, wire.request(wire.UNLOCK, bytes([wire.LOCK_KEY])), "to be locked")
@@ -160,10 +159,10 @@ class _DigitalConversation:
                 "the transducer did not take the gains and offsets of its calibration; switch it off and on"
             )
         start, started = (wire.request(wire.START_STREAM, bytes([key])) for key in (wire.START_KEY, 1))
-        heard = _response(link, start, started, _PATIENCE[-1] * _ANSWER)
-        if started not in heard:
+        response = _response(link, start, started, _PATIENCE[-1] * _ANSWER)
+        if started not in response:
             raise LinkLost("the transducer does not begin to stream; switch it off and on")
-        return heard.partition(started)[2]
+        return response.partition(started)[2]
 
     def end(self, link: Link) -> None:
         with contextlib.suppress(LinkLost):  # whoever is gone streams no more
@@ -228,13 +227,13 @@ def _response(link: Link, request: bytes, expected: bytes, patience: float = _AN
     while link.receive(0.0) and time.monotonic() < deadline:
         pass  # left over from before
     link.send(request)
-    heard = b""
+    response = b""
     deadline = time.monotonic() + patience
     while True:
         left = deadline - time.monotonic()
-        heard += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
-        if left <= 0.0 or (expected in heard if expected else wire.answer_in(heard, request) is not None):
-            return heard
+        response += link.receive(max(left, 0.0)) or b""  # also where this computer was busy until now
+        if left <= 0.0 or (expected in response if expected else wire.answer_in(response, request) is not None):
+            return response
 
 
 DRIVER = Driver("digital-ft", open_digital_ft, identify_digital_ft)

@@ -112,8 +112,8 @@ def write_registers(first: int, registers: bytes) -> bytes:
     return request(WRITE, struct.pack(">HHB", first, len(registers) // 2, len(registers)) + registers)
 
 
-def answer_in(heard: bytes, request: bytes) -> bytes | Refused | None:
-    """Return the data of the answer to the request `asked` wherever it lies in `heard`; None while it is not there.
+def answer_in(response: bytes, request: bytes) -> bytes | Refused | None:
+    """Return the data of the answer to `request`, wherever it lies in `response`; None while it is not there.
 
     For registers read that is their bytes, else what follows the function code. Raises nothing.
     """
@@ -123,10 +123,10 @@ def answer_in(heard: bytes, request: bytes) -> bytes | Refused | None:
         size, head = 5 + 2 * request[5], bytes([ADDRESS, READ, 2 * request[5]])
     elif function == WRITE:
         size, head = 8, request[:6]
-    for frame in _frames(heard, head, size):
+    for frame in _frames(response, head, size):
         if frame != request:  # an adapter may repeat what we send
             return frame[3:-2] if function == READ else frame[2:-2]
-    for frame in _frames(heard, bytes([ADDRESS, function | _EXCEPTION]), 5):
+    for frame in _frames(response, bytes([ADDRESS, function | _EXCEPTION]), 5):
         return Refused(_REASONS.get(frame[2], f"exception {frame[2]}"))
     return None
 
@@ -239,14 +239,14 @@ def _framed(frame: bytes) -> bytes:
     return frame + struct.pack("<H", crc16(frame))
 
 
-def _frames(heard: bytes, head: bytes, size: int) -> Iterator[bytes]:
-    """Yield the sound frames of `size` bytes in `heard` that begin with `head`."""
-    at = heard.find(head)
-    while 0 <= at <= len(heard) - size:
-        frame = heard[at : at + size]
+def _frames(response: bytes, head: bytes, size: int) -> Iterator[bytes]:
+    """Yield the sound frames of `size` bytes in `response` that begin with `head`."""
+    at = response.find(head)
+    while 0 <= at <= len(response) - size:
+        frame = response[at : at + size]
         if _framed(frame[:-2]) == frame:
             yield frame
-        at = heard.find(head, at + 1)
+        at = response.find(head, at + 1)
 
 
 def _text(field: bytes) -> str:

@@ -141,16 +141,16 @@ def _where(address: Address) -> _Where:
     )
 
 
+@dataclass(eq=False)
 class _GaugeConversation:
     """Requests and streams of one converter. Each request is answered before anything else comes."""
 
-    def __init__(self, serial: int, constants: wire.Constants, clock: wire.ScanClock) -> None:
-        self._serial = serial
-        self._constants = constants
-        self._scan_clock = clock
+    serial: int
+    constants: wire.Constants
+    scan_clock: wire.ScanClock
 
     def decoder(self) -> RecordDecoder:
-        return wire.StreamDecoder(self._constants)
+        return wire.StreamDecoder(self.constants)
 
     def numbering(self, rate: float, factor: float) -> ScanCount:
         return ScanCount(rate, factor, wrap=_WRAP)
@@ -159,9 +159,9 @@ class _GaugeConversation:
         """End whatever streams, set the scans and let them come. Raises LinkLost or DeviceFault with the reason."""
         self.end(link)
         identity = _identity(link)
-        if identity.serial != self._serial:
-            raise DeviceFault(f"converter {identity.serial} answers where {self._serial} was; open it anew")
-        wire.check_configured(_reply(link, wire.configure_stream(self._scan_clock)))
+        if identity.serial != self.serial:
+            raise DeviceFault(f"converter {identity.serial} answers where {self.serial} was; open it anew")
+        wire.check_configured(_reply(link, wire.configure_stream(self.scan_clock)))
         if code := wire.normal_error(_reply(link, wire.START), 0xA9):
             raise DeviceFault(f"the converter does not stream: {wire.meaning(code)}; pull its plug and put it in again")
         return b""

@@ -79,8 +79,8 @@ def _device_info(api: Any, address: Address) -> tuple[str, TransducerInfo]:  # n
         raise SetupError(f"{address.uri}: NI-DAQmx does not answer ({error}); install its driver from NI") from None
     device = devices.get(address.host.lower())
     if device is None:
-        known = ", ".join(sorted(device.name for device in devices.values())) or "none"
-        raise SetupError(f"{address.uri}: there is no device {address.host}; NI-DAQmx knows {known}")
+        names = ", ".join(sorted(device.name for device in devices.values())) or "none"
+        raise SetupError(f"{address.uri}: there is no device {address.host}; NI-DAQmx knows {names}")
     simulated = bool(device.is_simulated)
     info = TransducerInfo(
         uri=address.uri,

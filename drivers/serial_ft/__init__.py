@@ -53,9 +53,9 @@ def open_serial_ft(address: Address, clock: Clock, deadline: Deadline) -> Stream
     with at(address):
         link, baud = _answering(place, deadline)
         with contextlib.closing(link):
-            said = banner(deadline.bound(link))
+            reply = banner(deadline.bound(link))
             rate = measured_rate(link, conversation, clock, _MEASURED, deadline)
-    info = _info(place, baud, said, rate)
+    info = _info(place, baud, reply, rate)
     return StreamingTransducer(info, lambda _: SerialLink(place.port, baud), conversation, clock, opening=deadline)
 
 
@@ -91,7 +91,7 @@ def _answering(place: _Where, deadline: Deadline) -> tuple[SerialLink, int]:
     raise LinkLost(f"no controller answers (tried {rates} baud); check its power, the cable and the baud rate")
 
 
-def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
+def _info(place: _Where, baud: int, reply: str, rate: float) -> TransducerInfo:
     address = place.address
     settings = {
         "baud": f"{baud}, {'as the address says' if len(place.bauds) == 1 else 'found by trying'}",
@@ -102,14 +102,14 @@ def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
         "time": "host arrival at the measured rate; the controller has no clock or record number, "
         f"and a loss shorter than {GAP:g} s that leaves no broken bytes is not noticed",
     }
-    if said:
-        settings |= {"banner": said, "rate": "measured at opening; the controller cannot be asked"}
+    if reply:
+        settings |= {"banner": reply, "rate": "measured at opening; the controller cannot be asked"}
     return TransducerInfo(
         uri=address.uri,
         driver="serial-ft",
-        model="SIMULATED F/T Controller" if _is_simulated(address, said) else "F/T Controller",
+        model="SIMULATED F/T Controller" if _is_simulated(address, reply) else "F/T Controller",
         serial=place.calibration.serial,
-        simulated=_is_simulated(address, said),
+        simulated=_is_simulated(address, reply),
         rate=rate,
         counter_rate=math.nan,
         calibration=place.calibration,
@@ -118,8 +118,8 @@ def _info(place: _Where, baud: int, said: str, rate: float) -> TransducerInfo:
     )
 
 
-def _is_simulated(address: Address, said: str) -> bool:
-    return "SIMULATED" in said.upper() or "simulated" in address.options
+def _is_simulated(address: Address, reply: str) -> bool:
+    return "SIMULATED" in reply.upper() or "simulated" in address.options
 
 
 def _where(address: Address) -> _Where:
@@ -157,14 +157,14 @@ def _above_zero(address: Address, option: str) -> float:
     return value
 
 
+@dataclass(eq=False)
 class _ControllerConversation:
     """Prompts, settings and streams of one controller."""
 
-    def __init__(self, *, binary: bool) -> None:
-        self._binary = binary
+    binary: bool
 
     def decoder(self) -> RecordDecoder:
-        return wire.BinaryDecoder() if self._binary else wire.AsciiDecoder()
+        return wire.BinaryDecoder() if self.binary else wire.AsciiDecoder()
 
     def numbering(self, rate: float, factor: float) -> ClockRecovery:
         return ClockRecovery(rate, factor)
@@ -173,15 +173,15 @@ class _ControllerConversation:
         """Set the controller up and let it stream; return what it streamed already. Raises LinkLost, DeviceFault."""
         if not prompted(link):
             raise LinkLost("the controller gives no prompt; check its power, the cable and the baud rate")
-        output = wire.BINARY_OUTPUT if self._binary else wire.ASCII_OUTPUT
+        output = wire.BINARY_OUTPUT if self.binary else wire.ASCII_OUTPUT
         for command in (output, *wire.SETTINGS):
             if not _reply(link, command + wire.RETURN, _ANSWER, settled=False).rstrip().endswith(wire.PROMPT):
                 raise LinkLost(f"the controller does not answer to {command.decode()}; switch it off and on")
         for _ in range(_TRIES):
-            if wire.answered_record(_reply(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self._binary):
+            if wire.answered_record(_reply(link, wire.ONE_RECORD + wire.RETURN, _ANSWER), binary=self.binary):
                 break
         else:
-            form = "binary" if self._binary else "ASCII"
+            form = "binary" if self.binary else "ASCII"
             raise DeviceFault(
                 f"the controller answers, but not with a record of six axes in {form} output; "
                 "check that a transducer is connected to it, and try the other format"
@@ -193,21 +193,21 @@ class _ControllerConversation:
         with contextlib.suppress(LinkLost):  # whoever is gone streams no more
             link.send(wire.RETURN)
             deadline = time.monotonic() + _END
-            heard = b""
+            response = b""
             while time.monotonic() < deadline:
                 data = link.receive(_SILENT)
-                if data is None and heard.endswith(wire.PROMPT):
+                if data is None and response.endswith(wire.PROMPT):
                     break
-                heard = data or heard
+                response = data or response
 
     def _streaming(self, link: Link) -> bytes:
         """Ask for the stream, and return what follows the echo of the request."""
         link.send(wire.STREAM + wire.RETURN)
-        heard = b""
+        response = b""
         deadline = time.monotonic() + _ANSWER
         while time.monotonic() < deadline:
-            heard += link.receive(_SETTLED) or b""
-            _, echo, rest = heard.partition(wire.STREAM)
+            response += link.receive(_SETTLED) or b""
+            _, echo, rest = response.partition(wire.STREAM)
             _, line_end, first = rest.partition(b"\n")
             if echo and line_end:
                 return first
@@ -224,13 +224,13 @@ def banner(link: Link) -> str:
 
     Raises DeviceFault when no prompt follows: a controller that lost its memory waits for a Y.
     """
-    said = _reply(link, wire.WARM_START, _BANNER)
-    if not said.rstrip().endswith(wire.PROMPT):
+    reply = _reply(link, wire.WARM_START, _BANNER)
+    if not reply.rstrip().endswith(wire.PROMPT):
         raise DeviceFault(
             "the controller started but gave no prompt; it may have lost its settings and wait for a Y: "
             "answer it from a terminal program once"
         )
-    text = said.rstrip().removesuffix(wire.PROMPT).decode("ascii", "replace")
+    text = reply.rstrip().removesuffix(wire.PROMPT).decode("ascii", "replace")
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
@@ -241,14 +241,14 @@ def _reply(link: Link, request: bytes, patience: float, *, settled: bool = True)
     """
     link.receive(_BETWEEN)
     link.send(request)
-    said = b""
+    reply = b""
     deadline = time.monotonic() + patience
     while True:
         over = time.monotonic() >= deadline
         data = link.receive(_SETTLED)  # once more where this computer was busy until now
-        said += data or b""
-        if over or (said.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
-            return said
+        reply += data or b""
+        if over or (reply.rstrip().endswith(wire.PROMPT) and (data is None or not settled)):
+            return reply
 
 
 DRIVER = Driver("serial-ft", open_serial_ft, identify_serial_ft)

@@ -85,10 +85,10 @@ def columns(
         raise ColumnsUnknown(
             f'the time is in "{time_unit}", which is none of {", ".join(TIME_UNITS)}: convert the file'
         )
-    names = tuple(header) if header is not None else _numbered(axes or (), width)
+    stated_names = [*(axes or ()), *(f"column {i + 1}" for i in range(len(axes or ()), width))]
     stated = units is not None or axes is not None
     return Columns(
-        names,
+        tuple(stated_names if header is None else header),
         places.get(TIME),
         time_unit,
         tuple(places[axis] for axis in AXES),
@@ -146,10 +146,6 @@ def _agreed(what: str, headed: set[str | None], stated: str | None, factors: Map
     if stated is not None and stated != unit:
         raise ColumnsUnknown(f"the header has the {what} in {unit}, but --units says {stated}: give one of the two up")
     return unit
-
-
-def _numbered(axes: Sequence[str], width: int) -> tuple[str, ...]:
-    return tuple(axes[i] if i < len(axes) else f"column {i + 1}" for i in range(width))
 
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from sessions.exchange import ExportError, ExportSource, Progress
-from sessions.exchange.session_tables import Column, Table, tables
+from sessions.exchange.session_tables import Column, Table, event_columns, tables
 from sessions.recording import Recording
 from sessions.recording.head import json_text
 from sessions.recording.manifest import description
@@ -166,18 +166,11 @@ def _add_trials(file: "NWBFile", recording: Recording, first_ns: int) -> None:
 def _events(recording: Recording, first_ns: int) -> Table:
     events = recording.events
     texts = tuple("; ".join(f"{name}: {value}" for name, value in _flat(event.data)) for event in events)
-    return Table(
-        "events",
-        "Everything that happened, in order.",
-        (
-            Column("timestamp", "", "s from the start", tuple((e.time_ns - first_ns) * 1e-9 for e in events)),
-            Column("time", "ns", "session clock", tuple(e.time_ns for e in events)),
-            Column("kind", "", "what happened, see docs/session-format.md", tuple(e.kind for e in events)),
-            Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events)),
-            Column("readings", "", "how many readings were recorded before it", tuple(e.readings for e in events)),
-            Column("data", "", "what else is known, for people; exact in the notes", texts),
-        ),
-    )
+    _, time, kind, _, readings, _ = event_columns(events)
+    seconds = Column("timestamp", "", "s from the start", tuple((e.time_ns - first_ns) * 1e-9 for e in events))
+    trial = Column("trial", "", "number of the trial; 0 for none", tuple(e.trial or 0 for e in events))
+    data = Column("data", "", "what else is known, for people; exact in the notes", texts)
+    return Table("events", "Everything that happened, in order.", (seconds, time, kind, trial, readings, data))
 
 
 def _flat(data: Mapping[str, Any], within: str = "") -> Iterator[tuple[str, object]]:

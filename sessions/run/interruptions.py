@@ -10,9 +10,8 @@ from types import FrameType
 class Interruptions:
     """Whether somebody wants the program to stop."""
 
-    def __init__(self) -> None:
-        self.heard = False
-        self._at_once = False
+    heard = False
+    _at_once = False
 
     def hear(self, _signal: int, _frame: FrameType | None) -> None:
         """Be the signal handler."""

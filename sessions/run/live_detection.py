@@ -4,6 +4,8 @@ Readings are never altered. The rule of a take: it begins with an unloaded stret
 before any contact, and ends no earlier than `after_lift` seconds after the last lift.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,28 +20,20 @@ Array = NDArray[np.float64]
 Noticed = Zeroed | ContactOnset | FingerLifted | Settled
 
 
+@dataclass(eq=False)
 class TakeWatch:
     """Watches the readings of one take: first until its zero is measured, then for the finger."""
 
-    def __init__(
-        self,
-        info: TransducerInfo,
-        frame: Frame,
-        zero_duration: float,
-        detection: DetectorSettings,
-        after_lift: float = 0.5,
-    ) -> None:
-        """Begin to measure the zero over `zero_duration` seconds; a contact detector watches from then on.
+    info: TransducerInfo
+    frame: Frame
+    zero_duration: float  # of the unloaded stretch [s]
+    detection: DetectorSettings
+    after_lift: float = 0.5  # without a touch, when the finger stays off [s]
 
-        The finger stays off when nothing touched for `after_lift` seconds.
-        """
-        self._info = info
-        self._frame = frame
-        self._duration = zero_duration
-        self._detection = detection
+    def __post_init__(self) -> None:
+        """Begin to measure the zero."""
         self._detector: ContactDetector | None = None
         self._stretch = ReadingBlock.empty()
-        self._after_lift = after_lift
         self._lifted: float | None = None  # when the finger left [s, device time]; None while it touches, or stayed off
 
     def feed(self, block: ReadingBlock) -> tuple[Noticed, ...]:
@@ -49,11 +43,11 @@ class TakeWatch:
         if self._detector is not None:
             return self._touches(self._detector, block)
         self._stretch = ReadingBlock.joined([self._stretch, block])
-        self._stretch = self._stretch.between(_last(self._stretch.time, self._duration), len(self._stretch))
+        self._stretch = self._stretch.between(_last(self._stretch.time, self.zero_duration), len(self._stretch))
         zero = self._zero()
         if zero is None:
             return ()
-        self._detector = ContactDetector(self._detection)
+        self._detector = ContactDetector(self.detection)
         # The detector learns the noise from the same stretch; nothing touched during it.
         self._detector.feed(self._stretch.time, self._normal_force(self._stretch))
         return (zero,)
@@ -65,7 +59,7 @@ class TakeWatch:
         normal = self._normal_force(stretch)
         # One reading's step is allowed for, since the stretch holds whole readings only.
         step = duration / max(len(stretch) - 1, 1)
-        if duration + step < self._duration or not is_quiet(normal.tolist(), self._detection):
+        if duration + step < self.zero_duration or not is_quiet(normal.tolist(), self.detection):
             return None
         return Zeroed(
             mean=tuple(stretch.raw.mean(axis=0).tolist()),
@@ -88,13 +82,13 @@ class TakeWatch:
                 notices.append(FingerLifted(event.time, event.noticed))
                 self._lifted = event.time
         last = float(block.time[-1])
-        if self._lifted is not None and last - self._lifted >= self._after_lift:
+        if self._lifted is not None and last - self._lifted >= self.after_lift:
             notices.append(Settled(last))
             self._lifted = None
         return tuple(notices)
 
     def _normal_force(self, block: ReadingBlock) -> Array:
-        return normal_force(self._info.calibration.wrench(block.raw, np.zeros(6)), self._frame)
+        return normal_force(self.info.calibration.wrench(block.raw, np.zeros(6)), self.frame)
 
 
 def _last(time: Array, duration: float) -> int:
