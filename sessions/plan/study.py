@@ -124,8 +124,7 @@ class Study:
                 entry = {"subject": event.subject, "slot": event.data["slot"], "body": event.data["body"]}
                 members[event.subject] = msgspec.convert(entry, Member)
             elif event.kind == "withdrawn":
-                before = members[event.subject]
-                members[event.subject] = Member(before.subject, before.slot, before.body, str(event.data["reason"]))
+                members[event.subject] = replace(members[event.subject], withdrawn=str(event.data["reason"]))
         return members
 
     @property

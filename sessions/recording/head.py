@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 from urllib.parse import quote
 
 import msgspec
@@ -22,6 +22,7 @@ from drivers.clock import Clock
 from drivers.transducer import StatusBit, StatusTable, TransducerInfo, bit
 from sessions.file_access import converted, json_object, read_limited, write_whole
 from sessions.plan.plan import Origin
+from sessions.recording.log import SixNumbers, Whole
 
 LIBRARIES = ("numpy", "scipy", "numba", "h5py", "msgspec", "matplotlib", "pyserial", "pyusb")
 OPTIONAL = ("nidaqmx", "distributed")  # named where they are installed
@@ -140,16 +141,12 @@ def certificate_for(folder: Path) -> dict[str, Any] | None:
     return None
 
 
-_Row: TypeAlias = tuple[float, float, float, float, float, float]
-_Word: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # a status word as `ReadingBlock` holds it
-
-
 class _Calibration(msgspec.Struct):
     """A calibration as the head holds it."""
 
     serial: str
     raw_unit: str
-    matrix: tuple[_Row, _Row, _Row, _Row, _Row, _Row]
+    matrix: Annotated[tuple[SixNumbers, ...], msgspec.Meta(min_length=6, max_length=6)]
     rated: Annotated[tuple[float | None, ...], msgspec.Meta(min_length=6, max_length=6)]
     source: str
     sha256: str
@@ -168,14 +165,14 @@ class _Info(msgspec.Struct):
     counter_rate: float | None
     calibration: _Calibration
     settings: dict[str, str]
-    harmless: _Word = 0
-    summary: _Word = 0
+    harmless: Whole = 0
+    summary: Whole = 0
     status_bits: list[StatusBit] | None = None
 
 
 class _Clock(msgspec.Struct):
     factor: Annotated[float, msgspec.Meta(ge=0.0)]  # 0: the clock moves when it is waited on
-    now_ns: _Word
+    now_ns: Whole
 
 
 class _Setting(msgspec.Struct):

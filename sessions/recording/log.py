@@ -136,67 +136,26 @@ Whole: TypeAlias = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]  # wh
 Count: TypeAlias = Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
 SixNumbers: TypeAlias = tuple[float, float, float, float, float, float]
 
-
-class _Take(msgspec.Struct):
-    take: Count
-
-
-class _Discarded(_Take):
-    reason: str
-
-
-class _Scored(msgspec.Struct):
-    score: float | None
-    positions: list[tuple[float, float]] | None = None
-
-
-class _Number(msgspec.Struct):
-    number: float | None
-
-
-class _PairedChoice(msgspec.Struct):
-    choice: Literal["first", "second"] | None
-
-
-class _Zeroed(msgspec.Struct):
-    mean: SixNumbers
-
-
-_Losses = msgspec.defstruct("_Losses", [*((name, Count, 0) for name in COUNTS), ("rate_words", str, "")])
-
-
-class _Sentence(msgspec.Struct):
-    sentence: str
-
-
-class _Ended(msgspec.Struct):
-    reason: str = ""
-    cause: str = ""
-    complete: bool = False
-    readings: Count = 0
-    health: dict[str, Any] | None = None
-
-
-class _Resumed(msgspec.Struct):
-    last_ns: Whole
-    gap: float | None = None
-
-
-SHAPES: Mapping[str, type[msgspec.Struct]] = {
-    "take_started": _Take,
-    "take_kept": _Take,
-    "take_restored": _Take,
-    "take_discarded": _Discarded,
-    "scored": _Scored,
-    "number_given": _Number,
-    "chosen": _PairedChoice,
-    "zeroed": _Zeroed,
-    "losses": _Losses,
-    "log_torn": _Sentence,
-    "not_restored": _Sentence,
-    "ended": _Ended,
-    "resumed": _Resumed,
+_TAKE: list[Any] = [("take", Count)]
+_FIELDS: Mapping[str, list[Any]] = {  # name and type of what events hold at the least; a default where it may lack
+    "take_started": _TAKE,
+    "take_kept": _TAKE,
+    "take_restored": _TAKE,
+    "take_discarded": [*_TAKE, ("reason", str)],
+    "scored": [("score", float | None), ("positions", list[tuple[float, float]] | None, None)],
+    "number_given": [("number", float | None)],
+    "chosen": [("choice", Choice | None)],
+    "zeroed": [("mean", SixNumbers)],
+    "losses": [*((name, Count, 0) for name in COUNTS), ("rate_words", str, "")],
+    "log_torn": [("sentence", str)],
+    "not_restored": [("sentence", str)],
+    "ended": [
+        *(("reason", str, ""), ("cause", str, ""), ("complete", bool, False), ("readings", Count, 0)),
+        ("health", dict[str, Any] | None, None),
+    ],
+    "resumed": [("last_ns", Whole), ("gap", float | None, None)],
 }
+SHAPES = {kind: msgspec.defstruct("Event", fields) for kind, fields in _FIELDS.items()}
 
 
 def event_data(kind: str, text: str) -> dict[str, Any]:
