@@ -205,7 +205,7 @@ class AnalystWindow(QMainWindow):
             case "friction":
                 self.stroke.go_to_numbers()
             case "window":
-                self.stroke.go_to_window()
+                self.stroke.stroke.handles["steady begin"].setFocus()
             case _:
                 self.stroke.go_to_readings()
 

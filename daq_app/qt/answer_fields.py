@@ -232,7 +232,6 @@ class NumberField(_Field):
     """Takes a number above 0; a comma is a point."""
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
-        """Show an empty field; `now` tells the session clock [s]."""
         super().__init__(now)
         self.field = QLineEdit()
         self.field.setAccessibleName(Text.OWN_NUMBER)
@@ -262,7 +261,6 @@ class ChoiceOfTwo(_Field):
     """Two buttons of the same size; the one that is chosen stays pressed."""
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
-        """Show two buttons; `now` tells the session clock [s]."""
         super().__init__(now)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(Text.OF_TWO)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen
-from PySide6.QtWidgets import QComboBox, QSizePolicy, QWidget
+from PySide6.QtWidgets import QComboBox, QPushButton, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp
 from daq_app.qt.parts import EntryLine, Panel, button, choice, hbox, label, named, regrade, say, scrolled, vbox
@@ -27,7 +27,6 @@ class BenchPanel(Panel):
     """The right of the experimenter's window."""
 
     def __init__(self, scale: float, send: Callable[[Message], None], search: Callable[[], None]) -> None:
-        """Show no transducer; `send` takes what is asked for, `search` looks for devices."""
         super().__init__(tr("bench"))
         self._send = send
         self._view: BenchView | None = None
@@ -43,7 +42,7 @@ class BenchPanel(Panel):
         self._bars = {name: LoadBar(name, scale) for name in LOADS}
         self._choice = choice(tr("transducer to connect: choose one, or type its address"))
         self._choice.setEditable(True)
-        self._choice.setLineEdit(EntryLine(self._typed, self._leave))
+        self._choice.setLineEdit(EntryLine(lambda: self._leave(connecting=True), self._leave))
         self._choice.setInsertPolicy(QComboBox.InsertPolicy.NoInsert)  # an address is no device until it answers
         self._choice.setCompleter(None)  # pyright: ignore[reportArgumentType]  what is typed stays what it is
         self.search = button(tr("Search"), tr("search for transducers"), search)
@@ -78,9 +77,7 @@ class BenchPanel(Panel):
         self.search.setEnabled(not view.searching)
         say(self._search_words, view.search_words)
         self._search_words.setVisible(bool(view.search_words))
-        self.connect_button.setText(tr("Disconnect") if view.lamp not in ("off",) else tr("Connect"))
-        self.connect_button.setAccessibleName(self.connect_button.text() + tr(" the transducer"))
-        self.connect_button.setEnabled(view.lamp == "off" or view.connect is not None)
+        show_connecting(self.connect_button, view)
         self._choice.setEnabled(view.lamp == "off")
         self.tare.setEnabled(view.can_tare)
         self.acknowledge.setEnabled(view.can_acknowledge)
@@ -93,11 +90,9 @@ class BenchPanel(Panel):
         elif uri := self._chosen():
             self._send(Connect(uri))
 
-    def _typed(self) -> None:
-        self.connect_chosen()
-        self._leave()
-
-    def _leave(self) -> None:
+    def _leave(self, *, connecting: bool = False) -> None:
+        if connecting:
+            self.connect_chosen()
         self.window().setFocus()
 
     def _chosen(self) -> str:
@@ -144,11 +139,17 @@ class BenchPanel(Panel):
         return scrolled(inside)
 
 
+def show_connecting(push: QPushButton, view: BenchView) -> None:
+    """Show what a press connects or disconnects, where it can."""
+    push.setText(tr("Connect") if view.lamp == "off" else tr("Disconnect"))
+    push.setAccessibleName(tr("{act} the transducer", act=push.text()))
+    push.setEnabled(view.lamp == "off" or view.connect is not None)
+
+
 class BenchStrip(Panel):
     """The bench folded: a lamp, and a short bar for each axis."""
 
     def __init__(self, scale: float, expand: Callable[[], None]) -> None:
-        """Show no transducer; `expand` shows the bench whole."""
         super().__init__(tr("bench, folded"), "strip")
         self._lamp = Lamp(tr("transducer"))
         self._bars = {name: LoadBar(name, scale) for name in LOADS}

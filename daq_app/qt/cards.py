@@ -9,6 +9,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QPixmap
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from daq_app.qt.bench_panel import show_connecting
 from daq_app.qt.parts import Panel, button, choice, field, fill, hbox, label, regrade, say, vbox
 from daq_app.qt.preferences import Millimetres, name_of
 from daq_app.qt.subject_picture import Thumbnail
@@ -60,7 +61,6 @@ class CutShort(Panel):
     _listed = Signal(object)  # from a thread
 
     def __init__(self, send: Callable[[Message], None]) -> None:
-        """Offer nothing; `send` takes what is asked for."""
         super().__init__("", "banner")
         self._send = send
         self._shown: tuple[Unfinished, ...] = ()
@@ -108,12 +108,8 @@ class TransducerRow(QWidget):
 
     def show_view(self, view: BenchView) -> None:
         """Show which transducer it is, its zero, noise and life, and what can be done with it."""
-        connected = view.lamp != "off"
-        act = tr("Disconnect") if connected else tr("Connect")
         say(self.words, bench_summary(view))
-        self.connect_button.setText(act)
-        self.connect_button.setAccessibleName(tr("{act} the transducer", act=act))
-        self.connect_button.setEnabled(not connected or view.connect is not None)
+        show_connecting(self.connect_button, view)
         self.zero.setEnabled(view.can_tare)
 
 
@@ -121,7 +117,6 @@ class ScreenFields(QWidget):
     """What stands on the card of the subject's screen, be it a second screen or a tablet."""
 
     def __init__(self, scale: float, act: Callable[[str], None]) -> None:
-        """Show a screen of which nothing is known; `act` takes what a button stands for."""
         super().__init__()
         self.words = ""  # the length of the line, and characters that no font here has
         self.missing = ""  # why the subject's page is on no tablet, where it should be

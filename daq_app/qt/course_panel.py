@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGridLayout, QListWidget, QListWidgetItem, QWidget
 
-from daq_app.qt.parts import EntryLine, Panel, bare, button, hbox, label, say, stacked, vbox
+from daq_app.qt.parts import EntryLine, Panel, button, hbox, label, say, stacked, vbox
 from daq_app.qt.subject_picture import Mirror
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.state import Message
@@ -28,7 +28,6 @@ class CoursePanel(Panel):
     """The left of the experimenter's window while a session is in hand."""
 
     def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
-        """Show no plan; `send` takes what is done."""
         super().__init__(tr("course of the session"))
         self._send = send
         self._view: CourseView | None = None
@@ -42,7 +41,9 @@ class CoursePanel(Panel):
         self.line.setAccessibleName(tr("reason or note"))
         self._question = label("", wrap=True)
         acts, columns = QWidget(), 3 if scale <= 1.0 else 2
-        grid = bare(QGridLayout(acts), GRID)
+        grid = QGridLayout(acts)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setSpacing(GRID)
         for at, widget in enumerate(self.buttons.values()):
             grid.addWidget(widget, at // columns, at % columns)
         self.plan.setMinimumHeight(3 * TARGET // 2)

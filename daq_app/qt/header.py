@@ -6,7 +6,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QResizeEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
-from daq_app.qt.painting import Lamp
+from daq_app.qt.painting import Lamp, paint_arrow
 from daq_app.qt.parts import Panel, button, hbox, label, regrade, say
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, font, theme_of
@@ -64,7 +64,6 @@ class Notice(Panel):
     """One line that is always there: empty, a sentence, or a banner that stays until its cause is gone."""
 
     def __init__(self, scale: float, send: Callable[[Message], None]) -> None:
-        """Show nothing; `send` takes what the banner's button asks for."""
         super().__init__("", "banner")
         self._send, self._scale, self._folds = send, scale, False
         self._banner: Banner | None = None
@@ -114,7 +113,6 @@ class ToDo(Panel):
     """What to do now, and the one button that does it."""
 
     def __init__(self, primary: Callable[[], None], review: Callable[[], None]) -> None:
-        """Show nothing to do; `review` opens the session that has ended."""
         super().__init__(tr("what to do now"))
         self._small = False
         self._arrow = Arrow()
@@ -176,10 +174,6 @@ class Arrow(QWidget):
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.translate(self.width() / 2, self.height() / 2)
-        painter.scale(1, self._direction)
         painter.setPen(QPen(QColor(theme_of(self).text), 4, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
-        half = self.height() / 2 - 6
-        painter.drawLine(QPointF(0, half), QPointF(0, -half))
-        painter.drawLine(QPointF(0, -half), QPointF(-12, -half + 14))
-        painter.drawLine(QPointF(0, -half), QPointF(12, -half + 14))
+        middle, half = self.height() / 2, self._direction * (self.height() / 2 - 6)
+        paint_arrow(painter, self.width() / 2, middle + half, middle - half, QPointF(12, 14))

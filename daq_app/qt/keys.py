@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from PySide6.QtCore import QElapsedTimer, QEvent, QObject, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QApplication, QGridLayout, QMainWindow, QWidget
+from PySide6.QtWidgets import QApplication, QMainWindow, QWidget
 
-from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, scrolled, vbox
+from daq_app.qt.parts import Panel, button, hbox, is_text_field, label, named, scrolled, vbox
 from daq_app.qt.subject_window import SubjectWindow
 from daq_app.qt.tokens import GRID
 from daq_app.window.subject import owner
@@ -108,15 +108,10 @@ class KeysPage(Panel):
 
     def _fill(self) -> None:
         head = hbox((label(tr("Keys"), "title"), 1), button(tr("Close  F1"), tr("close the keys"), self.hide))
-        rows = QWidget()
-        grid = QGridLayout(rows)
-        grid.setContentsMargins(0, 0, GRID, 0)
+        rows, pairs = QWidget(), ((tr(known.key), label(tr(known.words), wrap=True)) for known in self._keys)
+        grid = named(pairs, role="value")
         grid.setHorizontalSpacing(3 * GRID)
-        grid.setVerticalSpacing(4)
-        for row, known in enumerate(self._keys):
-            grid.addWidget(label(tr(known.key), "value"), row, 0, Qt.AlignmentFlag.AlignTop)
-            grid.addWidget(label(tr(known.words), "value", wrap=True), row, 1)
-        grid.setColumnStretch(1, 1)
+        vbox(grid, on=rows, margins=(0, 0, GRID, 0))
         area = scrolled(rows)
         area.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # keys scroll it
         vbox(head, (area, 1), on=self, margins=(2 * GRID, int(1.5 * GRID), 2 * GRID, int(1.5 * GRID)), spacing=GRID)

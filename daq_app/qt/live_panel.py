@@ -166,7 +166,6 @@ class LivePanel(Panel):
     """The middle of the experimenter's window."""
 
     def __init__(self, feed: LiveFeed, model: LiveModel, scale: float) -> None:
-        """Show what `feed` holds and what `model` says; nothing yet."""
         super().__init__(tr("live readings"))
         self._feed, self._model, self._model_trace = feed, model, ModelTrace()
         self._seconds = 10

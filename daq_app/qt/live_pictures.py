@@ -6,7 +6,8 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_lost
+from daq_app.analyst.frame import View
+from daq_app.qt.painting import PaintedWidget, blank, draw_line, faces, fine, lines, paint_arrow, paint_lost
 from daq_app.qt.tokens import MODEL, MU, SMALL, font, theme_of
 from daq_app.window.live_model import ModelWords, Picture
 from daq_app.window.live_trace import PlotScale
@@ -119,19 +120,12 @@ class ContactMap(PaintedWidget):
         for mm in range(-10, 20, 10):
             x = middle.x() + mm * per_mm
             painter.drawLine(QPointF(x, box.top()), QPointF(x, box.bottom()))
-        self._paint_arrow(painter, box)
+        if self._direction:
+            painter.setPen(QPen(QColor(t.quiet), 2))
+            y, half = box.center().y(), self._direction * box.height() * 0.3
+            paint_arrow(painter, box.right() - 10, y + half, y - half, QPointF(5, 8))
         painter.end()
         return picture
-
-    def _paint_arrow(self, painter: QPainter, box: QRectF) -> None:
-        if not self._direction:
-            return
-        painter.setPen(QPen(QColor(self.theme.quiet), 2))
-        x, half = box.right() - 10, box.height() * 0.3
-        tip = box.center().y() - self._direction * half
-        painter.drawLine(QPointF(x, box.center().y() + self._direction * half), QPointF(x, tip))
-        for side in (-5, 5):
-            painter.drawLine(QPointF(x, tip), QPointF(x + side, tip + self._direction * 8))
 
 
 class FingerView(QWidget):
@@ -188,28 +182,22 @@ class FingerView(QWidget):
             self._paint_row(painter, QRectF(0, top + room - row, self.width(), row))
 
     def _paint_finger(self, painter: QPainter, box: QRectF) -> None:
-        (left, right, below, above), t = SHOWN, theme_of(self)
-        per_mm = min(box.width() / (right - left), box.height() / (above - below))
-        if per_mm < 1.0:
+        t, view = theme_of(self), View.fitted(SHOWN, box.left(), box.top(), box.width(), box.height())
+        if view.per_mm < 1.0:
             return
-        origin = QPointF(box.center().x() - per_mm * (left + right) / 2.0, box.bottom() + per_mm * below)
-
-        def placed(points: Array) -> Array:
-            return np.array([origin.x(), origin.y()]) + per_mm * points * [1.0, -1.0]
-
         painter.save()
         painter.setClipRect(box)
         painter.setPen(QPen(QColor(t.quiet), 2))
-        painter.drawLine(QPointF(box.left(), origin.y()), QPointF(box.right(), origin.y()))
+        ground = view.placed(np.zeros((1, 2)))[0, 1]
+        painter.drawLine(QPointF(box.left(), ground), QPointF(box.right(), ground))
         picture = self._picture
         if picture is not None:
-            self._paint_faces(painter, picture, placed(picture.nodes))
+            self._paint_faces(painter, picture, view.placed(picture.nodes))
             style = Qt.PenStyle.SolidLine if self._words.state == "settled" else Qt.PenStyle.DashLine
             painter.setPen(fine(t.text, style))
-            draw_line(painter, *placed(picture.outline).T)
+            draw_line(painter, *view.placed(picture.outline).T)
             if picture.lost is not None:
-                x, y = placed(np.array([picture.lost]))[0].tolist()
-                paint_lost(painter, QPointF(x, y), t)
+                paint_lost(painter, QPointF(*view.placed(np.array([picture.lost]))[0].tolist()), t)
         painter.restore()
         painter.setPen(QColor(t.quiet))
         words = tr("0 to {high:g} kPa", high=self._colours.high)

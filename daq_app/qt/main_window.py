@@ -17,7 +17,7 @@ from daq_app.qt.header import Header, Notice, ToDo
 from daq_app.qt.keys import KeysPage
 from daq_app.qt.middle import Middle
 from daq_app.qt.new_session_page import NewSessionPage
-from daq_app.qt.parts import bare, fill, hbox, scrolled, stacked, vbox
+from daq_app.qt.parts import fill, hbox, scrolled, stacked, vbox
 from daq_app.qt.preferences import LANGUAGE, SCALE, THEME, millimetres, restore_place, save_place
 from daq_app.qt.rooms import ROOMS, Menus, Rail, Room, Rooms
 from daq_app.qt.subject_picture import open_preview
@@ -306,11 +306,11 @@ class MainWindow(QMainWindow):
         window = QWidget()
         window.setObjectName("window")
         panels = QWidget()
-        body = bare(_Panels(panels), GRID)
-        fill(body, (self._left, 4), (self.middle, 3))
         for part in (self.bench, self.strip):
             part.hide()  # until it is known how much room there is
-            body.addWidget(part)
+        body = fill(_Panels(panels), (self._left, 4), (self.middle, 3), self.bench, self.strip)
+        body.setContentsMargins(0, 0, 0, 0)
+        body.setSpacing(GRID)
         here = QWidget()
         below = scrolled(panels)
         below.setMinimumHeight(1)  # what to do now is whole, however low the window is

@@ -82,7 +82,6 @@ class InspectedTrial(QWidget):
     """Takes the place of the signals while a trial is inspected; readings go on behind it."""
 
     def __init__(self, scale: float, back: Callable[[], None]) -> None:
-        """Show no trial; `back` returns to the signals."""
         super().__init__()
         self._shown: Inspection | None = None
         self.heading = label("", "name", wrap=True)
@@ -132,7 +131,6 @@ class Middle(QWidget):
     """Shows the signals of this moment, until a trial is inspected; the next stroke brings the signals back."""
 
     def __init__(self, bridge: Bridge, scale: float, act: Callable[[str], None]) -> None:
-        """Show no session; `act` does what a button stands for."""
         super().__init__()
         self._bridge = bridge
         self.inspected: int | None = None  # number of the trial that is; None where none is

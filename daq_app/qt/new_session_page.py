@@ -30,7 +30,6 @@ class NewSessionPage(Panel):
     changed = Signal()
 
     def __init__(self, scale: float, send: Callable[[Message], None], act: Callable[[str], None]) -> None:
-        """Show an empty form; `send` takes what is asked for, `act` what a button of the page stands for."""
         super().__init__(tr("new session"))
         self._send = send
         self._cards: tuple[Card, ...] = ()

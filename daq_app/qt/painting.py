@@ -167,6 +167,14 @@ class Lamp(QWidget):
                 painter.drawEllipse(box)
 
 
+def paint_arrow(painter: QPainter, x: float, tail: float, tip: float, wing: QPointF) -> None:
+    """Paint an upright arrow; `wing` is how far aside and back from the tip its two short lines end [pixel]."""
+    back = wing.y() if tail > tip else -wing.y()
+    painter.drawLine(QPointF(x, tail), QPointF(x, tip))
+    for side in (-wing.x(), wing.x()):
+        painter.drawLine(QPointF(x, tip), QPointF(x + side, tip + back))
+
+
 def paint_lost(painter: QPainter, at: QPointF, tokens: Tokens) -> None:
     """Mark the place of a failed solve, on any ground: a ring with a cross."""
     painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -31,7 +31,6 @@ from daq_app.qt.preferences import DRAWER, DRAWER_SIZES, settings
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.wording import tr
 
-L = TypeVar("L", bound=QLayout)
 Margins = int | tuple[int, int, int, int]  # around a layout: left, top, right, bottom [px]
 B = TypeVar("B", bound=QBoxLayout)
 Part = QWidget | QLayout | int | tuple[QWidget | QLayout, int]  # with its stretch; a number alone is empty room
@@ -122,7 +121,6 @@ class _Choice(QComboBox):
     """
 
     def __init__(self, name: str) -> None:
-        """Name it to screen readers on every system."""
         super().__init__()
         self.setAccessibleName(name)
         self._label = QLabel(name)
@@ -173,14 +171,6 @@ def is_text_field(widget: QWidget | None) -> bool:
     return isinstance(widget, QLineEdit | QAbstractSpinBox | QTextEdit | QPlainTextEdit) and not widget.isReadOnly()
 
 
-def bare(layout: L, spacing: int | None = None) -> L:
-    """Return a layout without margins."""
-    layout.setContentsMargins(0, 0, 0, 0)
-    if spacing is not None:
-        layout.setSpacing(spacing)
-    return layout
-
-
 def fill(layout: B, *parts: Part) -> B:
     """Return a layout with further parts at its end."""
     for part in parts:
@@ -221,15 +211,15 @@ def stacked(*pages: QWidget) -> QStackedWidget:
     return stack
 
 
-def named(values: Iterable[tuple[str, QWidget]], across: int = 1) -> QGridLayout:
-    """Return widgets behind their names, so many pairs in a row."""
+def named(values: Iterable[tuple[str, QWidget]], across: int = 1, role: str = "quiet") -> QGridLayout:
+    """Return widgets behind their names in a type of the style sheet, so many pairs in a row."""
     grid = QGridLayout()
     grid.setHorizontalSpacing(GRID)
     grid.setVerticalSpacing(2)
     place = Qt.AlignmentFlag.AlignTop if across == 1 else Qt.AlignmentFlag(0)  # beside what may wrap
     for at, (name, widget) in enumerate(values):
         row, column = at // across, 2 * (at % across)
-        grid.addWidget(label(name, "quiet"), row, column, place)
+        grid.addWidget(label(name, role), row, column, place)
         grid.addWidget(widget, row, column + 1)
         grid.setColumnStretch(column + 1, 1)
     return grid
@@ -298,7 +288,6 @@ class Openness:
     """
 
     def __init__(self, key: str, place: Callable[[], object]) -> None:
-        """Take what was remembered; open where nothing was."""
         self._key, self._place = key, place
         self._wanted = settings().value(key) != "no"
         self._instead = False  # it was opened where there is no room

@@ -36,7 +36,6 @@ class SaveButtons(QWidget):
     """Saves a picture by its name."""
 
     def __init__(self, what: str, save: Save) -> None:
-        """Offer to save `what`; nothing is shown yet."""
         super().__init__()
         self._name, self._save = "", save
         self.buttons = [

@@ -61,7 +61,6 @@ class Rail(Panel):
     """Three buttons, one for each room; that of the room that is shown stays pressed."""
 
     def __init__(self, scale: float, go: Callable[[Room], None]) -> None:
-        """Show that nothing is open; `go` is called with the room that is wanted."""
         super().__init__(tr("rooms"), "strip")
         self.buttons: dict[Room, QPushButton] = {}
         for room in ROOMS:

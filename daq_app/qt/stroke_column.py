@@ -92,9 +92,6 @@ class StrokeColumn(QWidget):
             for name, value in lines:
                 self._numbers.addRow(label(name, "quiet"), label(value, wrap=True))
 
-    def go_to_window(self) -> None:
-        self.stroke.handles["steady begin"].setFocus()
-
     def go_to_readings(self) -> None:
         """Go to the first reading of the steady window."""
         self.tabs.setCurrentIndex(READINGS)

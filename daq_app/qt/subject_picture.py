@@ -151,7 +151,6 @@ class SubjectPreview(QDialog):
     """The pages as a list, and the picture of the one that is chosen."""
 
     def __init__(self, pages: Sequence[PreviewPage], size: QSize, scale: float, parent: QWidget | None = None) -> None:
-        """Show the first page, as it looks in a subject's window of a size."""
         super().__init__(parent)
         self.setObjectName("window")
         self.setWindowTitle(tr("daq-app · preview of the subject's pages"))

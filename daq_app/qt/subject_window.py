@@ -30,7 +30,6 @@ class SubjectWindow(QWidget):
     screen_changed = Signal()
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
-        """Show a welcome; `now` tells the session clock [s]."""
         super().__init__()
         self.setObjectName("window")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)

@@ -97,8 +97,8 @@ class Follower:
         scene, self._area, _ = self._made_for
         self._kinematics: Kinematics = use.kinematics
         self._scene = scene
-        self._small = _Model.of(scene)
-        self._finite = _Model.of(live_scene(use.plan, "finite")) if use.kinematics == "finite" else None
+        finite = (live_scene(use.plan, "finite"),) if use.kinematics == "finite" else ()
+        self._models = [_Model.of(one) for one in (scene, *finite)]  # at small strain, and at finite strain
         self._reached = False  # by finite strain, at the last step
         self._mu, self._tangential = LEAST_MU, 0.0
         self._stream: int | None = None
@@ -118,11 +118,11 @@ class Follower:
             self._untouched()
         steps = [self._step(n, p) for n, p in zip(forces.normal, forces.pull, strict=True)]
         sed = np.array([said for said, _ in steps])
-        instead = np.array([self._finite is not None and not reached for _, reached in steps])
+        instead = np.array([len(self._models) > 1 and not reached for _, reached in steps])
         self._said += zip(forces.time.tolist(), sed.tolist(), strict=True)
         while self._said and self._said[0][0] < forces.time[-1] - KEPT:
             self._said.popleft()
-        shown = self._finite if self._finite is not None and self._reached else self._small
+        shown = self._models[1 if self._reached and len(self._models) > 1 else 0]
         row, now, (picture, rest) = shown.stepper.row(), float(forces.time[-1]), shown.drawn()
         if sed[-1] > 0.0 and (not self._seen or abs(now - self._seen[-1].time) >= SEEN_EVERY):
             self._seen.append(_Seen(now, row, picture, rest, shown.stepper.depth))
@@ -149,35 +149,35 @@ class Follower:
             self._mu = max(self._mu, abs(pull) / normal)
             self._tangential = max(self._tangential, abs(pull))
         normal, pull = normal / self._scene.finger.width, pull / self._scene.finger.width
-        small, finite = (self._said_by(model, normal, pull) for model in (self._small, self._finite))
-        self._reached = not np.isnan(finite)
-        return (finite, True) if self._reached else (small, False)
-
-    def _said_by(self, model: _Model | None, normal: float, pull: float) -> float:
-        """Return the SED of a model under forces [N/mm]; nan without one."""
-        if model is None:
-            return float("nan")
         # The traction bound so far [MPa] is, as the analysis has it, the largest T over the contact area.
         bound = self._tangential / self._area if self._tangential > 0.0 else np.inf
-        model.stepper.mu, model.stepper.tau = self._mu, bound
-        return model.stepper.step(normal, pull)
+        for one in self._models:
+            one.stepper.mu, one.stepper.tau = self._mu, bound
+        small, *finite = (one.stepper.step(normal, pull) for one in self._models)
+        self._reached = bool(finite) and not np.isnan(finite[0])
+        return (finite[0], True) if self._reached else (small, False)
 
     def _untouched(self) -> None:
         self._mu, self._tangential = LEAST_MU, 0.0
-        self._small.stepper.forget()
-        self._reached = self._finite is not None
-        if self._finite is not None:
-            self._finite.stepper.forget()
+        self._reached = len(self._models) > 1
+        for one in self._models:
+            one.stepper.forget()
 
 
 def _settled(request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None) -> Settled:
+    """Return the full solve; where there is none, why, with the last state that was followed in the steady window."""
     scene = settled_scene(request.plan, request.friction, request.normal_force, kinematics)
+    why, failed, prediction = tr("The stroke gives no friction."), False, None
     try:
         prediction = None if scene is None else solve(scene)
     except SolveFailure as failure:
-        return _unsettled(request, kinematics, provisional, seen, str(failure.in_a_sentence()), failed=True)
+        why, failed = str(failure.in_a_sentence()), True
     if prediction is None:
-        return _unsettled(request, kinematics, provisional, seen, tr("The stroke gives no friction."))
+        row, picture, depth = np.full(len(ROW), np.nan), None, None
+        if seen is not None:
+            lost = most_squeezed(seen.rest, seen.picture.nodes, seen.picture.faces) if failed else None
+            row, picture, depth = seen.row, replace(seen.picture, lost=lost), seen.depth
+        return Settled(request.trial, None, None, provisional, row, picture, depth, kinematics, why)
     fields = fields_of(prediction)
     sed = fields.sed[fields.triangles].mean(axis=1)
     picture = Picture(fields.nodes, fields.triangles, sed, fields.outlines["skin"])
@@ -192,20 +192,6 @@ def _greatest_effect(prediction: Prediction) -> str:
     known = {name: one["estimate"] for name, one in prediction.model["left_out"].items() if one["estimate"] is not None}
     name = max(known, key=lambda one: known[one], default="")
     return name and f"{name} {float(f'{100 * known[name]:.2g}'):g} % of the SED"
-
-
-def _unsettled(
-    request: Settle, kinematics: Kinematics, provisional: float | None, seen: _Seen | None, why: str, *,
-    failed: bool = False,
-) -> Settled:  # fmt: skip
-    """Return why there is no full solve, with the last state that was followed in the steady window."""
-    if seen is None:
-        unknown = np.full(len(ROW), np.nan)
-        return Settled(request.trial, None, None, provisional, unknown, None, None, kinematics, why)
-    picture = seen.picture
-    if failed:
-        picture = replace(picture, lost=most_squeezed(seen.rest, picture.nodes, picture.faces))
-    return Settled(request.trial, None, None, provisional, seen.row, picture, seen.depth, kinematics, why)
 
 
 def most_squeezed(rest: Array, moved: Array, faces: Indices) -> tuple[float, float]:

@@ -52,18 +52,17 @@ LEAVING = tr_noop("pressed less than half as hard at the end")
 PRESS_ON = tr_noop("Keep pressing until the end.")
 
 
-def stroke_quality(
-    block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial, settings: AnalysisSettings | None = None
-) -> Quality:
+def stroke_quality(block: ReadingBlock, plan: SessionPlan, info: TransducerInfo, trial: Trial) -> Quality:
     """Return the quality of the stroke in the readings of one take, judged as the analysis of a recording judges it."""
-    analysis = analyse_blocks([(trial, block)], plan, info, settings or AnalysisSettings())
+    analysis = analyse_blocks([(trial, block)], plan, info, AnalysisSettings())
     stroke = analysis.strokes[0] if analysis.strokes else None
     flaws = sorted(analysis.flaws, key=lambda flaw: ("refused", "doubtful", "note").index(flaw.grade))
     mentioned = [flaw for flaw in flaws if flaw.grade != "note" or flaw.name in FLAWS]
-    remarks: list[tuple[str, str, str, str]] = []  # grade, few words, at length, and what to do
-    for flaw in mentioned:
-        short, advice = FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), ""))
-        remarks.append((flaw.grade, short, flaw.sentence, advice))
+    short = {flaw.name: FLAWS.get(flaw.name, (flaw.name.value.replace("_", " "), "")) for flaw in mentioned}
+    # grade, few words, at length, and what to do
+    remarks: list[tuple[str, str, str, str]] = [
+        (flaw.grade, short[flaw.name][0], flaw.sentence, short[flaw.name][1]) for flaw in mentioned
+    ]
     fell = None if stroke is None else _fell(stroke)
     if fell is not None and fell >= FELL:
         share = 100 * (1 - fell)

@@ -85,6 +85,13 @@ class SubjectText(StrEnum):
     PRESSING = "How hard you press"
 
 
+PLAIN = {  # title and text of the pages on which nothing is to be done
+    "idle": (SubjectText.WELCOME, SubjectText.BEGINS), "settling": (SubjectText.THANKS, SubjectText.LIFT),
+    "resting": (SubjectText.REST, SubjectText.RESTING), "paused": (SubjectText.PAUSE, SubjectText.GOES_ON),
+    "resuming": (SubjectText.PAUSE, SubjectText.GOES_ON), "ended": (SubjectText.THANKS, SubjectText.REST_HAND),
+}  # fmt: skip
+
+
 def usual_question(descriptor: str) -> str:
     """Return what is asked in English where a block has no question."""
     return f"Judge the {descriptor} of the surface"
@@ -146,9 +153,8 @@ class _Page:
 
     def view(self) -> SubjectView:
         session, shown = self.session, self.session.plan.shown.subject
-        match session.phase:
-            case "idle":
-                return self._read(self.say(SubjectText.WELCOME), self.say(SubjectText.BEGINS))
+        phase = "ended" if session.phase == "closing" else session.phase
+        match phase:
             case "mounting" | "taring":
                 return self._read(self.say(SubjectText.WAIT), self._notice(self.say(SubjectText.HANDS_OFF)))
             case "ready" | "stroking":
@@ -157,16 +163,9 @@ class _Page:
                 return replace(self._read(self._stroke(), self._notice(instruction)), force=force)
             case "scoring":
                 return self._question()
-            case "settling":
-                return self._read(self.say(SubjectText.THANKS), self.say(SubjectText.LIFT))
-            case "resting":
-                return self._read(self.say(SubjectText.REST), self.say(SubjectText.RESTING))
-            case "paused" | "resuming":
-                return self._read(self.say(SubjectText.PAUSE), self.say(SubjectText.GOES_ON))
-            case "closing" | "ended" if session.resumable:
-                return self._read(self.say(SubjectText.PAUSE), self.say(SubjectText.GOES_ON))
-            case "closing" | "ended":
-                return self._read(self.say(SubjectText.THANKS), self.say(SubjectText.REST_HAND))
+            case _:
+                title, text = PLAIN["paused" if session.resumable else phase]
+                return self._read(self.say(title), self.say(text))
 
     def _read(self, title: str, text: str = "") -> SubjectView:
         return SubjectView("read", title, text, hand=self.session.plan.answering_hand or "right")
@@ -190,27 +189,22 @@ class _Page:
         return " ".join(part for part in parts if part)
 
     def _question(self) -> SubjectView:
-        trial, hand = self.session.of(self.session.trial), self.session.plan.answering_hand or "right"
+        trial, page = self.session.of(self.session.trial), self._read(self.say(SubjectText.WAIT))
         if trial is None:
-            return self._read(self.say(SubjectText.WAIT))
-        key = (trial.trial.number, trial.takes)
+            return page
+        # A descriptor is a word of the protocol's own language.
+        usual = usual_question(trial.trial.stimulus.descriptor)
+        judge = usual if self.session.plan.language == ENGLISH else self.say(SubjectText.JUDGE)
+        page = replace(page, key=(trial.trial.number, trial.takes))
         match self.session.command:
             case steps.AskScore(_, ends, ticks, question):
-                title = question or self._judge(trial.trial.stimulus.descriptor)
-                return SubjectView("line", title, "", ends, ticks, key, hand)
+                return replace(page, kind="line", title=question or judge, ends=ends, ticks=ticks)
             case steps.AskNumber(_, question):
-                title = question or self._judge(trial.trial.stimulus.descriptor)
-                return SubjectView("number", title, self.say(SubjectText.NUMBER), key=key, hand=hand)
+                return replace(page, kind="number", title=question or judge, text=self.say(SubjectText.NUMBER))
             case steps.AskChoice(_, _, question):
-                return SubjectView("choice", question or self.say(SubjectText.WHICH), "", key=key, hand=hand)
+                return replace(page, kind="choice", title=question or self.say(SubjectText.WHICH))
             case _:
-                return self._read(self.say(SubjectText.WAIT))
-
-    def _judge(self, descriptor: str) -> str:
-        """Return the usual question; a descriptor is a word of the protocol's own language."""
-        if self.session.plan.language == ENGLISH:
-            return usual_question(descriptor)
-        return self.say(SubjectText.JUDGE)
+                return self._read(page.title)
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,8 +331,8 @@ class Choice:
 
     def chosen(self, time: float, value: Which, device: Device) -> "Choice":
         """Return the answer with one of two at `time` [s]."""
-        first = time if self.first_touch is None else self.first_touch
-        return Choice(value, first, self.corrections + (self.value not in (None, value)), device)
+        again = self.corrections + (self.value not in (None, value))
+        return Choice(value, self._first(time), again, device)
 
     def typed(self, time: float, number: float | None) -> "Choice":
         """Return the answer with another number in the field at `time` [s]; one that is not above 0 is none.
@@ -346,8 +340,10 @@ class Choice:
         What stands while a number is typed is not yet an answer that is corrected.
         """
         value = number if number is not None and number > 0.0 and isfinite(number) else None
-        first = time if self.first_touch is None else self.first_touch
-        return Choice(value, first, self.corrections, "keyboard")
+        return Choice(value, self._first(time), self.corrections, "keyboard")
+
+    def _first(self, time: float) -> float:
+        return time if self.first_touch is None else self.first_touch
 
     def judgement(self, hand: Hand | None) -> MagnitudeEstimate | PairedChoice:
         """Return the event of an answer that is given."""

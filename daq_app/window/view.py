@@ -166,9 +166,8 @@ def _bench_lamp(bench: BenchState) -> tuple[Literal["off", "well", "look", "wron
         return "look", tr("near the rated load: {axes}", axes=", ".join(tr(axis) for axis in near))
     counts = asdict(bench.health)
     troubles = [f"{counts[name]} {name}" for name in COUNTED if counts[name]]
-    troubles += list(bench.health.flagged)
-    troubles += [bench.health.rate_words] if bench.health.off_rate else []
-    if troubles:
+    rate = [bench.health.rate_words] if bench.health.off_rate else []
+    if troubles := [*troubles, *bench.health.flagged, *rate]:
         return "look", ", ".join(troubles)
     if bench.health.lag_ms > LAGGING:
         return "look", tr("{lag:.0f} ms late", lag=bench.health.lag_ms)
