@@ -1,42 +1,50 @@
 """What is made of a session for the analyst: first its strokes, then the model's answers, then what is asked for."""
 
 import time
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from daq_app.analyst import state as m
 from daq_app.analyst.finger_words import NAMES, compared, film_words, named_errors
-from daq_app.analyst.frame import FIELD_ERRORS, Finger
-from daq_app.analyst.pictures import field_at, film_of, finger_of, lost_film
+from daq_app.analyst.frame import FIELD_ERRORS, Film, Finger, Frame, Instant, Parts
 from daq_app.analyst.session_words import picture_errors, sed_words
 from daq_app.analyst.stroke import RawFile, decision_meant, decision_of, history, reversal
 from daq_app.batch.derived import analysis_document, stored_options, stored_settings
 from daq_app.wording import tr
-from sessions.exchange import ExportError, ExportSource, export
+from sessions.exchange import ExportSource, export
 from sessions.plan.plan import Blinded
 from sessions.prediction import PredictionOptions, TrialPrediction, predict
 from sessions.prediction.predicting import Way
 from sessions.prediction.uncertainty import with_intervals
-from sessions.recording import Recording, RecordingError
+from sessions.recording import Recording
 from sessions.recording.derived import revealed
 from sessions.recording.head import software_versions
 from sessions.report import findings
 from sessions.report.contents import Field, Report
 from sessions.report.trials import field_of, finding_of
 from sessions.strokes import analyse
-from sessions.strokes.decisions import DecisionError, append, read
-from solver import Cancelled, Prediction, Scene, SceneError
+from sessions.strokes.decisions import append, read
+from solver import Cancelled, Prediction, Scene
+from solver.arrays import Array
+from solver.equilibrium.load_path import Instant as Step
 from solver.mesh import Mesh
-from solver.response.fields import Sketch
+from solver.prediction import ROW, Skin
+from solver.quantities import SED
+from solver.response.fields import Fields, Sketch, Still, fields_of, place_of_least_stretch, stills, way_until
 
 if TYPE_CHECKING:
     from sessions.report.figures import Panel
 
 Say = Callable[[m.Said], None]
+Progress = Callable[[float], bool]
 Urgent = Callable[[], bool]  # whether what is being done must be left for something else
+MOST = 150  # states of a way that did not settle, which may be long
+AT_ONCE = 8  # states that are drawn between two reports of progress
+OWN = ("daq_app", "sessions", "solver")  # packages whose errors are sentences
 
 
 class Work:
@@ -324,9 +332,69 @@ def _options(recording: Recording) -> PredictionOptions:
 
 def sentence_of(error: Exception) -> str:
     """Return a failure in a sentence."""
-    known: tuple[type[Exception], ...] = (RecordingError, ExportError, DecisionError, Blinded, SceneError)
-    with suppress(ImportError):
-        from sessions.report.pages import ReportError
+    own = type(error).__module__.partition(".")[0] in OWN
+    return str(error) if own else f"{type(error).__name__}: {error}"
 
-        known = (*known, ReportError)
-    return str(error) if isinstance(error, (*known, NothingToShow)) else f"{type(error).__name__}: {error}"
+
+def finger_of(prediction: Prediction, sketch: Sketch) -> Finger:
+    """Return the settled finger of a prediction."""
+    drawn = fields_of(prediction, sketch)
+    parts = Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
+    return Finger(parts, _frame(drawn, prediction.skin, prediction.row.sed), prediction.row.arc)
+
+
+def film_of(way: Way, instants: Sequence[Step], sketch: Sketch, progress: Progress) -> Film:
+    """Return the states of a way. Raises Cancelled where `progress` returns False."""
+    pictures: list[Still] = []
+    for begin in range(0, len(instants), AT_ONCE):
+        pictures += stills(way.finger, instants[begin : begin + AT_ONCE], sketch)
+        if not progress(min(1.0, (begin + AT_ONCE) / len(instants))):
+            raise Cancelled
+    frames = tuple(_frame(still.fields, still.skin, still.row) for still in pictures)
+    parts = Parts(sketch.triangles, sketch.elements, sketch.region, sketch.skin)
+    return Film(parts, frames, tuple(_instant(still) for still in pictures), ROW)
+
+
+def lost_film(way: Way, sketch: Sketch, progress: Progress) -> tuple[Film, str]:
+    """Return the states up to where a solve that has no answer came, and what stopped it there."""
+    instants, failure = way_until(way.scene, way.finger, progress)
+    every = max(1, -(-len(instants) // MOST))
+    film = film_of(way, [*instants[:-1:every], instants[-1]], sketch, progress)
+    if failure is None:
+        return film, ""
+    lost = place_of_least_stretch(way.finger, instants[-1].state, instants[-1].depth)
+    return replace(film, lost=lost), str(failure.in_a_sentence())
+
+
+def field_at(experiment: str, index: int, film: Film, at: int) -> Field:
+    """Return one state of a film as the figures of a report draw it."""
+    frame = film.frames[at]
+    contact = frame.contact
+    return Field(
+        experiment=experiment,
+        index=index,
+        nodes=_pairs(frame.nodes),
+        triangles=tuple((int(a), int(b), int(c)) for a, b, c in film.parts.triangles),
+        sed=tuple(frame.values[SED.name].tolist()),
+        outlines={name: _pairs(line) for name, line in frame.outlines.items()},
+        patch=_pairs(frame.patch),
+        contact=_pairs(np.column_stack([contact.x, contact.gap])),
+        pressure=tuple(contact.pressure.tolist()),
+        traction=tuple(contact.traction.tolist()),
+        state=contact.state,
+    )
+
+
+def _pairs(points: Array) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in points)
+
+
+def _frame(drawn: Fields, skin: Skin, row: Array) -> Frame:
+    return Frame(drawn.nodes, dict(drawn.values), dict(drawn.outlines), drawn.patch, skin, row)
+
+
+def _instant(still: Still) -> Instant:
+    at, force = still.instant, still.instant.state.force
+    states = still.skin.state
+    sticking, slipping = states.count("stick"), states.count("slip") + states.count("cap")
+    return Instant(at.time, at.depth, at.travel, still.sed, float(force[1]), float(force[0]), sticking, slipping)

@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QRe
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp, paint_arrow
-from daq_app.qt.parts import Panel, button, hbox, label, regrade, say
+from daq_app.qt.parts import Panel, button, hbox, label, regrade, say, set_beside
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, font, theme_of
 from daq_app.window.state import Message
@@ -56,8 +56,7 @@ class Header(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the lamp below the subject where the strip is too narrow for one row."""
         super().resizeEvent(event)
-        wide = self.width() >= self._one_row
-        self._rows.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
+        set_beside(self._rows, self.width() >= self._one_row)
 
 
 class Notice(Panel):

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetrics, QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, vbox
+from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, set_beside, vbox
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.course_state import PICTURE, Mark, picture_end
@@ -105,10 +105,8 @@ class LiveBar(QWidget):
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self.show_words()
-        side_by_side = self._forces_shown and self._needed(TITLE) + self._acts <= self.width()
+        set_beside(self._rows, not self._forces_shown or self._needed(TITLE) + self._acts <= self.width())
         size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
-        direction = QBoxLayout.Direction.LeftToRight if side_by_side else QBoxLayout.Direction.TopToBottom
-        self._rows.setDirection(direction if self._forces_shown else QBoxLayout.Direction.LeftToRight)
         room = self.width()
         for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
             value.setFixedWidth(self._widest(channel, size))
@@ -177,6 +175,7 @@ class LivePanel(Panel):
         self.plots = [LivePlot(*plot, scale) for plot in (*PLOTS, *AXES)]
         self._model_plot = LivePlot(*SED, scale, MODEL_CHANNELS)
         self._model_plot.setMinimumHeight(1)  # folded where there is little room, it must not keep the window large
+        self._column = (*self.plots[:3], self._model_plot)  # below each other
         self.finger = FingerView(scale)
         self.map = ContactMap(scale)
         self.bar = LiveBar(scale, self.show_seconds, self._hold, self._finite)
@@ -251,7 +250,7 @@ class LivePanel(Panel):
             self._show_until(self.plots[3:], now, seen, clock)
             frozen = newest is not None and end < newest
             edge = tr("now") if not frozen else tr("lift + 1 s") if self._hold_time is None else tr("held")
-            for plot in (*self.plots[:3], self._model_plot):
+            for plot in self._column:
                 plot.show_axis(end=edge)
             if self.map.isVisible():
                 every = max(round(TRAIL * trace.rate / POINTS), 1)
@@ -299,18 +298,15 @@ class LivePanel(Panel):
         for act in (self.bar.finite, self.bar.length, self.bar.hold):  # their keys still serve
             act.setVisible(self.height() >= self._least_for_acts)
         speed, model = self.height() >= LEAST_FOR_SPEED, self.height() >= LEAST_FOR_MODEL
-        column = (*self.plots[:3], self._model_plot)
-        for plot, shown in zip(column, (True, True, speed, model), strict=True):
+        visible = [True, True, speed, model]
+        for plot, shown, below in zip(self._column, visible, [*visible[1:], False], strict=True):
             plot.setVisible(shown)
-        lowest = column[3] if model else column[2] if speed else column[1]
-        for plot in column:
-            plot.show_axis(times=plot is lowest)  # one axis for all of them
+            plot.show_axis(times=not below)  # one axis for all of them
         self.finger.setVisible(model)
 
     def _placed(self) -> tuple[QWidget, QWidget]:
         stroke, drawer = QWidget(), QWidget()
-        column = (*self.plots[:3], self._model_plot)
-        vbox(*zip(column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
+        vbox(*zip(self._column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
         axes = ((plot, 2) for plot in self.plots[3:])
         vbox((self.finger, 7), (self.map, 3), *axes, on=drawer, spacing=4)
         self.plots[3].show_axis(times=False)

@@ -5,10 +5,24 @@ from pathlib import Path
 
 from PySide6.QtCore import QEvent, QSignalBlocker, QSize, Signal
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QBoxLayout, QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
+from PySide6.QtWidgets import QComboBox, QCompleter, QFileDialog, QRadioButton, QWidget
 
 from daq_app.qt.cards import CardFrame, CutShort, ScreenFields, TransducerRow
-from daq_app.qt.parts import Panel, button, choice, entry, field, fill, hbox, label, say, scrolled, tick, vbox
+from daq_app.qt.parts import (
+    Panel,
+    button,
+    choice,
+    entry,
+    field,
+    fill,
+    hbox,
+    label,
+    say,
+    scrolled,
+    set_beside,
+    tick,
+    vbox,
+)
 from daq_app.qt.preferences import Millimetres
 from daq_app.qt.tokens import GRID, TARGET
 from daq_app.window.checklist import FIELDS, Card, checklist, codes_in, next_code, studies_in
@@ -283,8 +297,7 @@ class NewSessionPage(Panel):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the cards in two columns where there is room."""
         super().resizeEvent(event)
-        wide = self.width() >= self._two
-        self._columns.setDirection(QBoxLayout.Direction.LeftToRight if wide else QBoxLayout.Direction.TopToBottom)
+        set_beside(self._columns, self.width() >= self._two)
 
     def changeEvent(self, event: QEvent) -> None:
         """Look for studies anew where the window is turned to: another program may have made one."""
