@@ -194,8 +194,7 @@ class AnalystWindow(QMainWindow):
             self.ask(m.Compare(name))
 
     def _follow(self, place: str) -> None:
-        at = {"session": 2, "prediction": 2, "trial": 0}.get(place, 1)
-        self._pages.setCurrentIndex(at)
+        self._pages.setCurrentIndex({"session": 2, "prediction": 2, "trial": 0}.get(place, 1))
         match place:
             case "session" | "prediction":
                 self.model.tabs.setCurrentIndex(SESSION if place == "session" else FINGER)

@@ -118,8 +118,7 @@ class LiveBar(QWidget):
     def show_words(self) -> None:
         """Say on the buttons what they do, or their keys alone where there is no room."""
         self.finite.setText("M" if self._short else tr("Finite  M"))
-        words = tr("Held  H") if self.hold.isChecked() else tr("Hold  H")
-        self.hold.setText("H" if self._short else words)
+        self.hold.setText("H" if self._short else tr("Held  H") if self.hold.isChecked() else tr("Hold  H"))
 
     def _needed(self, size: int) -> int:
         """Return the width of all numbers in a type [px]."""
@@ -282,8 +281,7 @@ class LivePanel(Panel):
     def _draw_model(self, now: float, clock: float, *, still: bool) -> None:
         """Draw what the model says: of the last stroke once it was solved in full, or else of this moment."""
         if self._model_plot.isVisible() and (not still or self._model_trace.holds(now - self._seconds)):
-            last = np.nextafter(now, np.inf)
-            columns = self._model_trace.columns(now - self._seconds, last, self._columns())
+            columns = self._model_trace.columns(now - self._seconds, np.nextafter(now, np.inf), self._columns())
             self._model_plot.show_columns(columns, now, (), clock)
         if not self.finger.isVisible() or self._hold_time is not None:
             return
@@ -307,8 +305,7 @@ class LivePanel(Panel):
     def _placed(self) -> tuple[QWidget, QWidget]:
         stroke, drawer = QWidget(), QWidget()
         vbox(*zip(self._column, (3, 2, 2, 2), strict=True), on=stroke, spacing=4)
-        axes = ((plot, 2) for plot in self.plots[3:])
-        vbox((self.finger, 7), (self.map, 3), *axes, on=drawer, spacing=4)
+        vbox((self.finger, 7), (self.map, 3), *((plot, 2) for plot in self.plots[3:]), on=drawer, spacing=4)
         self.plots[3].show_axis(times=False)
         return stroke, drawer
 

@@ -200,8 +200,7 @@ class FingerView(QWidget):
                 paint_lost(painter, QPointF(*view.placed(np.array([picture.lost]))[0].tolist()), t)
         painter.restore()
         painter.setPen(QColor(t.quiet))
-        words = tr("0 to {high:g} kPa", high=self._colours.high)
-        painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, words)
+        painter.drawText(box.adjusted(4, 0, -4, -2), TOP_RIGHT, tr("0 to {high:g} kPa", high=self._colours.high))
 
     def _paint_faces(self, painter: QPainter, picture: Picture, places: Array) -> None:
         part = np.clip(np.nan_to_num(1000.0 * picture.sed / self._colours.high), 0.0, 1.0)

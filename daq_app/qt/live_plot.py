@@ -92,8 +92,7 @@ class LivePlot(PaintedWidget):
         x = inside.right() + (self._columns.time - self._now) * inside.width() / self._seconds
         low, high = self._reach()
         for curve, row in zip(self._curves, self._rows, strict=True):
-            values = self._columns.values[row]
-            y = inside.bottom() - (values - low) * (inside.height() / (high - low))
+            y = inside.bottom() - (self._columns.values[row] - low) * (inside.height() / (high - low))
             if curve.dashed:
                 # Dashes belong to the readings, and move with them.
                 y = np.where(np.floor(self._columns.time * DASHES / self._seconds) % 3 < 2, y, np.nan)
@@ -136,8 +135,7 @@ class LivePlot(PaintedWidget):
             painter.setPen(fine(sheer(self.theme.line, 110)))
             painter.drawLine(QPointF(inside.left(), y), QPointF(inside.right(), y))
             painter.setPen(QColor(self.theme.quiet))
-            top = min(max(y - line / 2.0, 0.0), self.height() - line)
-            box = QRectF(0, top, inside.left() - 5, line)
+            box = QRectF(0, min(max(y - line / 2.0, 0.0), self.height() - line), inside.left() - 5, line)
             painter.drawText(box, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, _number(value))
 
     def _paint_times(self, painter: QPainter, inside: QRectF) -> None:

@@ -38,8 +38,7 @@ class TrialStrip(QScrollArea):
         scrolled(inside, self)
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setAccessibleName(tr("trials of the session"))
-        lines = round((2 * SMALL + 2 * GRID) * scale)
-        self.setFixedHeight(max(lines, TARGET) + 12 + GRID // 2)  # with the scroll bar
+        self.setFixedHeight(max(round((2 * SMALL + 2 * GRID) * scale), TARGET) + 12 + GRID // 2)  # with the scroll bar
 
     def show_tiles(self, tiles: tuple[Tile, ...]) -> None:
         if tiles == self._shown:

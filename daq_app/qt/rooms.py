@@ -194,8 +194,7 @@ class ReviewRoom(QWidget):
         self._none = label(tr("Choose a session at the left, or open one."), "title", wrap=True)
         side, choose = QWidget(), button(tr("Open…  Ctrl+O"), tr("open a recorded session"), self.choose)
         side.setFixedWidth(round(LIST_WIDTH * scale))
-        head = label(tr("Recent sessions"), "section")
-        vbox(head, (self.recent, 1), choose, on=side, margins=(0, GRID, 0, GRID))
+        vbox(label(tr("Recent sessions"), "section"), (self.recent, 1), choose, on=side, margins=(0, GRID, 0, GRID))
         self._row = hbox(side, (self._none, 1), on=self, spacing=GRID)
 
     def enter(self) -> None:

@@ -181,7 +181,7 @@ class SubjectPreview(QDialog):
     def _show(self, row: int) -> None:
         view = self._pages[row].view
         self.picture.show_page(view, self._size)
-        own = [*map(translator(view.language), (SubjectText.NEXT, SubjectText.FIRST, SubjectText.SECOND))]
+        own = map(translator(view.language), (SubjectText.NEXT, SubjectText.FIRST, SubjectText.SECOND))
         lost = missing_glyphs([view.title, view.text, *view.ends, *(own if view.asks else ())], self.font())
         self.lost.show_text(tr("▲ No font here draws {lost}: install one that does.", lost=lost) if lost else "")
         self.back.setEnabled(row > 0)

@@ -50,11 +50,9 @@ DARK = Tokens(
 
 def current_tokens() -> Tokens:
     """Return the theme the system asks for."""
-    hints = QGuiApplication.styleHints()
-    scheme = hints.colorScheme()
+    scheme = QGuiApplication.styleHints().colorScheme()
     if scheme == Qt.ColorScheme.Unknown:
-        window = QGuiApplication.palette().color(QPalette.ColorRole.Window)
-        return DARK if window.lightness() < 128 else LIGHT
+        return DARK if QGuiApplication.palette().window().color().lightness() < 128 else LIGHT
     return DARK if scheme == Qt.ColorScheme.Dark else LIGHT
 
 

@@ -136,8 +136,7 @@ class TabletServer:
             try:
                 self._received(hello, time.monotonic())
                 while True:
-                    said = read(connection.recv())
-                    self._received(said, time.monotonic())
+                    self._received(read(connection.recv()), time.monotonic())
             finally:
                 with self._lock:
                     if gone := self._admitted is connection:

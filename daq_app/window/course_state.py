@@ -175,8 +175,7 @@ def _after(session: SessionState, message: object, now: float) -> SessionState:
         case LoggedEvent():
             return _logged(session, message)
         case Status():
-            moved = message.safe.time_ns != session.saved_ns
-            saved = now if moved else session.saved
+            saved = now if message.safe.time_ns != session.saved_ns else session.saved
             phase = cast("Phase", message.state) if message.state in REPORTED else session.phase
             return replace(session, status=message, saved_ns=message.safe.time_ns, saved=saved, phase=phase)
         case Judged(trial, take, quality):

@@ -290,8 +290,7 @@ def _rows(session: SessionState) -> tuple[PlanRow, ...]:
 def _row(session: SessionState, trial: TrialState) -> PlanRow:
     name = f"{trial.trial.number}  {trial.code}"
     if trial.trial.number == session.trial and session.phase != "ended":
-        again = tr("take {takes}", takes=trial.takes) if trial.takes > 1 else ""
-        return PlanRow("current", "▶", name, again)
+        return PlanRow("current", "▶", name, tr("take {takes}", takes=trial.takes) if trial.takes > 1 else "")
     if trial.outcome == "skipped":
         return PlanRow("skipped", "–", name, tr("skipped"))
     if trial.outcome == "coming":
