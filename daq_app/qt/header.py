@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QFontMetrics, QPainter, QPaintEvent, QPen, QRe
 from PySide6.QtWidgets import QApplication, QBoxLayout, QSizePolicy, QWidget
 
 from daq_app.qt.painting import Lamp, paint_arrow
-from daq_app.qt.parts import Panel, button, hbox, label, regrade, say, set_beside
+from daq_app.qt.parts import Panel, button, hbox, label, regrade, say, set_horizontal
 from daq_app.qt.preferences import name_of
 from daq_app.qt.tokens import GRID, SMALL, font, theme_of
 from daq_app.window.state import Message
@@ -16,6 +16,7 @@ from daq_app.window.view_course import Button
 from daq_app.wording import tr
 
 ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
+MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
 class Header(QWidget):
@@ -56,7 +57,7 @@ class Header(QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the lamp below the subject where the strip is too narrow for one row."""
         super().resizeEvent(event)
-        set_beside(self._rows, self.width() >= self._one_row)
+        set_horizontal(self._rows, self.width() >= self._one_row)
 
 
 class Notice(Panel):
@@ -75,23 +76,21 @@ class Notice(Panel):
 
     def show_view(self, banner: Banner | None, notice: str) -> None:
         """Show a banner, or else the last message."""
-        if banner is None and self._warning is not None:
-            notice = self._warning
         if banner is not None:
             self._warning = None
-        if banner is not None and banner.grade == "wrong" and (self._banner is None or self._banner.grade != "wrong"):
+        before, self._banner = self._banner, banner
+        grade = "" if banner is None else banner.grade
+        if grade == "wrong" and (before is None or before.grade != "wrong"):
             QApplication.beep()  # nobody looks at the window all the time
-        self._banner = banner
-        mark = {"wrong": "■ ", "look": "▲ "}.get(banner.grade, "") if banner else ""
-        text = f"{mark}{banner.sentence}" if banner else notice[:1].upper() + notice[1:]
+        words = self._warning or notice
+        text = f"{MARKS[grade]} {banner.sentence}" if banner else words[:1].upper() + words[1:]
         say(self._words, text, tr("Notice:"))
-        regrade(self, banner.grade if banner else "")
+        regrade(self, grade)
         self._button.setVisible(banner is not None and banner.sends is not None)
+        self._button.setText("" if banner is None else banner.action)
+        self._button.setAccessibleName(self._button.text() or tr("what the notice offers"))
         if self._folds:
             self.setVisible(bool(text))
-        if banner is not None:
-            self._button.setText(banner.action)
-            self._button.setAccessibleName(banner.action)
 
     def show_folding(self, folds: bool) -> None:
         """Keep the line's place while it is empty; or give it up, where there is no room to keep."""

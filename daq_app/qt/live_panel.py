@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from daq_app.qt.live_pictures import ContactMap, FingerView
 from daq_app.qt.live_plot import Curve, LivePlot
-from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, set_beside, vbox
+from daq_app.qt.parts import Drawer, Panel, button, choice, hbox, label, regrade, say, set_horizontal, vbox
 from daq_app.qt.preferences import settings
 from daq_app.qt.tokens import FX, FY, GRID, MODEL, MU, SMALL, TEXT, TITLE, N, T, font
 from daq_app.window.course_state import PICTURE, Mark, picture_end
@@ -64,7 +64,7 @@ class LiveBar(QWidget):
         self._acts = 0  # width of the buttons with their words and of the drop-down [px]
         self._scale = scale
         self.values: dict[str, QLabel] = {}
-        self._pairs: list[tuple[QLabel, QLabel]] = []
+        self._captions: dict[str, QLabel] = {}
         self.hold = button(tr("Hold  H"), tr("hold the picture; readings go on"), hold, checkable=True)
         name, words = tr("live model at finite strain"), tr("Finite  M")
         self.finite = button(words, name, lambda: finite(self.finite.isChecked()), checkable=True)
@@ -105,10 +105,11 @@ class LiveBar(QWidget):
             self._acts = sum(w.sizeHint().width() + GRID for w in (self.finite, self.hold)) + self.length.width()
         self._short = self._acts > self.width()
         self.show_words()
-        set_beside(self._rows, not self._forces_shown or self._needed(TITLE) + self._acts <= self.width())
+        set_horizontal(self._rows, not self._forces_shown or self._needed(TITLE) + self._acts <= self.width())
         size, role = next((pair for pair in SIZES if self._needed(pair[0]) <= self.width()), SIZES[-1])
         room = self.width()
-        for channel, (caption, value) in zip(self.values, self._pairs, strict=True):
+        for channel, value in self.values.items():
+            caption = self._captions[channel]
             value.setFixedWidth(self._widest(channel, size))
             regrade(value, role, "role")
             room -= caption.sizeHint().width() + value.width() + 2 * GRID
@@ -122,7 +123,7 @@ class LiveBar(QWidget):
 
     def _needed(self, size: int) -> int:
         """Return the width of all numbers in a type [px]."""
-        captions = sum(caption.sizeHint().width() + 2 * GRID for caption, _ in self._pairs)
+        captions = sum(caption.sizeHint().width() + 2 * GRID for caption in self._captions.values())
         return captions + sum(self._widest(channel, size) for channel in self.values)
 
     def _widest(self, channel: str, size: int) -> int:
@@ -138,10 +139,9 @@ class LiveBar(QWidget):
             caption = label(short_name(channel), "quiet")
             if channel in COLOURS:
                 caption.setStyleSheet(f"border-bottom: 3px solid {COLOURS[channel]};")
-            self.values[channel] = value
-            self._pairs.append((caption, value))
+            self.values[channel], self._captions[channel] = value, caption
         # Where there is room, a caption stands nearer to its own number than to another.
-        spread = [part for pair in self._pairs for part in (1, *pair)]
+        spread = [part for channel, value in self.values.items() for part in (1, self._captions[channel], value)]
         return hbox(*spread[1:], len(PICTURE), spacing=GRID)
 
 

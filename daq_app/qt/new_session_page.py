@@ -19,7 +19,7 @@ from daq_app.qt.parts import (
     label,
     say,
     scrolled,
-    set_beside,
+    set_horizontal,
     tick,
     vbox,
 )
@@ -297,7 +297,7 @@ class NewSessionPage(Panel):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Put the cards in two columns where there is room."""
         super().resizeEvent(event)
-        set_beside(self._columns, self.width() >= self._two)
+        set_horizontal(self._columns, self.width() >= self._two)
 
     def changeEvent(self, event: QEvent) -> None:
         """Look for studies anew where the window is turned to: another program may have made one."""

@@ -203,9 +203,9 @@ def _set_out(layout: B, parts: tuple[Part, ...], on: QWidget | None, margins: Ma
     return fill(layout, *parts)
 
 
-def set_beside(layout: QBoxLayout, beside: bool) -> None:
+def set_horizontal(layout: QBoxLayout, horizontal: bool) -> None:
     """Put the parts of a layout beside each other, or below each other where there is no room for that."""
-    layout.setDirection(QBoxLayout.Direction.LeftToRight if beside else QBoxLayout.Direction.TopToBottom)
+    layout.setDirection(QBoxLayout.Direction.LeftToRight if horizontal else QBoxLayout.Direction.TopToBottom)
 
 
 def stacked(*pages: QWidget) -> QStackedWidget:

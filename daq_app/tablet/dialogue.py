@@ -79,16 +79,9 @@ class Refused(Struct, frozen=True, tag="refused"):
 class Page(Struct, frozen=True, tag="page"):
     """What is to be shown."""
 
-    kind: Literal["read", "line", "number", "choice"]
+    view: SubjectView
     key: str  # of the question; empty where none is asked
-    title: str
-    text: str
-    ends: tuple[str, str]
-    ticks: int
-    hand: Literal["left", "right"]
-    language: str
     direction: Literal["ltr", "rtl"]
-    force: bool  # a bar of how hard the finger presses is shown
     setting: bool  # no session runs: the tablet is being set up
     words: dict[str, str]  # the page's own, in the subject's language
 
@@ -142,10 +135,8 @@ class Dialogue:
         for key in tuple(self._waiting):
             self._acknowledge(key)
         key = _key(session, *view.key) if view.asks and session is not None else ""
-        page = Page(
-            view.kind, key, view.title, view.text, view.ends, view.ticks, view.hand, view.language,
-            "rtl" if mirrored else "ltr", view.force, session is None, {word.name.lower(): say(word) for word in WORDS},
-        )  # fmt: skip
+        words = {word.name.lower(): say(word) for word in WORDS}
+        page = Page(view, key, "rtl" if mirrored else "ltr", session is None, words)
         if page != self._page:
             self._page = page
             self._send(page)
@@ -160,7 +151,7 @@ class Dialogue:
         if session is None or session.over or page is None or key in self._waiting or self._acknowledge(key):
             return None
         event = event_of(answer.acts, clock, session.plan.answering_hand)
-        if key == page.key and isinstance(event, ANSWERS[page.kind]):
+        if key == page.key and isinstance(event, ANSWERS[page.view.kind]):
             self._waiting.add(key)
             return event
         self._send(Stored(key))

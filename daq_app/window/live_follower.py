@@ -93,8 +93,8 @@ class Follower:
 
     def __init__(self, use: Use) -> None:
         """Mesh and condense the finger. Raises SceneError or MeshError where it cannot be meshed."""
-        self._made_for = _finger(use)
-        scene, self._area, _ = self._made_for
+        self._finger = _finger(use)
+        scene, self._area, _ = self._finger
         self._kinematics: Kinematics = use.kinematics
         self._scene = scene
         finite = (live_scene(use.plan, "finite"),) if use.kinematics == "finite" else ()
@@ -107,7 +107,7 @@ class Follower:
 
     def follows(self, use: Use) -> bool:
         """Say whether it follows just this finger already."""
-        return self._made_for == _finger(use)
+        return self._finger == _finger(use)
 
     def take(self, forces: Forces) -> Provisional:
         """Return what the model says of a batch."""

@@ -166,28 +166,23 @@ def model_words(said: Provisional | None, settled: Settled | None, problem: str)
         kpa=_kpa(float(said.sed[-1])), errors=errors_words(None), depth=said.depth,
     )  # fmt: skip
     if said.instead[-1]:
-        words = tr("{told}small strain: these forces are beyond the reach of finite strain", told=known)
+        words = tr("{known}small strain: these forces are beyond the reach of finite strain", known=known)
         return ModelWords(words, "instead")
     return ModelWords(known + tr(KINEMATICS[said.kinematics]), "provisional")
 
 
 def _of_settled(settled: Settled) -> str:
     shown = "" if settled.provisional is None else tr(" · shown live {kpa}", kpa=_kpa(settled.provisional))
-    how = tr(KINEMATICS[settled.kinematics])
+    how, picture, depth = tr(KINEMATICS[settled.kinematics]), settled.picture, settled.depth
     if settled.sed is None:
-        kept = ""
-        if settled.depth is not None:
-            lost = settled.picture is not None and settled.picture.lost is not None
-            marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
-            kept = tr(
-                " Shown is the last state that was followed, {depth:.1f} mm deep{marked}.",
-                depth=settled.depth, marked=marked,
-            )  # fmt: skip
+        lost = picture is not None and picture.lost is not None
+        marked = tr("; ⊗ marks its most squeezed tissue") if lost else ""
+        last = tr_noop(" Shown is the last state that was followed, {depth:.1f} mm deep{marked}.")
+        kept = "" if depth is None else tr(last, depth=depth, marked=marked)
         return tr(
             "No full solve at {how}{shown}. {reason}{kept}", how=how, shown=shown, reason=settled.reason, kept=kept
         )
-    by = settled.difference
-    if by is not None:
+    if (by := settled.difference) is not None:
         shown += f" ({100 * by:+.1f} %)".replace("-", "−")
     return tr(
         "Full solve  SED {kpa}{errors} · at the measured force, {how}{shown}",

@@ -318,17 +318,13 @@ def _stroke(session: SessionState, again: tuple[TrialState, ...]) -> StrokeView:
     if judged is None or judged.quality is None:
         return StrokeView("none", tr("No stroke yet."))
     quality, code = judged.quality, judged.trial.stimulus.code
-    parts = [tr("Stroke on {code}", code=code)]
-    if quality.steady is not None:
-        parts.append(tr("steady {duration:.1f} s", duration=quality.steady[1] - quality.steady[0]))
-    if quality.mu is not None:
-        parts.append(_mu(quality))
-    if quality.speed is not None:
-        parts.append(f"{quality.speed:.0f} mm/s")
+    parts, steady, share = [tr("Stroke on {code}", code=code)], quality.steady, 100 * (quality.fell or 0.0)
+    parts += [] if steady is None else [tr("steady {duration:.1f} s", duration=steady[1] - steady[0])]
+    parts += [] if quality.mu is None else [_mu(quality)]
+    parts += [] if quality.speed is None else [quantity(quality.speed, 0, "mm/s")]
     if quality.fell is not None:
-        share = 100 * quality.fell
-        fell, rose = tr("N fell {share:.0f} %", share=share), tr("N rose {share:.0f} %", share=-share)
-        parts.append(fell if share >= 0 else rose)
+        words = tr_noop("N fell {share:.0f} %") if share >= 0 else tr_noop("N rose {share:.0f} %")
+        parts.append(tr(words, share=abs(share)))
     parts.append(tr("good") if quality.grade == "good" else "; ".join(tr(one) for one in quality.words))
     redo = steps.Redo(quality.words[0]) if quality.words and judged in again else None
     return StrokeView(quality.grade, " · ".join(parts), " ".join(quality.sentences), redo)

@@ -37,7 +37,7 @@ def test_a_page_is_sent_once_and_tells_nothing_of_the_stimulus():
     page = tablet.show(*SCORE)
     tablet.show(*SCORE)
     assert len(tablet.sent) == 1
-    assert (page.kind, page.ends) == ("line", ("low end", "high end"))
+    assert (page.view.kind, page.view.ends) == ("line", ("low end", "high end"))
     told = repr(page).replace(page.key, "")
     assert not any(trial.stimulus.code in told for trial in PLAN.trials)
 
