@@ -52,7 +52,7 @@ def _by_hand():  # noqa: ANN202
 
     plots = [LivePlot(*plot, 1.0) for plot in PLOTS]
     plots += [LivePlot(*SED, 1.0, MODEL_CHANNELS), *(LivePlot(*plot, 1.0) for plot in AXES)]
-    _shown(plots)
+    _show(plots)
 
     def draw(now: float) -> None:
         marks = [Mark("onset", now - 4, now - 4), Mark("steady", now - 3, now - 1), Mark("lift", now - 1, now - 1)]
@@ -81,7 +81,7 @@ def _by_pyqtgraph():  # noqa: ANN202
             plot.addItem(item, ignoreBounds=True)
         marks.append(lines)
         plots.append(plot)
-    _shown(plots)
+    _show(plots)
 
     def draw(now: float) -> None:
         for _plot, own, (onset, lift, steady), (wide, _) in zip(plots, curves, marks, SIZES, strict=True):
@@ -95,7 +95,7 @@ def _by_pyqtgraph():  # noqa: ANN202
     return draw
 
 
-def _shown(plots) -> None:  # noqa: ANN001
+def _show(plots) -> None:  # noqa: ANN001
     for plot, size in zip(plots, SIZES, strict=True):
         plot.resize(*size)
         plot.show()

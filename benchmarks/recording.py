@@ -1,6 +1,7 @@
 """What recording costs: an hour's worth of readings at 7000 Hz written, opened, read and sealed (or `--seconds N`).
 
-Run: python -m benchmarks.recording
+Run: python -m benchmarks.recording. With --process instead what the recorder's process costs in a session, and how old
+a reading is when the client has it, at 200 and 7000 Hz. The simulated box runs in this process then.
 """
 
 import argparse
@@ -14,16 +15,24 @@ from pathlib import Path
 
 import numpy as np
 
+from daq_app.recorder import messages as m
+from daq_app.recorder.client import Recorder
 from drivers.calibration import Calibration
-from drivers.clock import SimulatedClock
+from drivers.clock import RealClock, SimulatedClock
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame, SessionPlan
+from sessions.plan.protocols import plan, protocol
 from sessions.recording import Recording, SessionWriter, provenance
 from sessions.recording.archive import problems, seal
 from sessions.recording.schema import COLUMNS
+from sessions.run.runner import Status
+from simulators.bench import Bench
+from simulators.net_ft_box import NetFtBox
 
 RATE = 7000
+PLAN = plan(protocol("sensotact-friction"), "S01", 1)
+STOPS = 5
 BLOCK = 140  # readings handed over at once: 20 ms
 INFO = TransducerInfo(
     "bench://", "bench", "bench", "0", True, RATE, RATE, Calibration("0", "counts", np.eye(6), np.ones(6), "none")
@@ -33,15 +42,23 @@ INFO = TransducerInfo(
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=int, default=3600)
+    parser.add_argument("--seconds", type=int, help="of readings (3600), or listened at each rate (10)")
     parser.add_argument("--folder", type=Path, help="where to write; a temporary folder when left out")
+    parser.add_argument("--process", action="store_true", help="the recorder's process")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(dir=options.folder) as room:
-        measure(Path(room) / "session", options.seconds)
+        if not options.process:
+            measure_writer(Path(room) / "session", options.seconds or 3600)
+            return
+        for rate in (200, RATE):
+            box = NetFtBox(Bench(1), RealClock(), rate=rate)
+            box.start()
+            measure_process(box.uri, rate, options.seconds or 10, Path(room))
+            box.close()
 
 
 @contextmanager
-def timed(what: str) -> Iterator[None]:
+def print_time(what: str) -> Iterator[None]:
     """Print how long something took, by the clock and by the processor: others may be using the machine."""
     began, worked = time.perf_counter(), time.process_time()
     yield
@@ -53,11 +70,12 @@ def memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
 
 
-def measure(folder: Path, seconds: int) -> None:
+def measure_writer(folder: Path, seconds: int) -> None:
     """Write, open, read and seal one recording."""
     clock = SimulatedClock()
-    plan = SessionPlan("bench", "S00", 0, "none", (), True, Frame())
-    writer = SessionWriter.create(folder, plan, INFO, provenance(clock), clock=clock)
+    writer = SessionWriter.create(
+        folder, SessionPlan("bench", "S00", 0, "none", (), True, Frame()), INFO, provenance(clock), clock=clock
+    )
     raw = np.round(np.random.default_rng(0).normal(0, 4000, (BLOCK, 6)))
     calls: list[float] = []
     worked = time.process_time()
@@ -90,19 +108,78 @@ def measure(folder: Path, seconds: int) -> None:
         f" most {1e3 * max(event_times):.0f} ms"
     )
     print(f"file: {(folder / 'session.sqlite').stat().st_size / 1e6:.0f} MB")
-    with timed("opening"):
+    with print_time("opening"):
         recording = Recording.open(folder)
     before = memory()
-    with timed("reading it whole"):
+    with print_time("reading it whole"):
         block = recording.readings()
     size = sum(getattr(block, name).nbytes for name in COLUMNS) / 1e6
     print(f"{len(block)} readings, {size:.0f} MB; memory grew by {memory() - before:.0f} MB")
     del block
-    with timed("sealing"):
+    with print_time("sealing"):
         seal(folder)
-    with timed("checking"):
+    with print_time("checking"):
         damage = problems(folder)
     print(f"{len(damage)} problems; largest memory: {memory():.0f} MB")
+
+
+def measure_process(uri: str, rate: int, seconds: int, room: Path) -> None:
+    """Run sessions at one rate, and print what they cost."""
+    began = time.perf_counter()
+    with Recorder.start() as recorder:
+        recorder.send(m.Connect(uri))
+        until(recorder, m.Device)
+        print(f"{rate} Hz: connected {time.perf_counter() - began:.2f} s after the start of the process")
+        stops: list[float] = []
+        for number in range(STOPS):
+            recorder.send(m.StartSession(PLAN, str(room / f"{rate}-{number}")))
+            until(recorder, m.SessionBegun)
+            if number == 0:
+                listen(recorder, seconds)
+            stop_time = time.perf_counter()
+            recorder.send(m.Stop())
+            until(recorder, m.SessionEnded)
+            stops.append(time.perf_counter() - stop_time)
+        print(f"{rate} Hz: from a stop to the written end, median of {STOPS}: {statistics.median(stops) * 1e3:.0f} ms")
+
+
+def listen(recorder: Recorder, seconds: int) -> None:
+    """Take what a session shows, and print how old and how much it is."""
+    ages: list[float] = []
+    lags: list[float] = []
+    readings = left_out = 0
+    worked, began = processor_time(recorder.pid), time.perf_counter()
+    while time.perf_counter() - began < seconds:
+        for report in recorder.poll(0.005):
+            if isinstance(report, m.Live):
+                ages.append((time.monotonic_ns() - int(report.received_ns[-1])) * 1e-6)
+                readings, left_out = readings + len(report.sequence), left_out + report.left_out
+            elif isinstance(report, Status):
+                lags.append(report.lag_ms)
+    passed = time.perf_counter() - began
+    share = (processor_time(recorder.pid) - worked) / passed
+    ages.sort()
+    late = ages[len(ages) * 99 // 100]
+    print(f"  {readings / passed:.0f} readings a second in {len(ages) / passed:.0f} messages, {left_out} left out")
+    print(f"  newest reading at the client: median {statistics.median(ages):.1f} ms old, 99 % within {late:.1f} ms")
+    print(f"  newest reading at the recorder: median {statistics.median(lags):.2f} ms old")
+    print(f"  processor: {100 * share:.0f} % of one core")
+
+
+def until(recorder: Recorder, kind: type[m.Report]) -> None:
+    """Wait for a report of a kind. Raises RuntimeError where what was asked for could not be done."""
+    while True:
+        for report in recorder.poll(0.01):
+            if isinstance(report, kind):
+                return
+            if isinstance(report, m.Failed):
+                raise RuntimeError(report.sentence)
+
+
+def processor_time(pid: int) -> float:
+    """Return the processor time a process has used [s]; Linux tells it in hundredths."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / 100.0
 
 
 if __name__ == "__main__":

@@ -65,11 +65,11 @@ def _print_analysis(recording: Recording) -> None:
     prediction = predict(analysis, recording.plan, options)
     carried = with_intervals(analysis, prediction)
     with_alternatives(carried)
-    alone = _taken(lambda: analyse(Recording.open(recording.folder)))
-    drawn = _taken(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
-    solved = _taken(lambda: predict(analysis, recording.plan, prediction.options))
-    spans = _taken(lambda: with_intervals(analysis, prediction))
-    alternatives = _taken(lambda: with_alternatives(carried))
+    alone = _median_time(lambda: analyse(Recording.open(recording.folder)))
+    drawn = _median_time(lambda: [stroke_intervals(stroke, at) for at, stroke in enumerate(strokes)])
+    solved = _median_time(lambda: predict(analysis, recording.plan, prediction.options))
+    spans = _median_time(lambda: with_intervals(analysis, prediction))
+    alternatives = _median_time(lambda: with_alternatives(carried))
     print(f"{len(strokes)} strokes, medians of {RUNS}, processor time")
     print(f"opened and analysed   {1000 * alone:6.0f} ms   (reach 1000)")
     print(f"bootstrap intervals   {1000 * drawn:6.0f} ms   (both together: reach 5000)")
@@ -79,7 +79,7 @@ def _print_analysis(recording: Recording) -> None:
     print(f"side by side          {1000 * alternatives:6.0f} ms   at small strain")
 
 
-def _taken(work: Callable[[], object]) -> float:
+def _median_time(work: Callable[[], object]) -> float:
     """Return the median processor time of some work [s]."""
     times: list[float] = []
     for _ in range(RUNS):

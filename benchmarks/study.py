@@ -22,7 +22,7 @@ from sessions.statistics.visit import VisitOptions
 REPEATS = 2
 
 
-def timed(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
+def measure(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
     """Return the wall time and the workers' processor time [s] of computing all sessions."""
     before, begun = _children(), time.perf_counter()
     done, failed = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
@@ -47,7 +47,7 @@ def main(count: int, options: VisitOptions) -> None:
         work: dict[int, list[float]] = {1: [], 2: []}
         for again in range(REPEATS):
             for workers in (1, 2):
-                took = timed(folders, base / f"shelf-{workers}-{again}", options, workers)
+                took = measure(folders, base / f"shelf-{workers}-{again}", options, workers)
                 wall[workers].append(took[0])
                 work[workers].append(took[1] / count)
         one, two = (median(wall[workers]) for workers in (1, 2))
@@ -57,7 +57,7 @@ def main(count: int, options: VisitOptions) -> None:
         print(f"processor time a session: {used[0]:.2f} s with one process, {used[1]:.2f} s with two")
         print(f"1,000 sessions with two: {1000 * two / count / 60:.1f} min here, ", end="")
         print(f"{1000 * used[1] / 2 / 60:.1f} min where nothing else runs")
-        print(f"once computed: {timed(folders, base / 'shelf-2-0', options, 2)[0]:.2f} s")
+        print(f"once computed: {measure(folders, base / 'shelf-2-0', options, 2)[0]:.2f} s")
 
 
 if __name__ == "__main__":

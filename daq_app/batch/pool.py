@@ -44,7 +44,7 @@ def content_of(session: Path) -> dict[str, bytes]:
     return {name: (session / name).read_bytes() for name in CONTENT if (session / name).is_file()}
 
 
-def computed(folder: Path, options: VisitOptions) -> Answer:
+def compute_visit(folder: Path, options: VisitOptions) -> Answer:
     """Return what the session in a folder brings; for a worker: nothing is raised."""
     try:
         return folder.name, asdict(visit_of(Recording.open(folder), options, software_versions()))
@@ -53,14 +53,14 @@ def computed(folder: Path, options: VisitOptions) -> Answer:
         return folder.name, sentence.replace(str(folder), folder.name)  # the same wherever it was computed
 
 
-def computed_from(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
+def compute_sent_visit(name: str, content: Mapping[str, bytes], options: VisitOptions) -> Answer:
     """Return what a session brings whose files were sent: a worker needs no disk in common with us."""
     with tempfile.TemporaryDirectory() as room:
         folder = Path(room) / name
         folder.mkdir()
         for file, data in content.items():
             (folder / file).write_bytes(data)
-        return computed(folder, options)
+        return compute_visit(folder, options)
 
 
 class SchedulerError(Exception):
@@ -172,7 +172,8 @@ def _by_client(
             # Files are read and sent as workers come free: never those of a thousand sessions at once.
             while waiting and threads and len(under_way) < 2 * threads:
                 folder = waiting.pop()
-                future = client.submit(computed_from, folder.name, content_of(folder), options, pure=False, retries=1)
+                content = content_of(folder)
+                future = client.submit(compute_sent_visit, folder.name, content, options, pure=False, retries=1)
                 names[future.key], under_way[future.key] = folder.name, future
                 answers.add(future)
             if not answers.has_ready():
@@ -306,7 +307,7 @@ def _local(folders: Sequence[Path], options: VisitOptions, workers: int | None) 
 
 def _in_pool(folders: Sequence[Path], options: VisitOptions, workers: int | None) -> Iterator[Answer]:
     with local_pool(len(folders), workers) as pool:
-        waiting: set[Future[Answer]] = {pool.submit(computed, folder, options) for folder in folders}
+        waiting: set[Future[Answer]] = {pool.submit(compute_visit, folder, options) for folder in folders}
         while waiting:
             ready, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
             for future in ready:

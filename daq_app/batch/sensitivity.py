@@ -4,7 +4,7 @@ import importlib
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -65,11 +65,8 @@ class TooFewAnswers(Exception):
 
 def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return the design around a scene; what the scene leaves out is not varied."""
-    design: dict[str, tuple[float, float]] = {}
-    for name, (low, high) in USUAL.items():
-        value = _value(scene, name)
-        if value:
-            design[name] = (low * value, high * value)
+    own = {name: _value(scene, name) for name in USUAL}
+    design = {name: (USUAL[name][0] * value, USUAL[name][1] * value) for name, value in own.items() if value}
     angle = scene.finger.contact_angle
     design[ANGLE] = (max(angle - ANGLE_SPAN, 10.0), min(angle + ANGLE_SPAN, 90.0))
     nu = scene.materials.fat.nu
@@ -78,7 +75,7 @@ def usual_design(scene: Scene) -> dict[str, tuple[float, float]]:
     return design
 
 
-def left_as_it_is(scene: Scene, design: Design) -> tuple[str, ...]:
+def constant_numbers(scene: Scene, design: Design) -> tuple[str, ...]:
     """Return the numbers of geometry, stiffness, load and friction that a design does not vary."""
     bone = scene.finger.bone == "meshed"
     names = [f"finger.{field.name}" for field in fields(scene.finger)]
@@ -88,7 +85,7 @@ def left_as_it_is(scene: Scene, design: Design) -> tuple[str, ...]:
     return tuple(name for name in [*numbers, "finger.bone_centre", "receptor.depth"] if name not in design)
 
 
-def checked(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
+def check_design(design: Mapping[str, Any], scene: Scene, where: str) -> dict[str, tuple[float, float]]:
     """Return a design read from a file. Raises SettingsError for a key or a range that cannot be varied."""
     ranges: dict[str, tuple[float, float]] = {}
     for name, span in design.items():
@@ -120,7 +117,7 @@ def sensitivity(
     scene of the design has no answer, SceneError where a range leaves what a scene may hold.
     """
     points = saltelli_points(design, samples, seed)
-    answer = sed or _settled
+    answer = sed or _sed_of
     scenes = [with_values(scene, dict(zip(design, point, strict=True))) for point in points.tolist()]
     responses = np.empty(len(points))
     failed: list[str] = []
@@ -208,17 +205,17 @@ def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
     return replace(scene, **own)
 
 
-def _settled(scene: Scene) -> float:
+def _sed_of(scene: Scene) -> float:
     settings = replace(scene.solve, course="steady", evidence="quick")
     return solve(replace(scene, solve=settings)).sed_ending
 
 
-def _value(scene: Any, name: str) -> float | None:  # noqa: ANN401  the scene or a table of it
+def _value(scene: Scene, name: str) -> float | None:
     """Return the number at a dotted key, None where there is none."""
-    first, _, rest = name.partition(".")
-    if not is_dataclass(scene) or first not in {field.name for field in fields(scene)}:
+    value: Any = asdict(scene)
+    try:
+        for key in name.split("."):
+            value = value[key]
+    except (KeyError, TypeError):
         return None
-    value: Any = getattr(scene, first)
-    if rest:
-        return _value(value, rest)
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None

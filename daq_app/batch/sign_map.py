@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
@@ -53,7 +53,7 @@ class Trial:
     """One finger to be asked."""
 
     finger: Scene
-    press: Press
+    press: Press = field(default_factory=Press)
     arcs: tuple[float, ...] = (0.0,)
 
     def key(self, versions: Mapping[str, str]) -> str:
@@ -76,26 +76,22 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
     base = published(kinematics)
     other: Kinematics = "finite" if kinematics == "small" else "small"
 
-    def finger(**changes: float) -> Scene:
-        return replace(base, finger=replace(base.finger, **changes))
+    def finger(**changes: float) -> Trial:
+        return Trial(replace(base, finger=replace(base.finger, **changes)))
 
-    def stiffer(tissue: str, factor: float) -> Scene:
-        return _stiffened(base, {tissue: factor})
-
-    here = Press()
     return {
-        "as published": Trial(base, here),
-        f"{other} strain": Trial(published(other), here),
+        "as published": Trial(base),
+        f"{other} strain": Trial(published(other)),
         f"pressed by {FORCE:g} N/mm": Trial(base, Press(force=FORCE)),
-        "receptor 1 mm proximal": Trial(base, here, (-1.0,)),
-        "receptor 0.25 mm proximal": Trial(base, here, (-0.25,)),
-        "receptor 0.25 mm distal": Trial(base, here, (0.25,)),
-        "receptor 1 mm distal": Trial(base, here, (1.0,)),
-        "tip radius 6 mm": Trial(finger(tip_radius=6.0), here),
-        "tip radius 7 mm": Trial(finger(tip_radius=7.0), here),
-        "contact angle 30°": Trial(finger(contact_angle=30.0), here),
-        "fat half as stiff": Trial(stiffer("fat", 0.5), here),
-        "epidermis three times as stiff": Trial(stiffer("epidermis", 3.0), here),
+        "receptor 1 mm proximal": Trial(base, arcs=(-1.0,)),
+        "receptor 0.25 mm proximal": Trial(base, arcs=(-0.25,)),
+        "receptor 0.25 mm distal": Trial(base, arcs=(0.25,)),
+        "receptor 1 mm distal": Trial(base, arcs=(1.0,)),
+        "tip radius 6 mm": finger(tip_radius=6.0),
+        "tip radius 7 mm": finger(tip_radius=7.0),
+        "contact angle 30°": finger(contact_angle=30.0),
+        "fat half as stiff": Trial(_scale_stiffness(base, {"fat": 0.5})),
+        "epidermis three times as stiff": Trial(_scale_stiffness(base, {"epidermis": 3.0})),
         "pressed a quarter less deep": Trial(base, Press(depth=0.75)),
     }
 
@@ -103,10 +99,8 @@ def single_changes(kinematics: Kinematics) -> Mapping[str, Trial]:
 def map_trials(kinematics: Kinematics) -> Mapping[float, Trial]:
     """Return the published finger with other tip radii [mm], asked at every place of the map."""
     base = published(kinematics)
-    return {
-        radius: Trial(replace(base, finger=replace(base.finger, tip_radius=radius)), Press(), PLACES)
-        for radius in RADII
-    }
+    fingers = {radius: replace(base, finger=replace(base.finger, tip_radius=radius)) for radius in RADII}
+    return {radius: Trial(finger, arcs=PLACES) for radius, finger in fingers.items()}
 
 
 def drawn_fingers(points: Array, kinematics: Kinematics) -> list[Trial]:
@@ -127,7 +121,7 @@ def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
         shaft_length=finger.shaft_length * radius / finger.tip_radius,
         contact_angle=angle,
     )
-    other = _stiffened(base, dict(zip(("epidermis", "dermis", "fat"), stiff, strict=True)))
+    other = _scale_stiffness(base, dict(zip(("epidermis", "dermis", "fat"), stiff, strict=True)))
     fat = replace(other.materials.fat, nu=nu)
     half = base.receptor.ending[0] / 2.0
     within = half + depth * ((epidermis + dermis) * radius - 2.0 * half)
@@ -140,13 +134,13 @@ def _finger(drawn: Mapping[str, float], base: Scene) -> Trial:
     return Trial(drawn_scene, Press(depth=press), (place,))
 
 
-def _stiffened(scene: Scene, factors: Mapping[str, float]) -> Scene:
+def _scale_stiffness(scene: Scene, factors: Mapping[str, float]) -> Scene:
     materials = scene.materials
     changed = {name: replace(materials.of(name), E=factor * materials.of(name).E) for name, factor in factors.items()}
     return replace(scene, materials=replace(materials, **changed))
 
 
-def answered(trial: Trial) -> Answer | str:
+def finger_answer(trial: Trial) -> Answer | str:
     """Return what one finger answers, or why it cannot be asked."""
     by_quantity = series_slopes(trial.finger, trial.press, trial.arcs)
     if isinstance(by_quantity, str):
@@ -175,13 +169,13 @@ def answers_of(
     """
     versions = software_versions()
     keys = [trial.key(versions) for trial in trials]
-    known = _kept(keep)
+    known = _load_answers(keep)
     missing = [number for number, key in enumerate(keys) if key not in known]
     done = len(trials) - len(missing)
     if missing:
         log = nullcontext() if keep is None else keep.open("a", encoding="utf-8", buffering=1)
         with log as file, _executor(scheduler, len(missing), workers) as pool:
-            waiting = {pool.submit(answered, trials[number]): keys[number] for number in missing}
+            waiting = {pool.submit(finger_answer, trials[number]): keys[number] for number in missing}
             for future in as_completed(waiting):
                 key = waiting[future]
                 known[key] = future.result()
@@ -192,7 +186,7 @@ def answers_of(
     return [known[key] for key in keys]
 
 
-def _kept(keep: Path | None) -> dict[str, Any]:
+def _load_answers(keep: Path | None) -> dict[str, Any]:
     """Return the answers that a file holds; a line that a crash cut short is left out."""
     answers: dict[str, Any] = {}
     if keep is not None and keep.exists():

@@ -74,13 +74,13 @@ def run(arguments: list[str]) -> int:
     try:
         return _dispatch(arguments)
     except KeyboardInterrupt:
-        return _said("stopped", STOPPED)
+        return _report("stopped", STOPPED)
     except BrokenPipeError:
         return FAILED  # whoever read our output has gone; there is nobody to tell
     except Exception as error:  # noqa: BLE001  the last resort: no traceback reaches a user
         if debug:
             traceback.print_exc()
-        return _said(*_failure(error))
+        return _report(*_failure(error))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -96,19 +96,19 @@ def _dispatch(arguments: list[str]) -> int:
         return DONE if arguments else WRONG
     name, *rest = arguments
     if name not in VERBS:
-        return _said(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
+        return _report(f"there is no verb '{name}': 'daq-app --help' lists them", WRONG)
     verb = importlib.import_module(f"daq_app.cli.verbs.{name.replace('import', 'import_').replace('-', '_')}")
     try:
-        options = _parser(name, verb).parse_args(_joined(rest))
+        options = _parser(name, verb).parse_args(_join_normal(rest))
     except SystemExit as leaving:  # argparse has printed its help
         return int(leaving.code or 0)
     return verb.run(options, Console(as_json=options.json))
 
 
-def _joined(arguments: list[str]) -> list[str]:
+def _join_normal(arguments: list[str]) -> list[str]:
     """Join --normal to its value, which may begin with a hyphen and would be taken for an option.
 
-    >>> _joined(["a.csv", "--normal", "-z", "--json"])
+    >>> _join_normal(["a.csv", "--normal", "-z", "--json"])
     ['a.csv', '--normal=-z', '--json']
     """
     if "--normal" not in arguments[:-1]:
@@ -148,10 +148,10 @@ def _parser(name: str, verb: ModuleType) -> argparse.ArgumentParser:
 
 def _failure(error: Exception) -> tuple[str, int]:
     """Return the sentence and the exit code for what went wrong."""
-    sentence = _shortened(" ".join(str(error).split()))
-    if isinstance(error, (WrongValue, *_loaded(_WRONG))):
+    sentence = _shorten(" ".join(str(error).split()))
+    if isinstance(error, (WrongValue, *_exceptions(_WRONG))):
         return sentence, WRONG
-    if isinstance(error, _loaded(_FAILED)):
+    if isinstance(error, _exceptions(_FAILED)):
         return sentence, FAILED
     if isinstance(error, OSError):
         if error.filename is None or error.strerror is None:
@@ -163,17 +163,17 @@ def _failure(error: Exception) -> tuple[str, int]:
     return f"unexpected {type(error).__name__} ({sentence}); run again with --debug and report what it shows", FAILED
 
 
-def _shortened(sentence: str) -> str:
+def _shorten(sentence: str) -> str:
     """Return a sentence without the middle of what a damaged file put into it."""
     return sentence if len(sentence) <= LONGEST else f"{sentence[: LONGEST // 2]} … {sentence[-LONGEST // 2 :]}"
 
 
-def _loaded(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
+def _exceptions(names: tuple[str, ...]) -> tuple[type[Exception], ...]:
     """Return those of the exceptions whose module was imported: no other can have been raised, nor need be imported."""
     pairs = [name.rsplit(".", 1) for name in names]
     return tuple(getattr(sys.modules[module], name) for module, name in pairs if module in sys.modules)
 
 
-def _said(sentence: str, code: int) -> int:
+def _report(sentence: str, code: int) -> int:
     print(f"daq-app: {harmless(sentence)}", file=sys.stderr)
     return code

@@ -66,7 +66,7 @@ class Terminal:
             case steps.AskBegin():
                 return "Press Enter to begin."
             case steps.AskMount(trial):
-                return f"{_called(trial)}: mount {trial.stimulus.code}, then press Enter."
+                return f"{_announcement(trial)}: mount {trial.stimulus.code}, then press Enter."
             case steps.AskStroke(trial, allowed):
                 after = "" if self._forces else " Press Enter when it is done."
                 often = "once" if allowed == 1 else f"up to {allowed} times"
@@ -88,10 +88,10 @@ class Terminal:
 
     def poll(self) -> tuple[steps.Event, ...]:
         """Return what the lines typed since the last call mean."""
-        events = [self._meant(self._lines.popleft().strip()) for _ in range(len(self._lines))]
+        events = [self._parse(self._lines.popleft().strip()) for _ in range(len(self._lines))]
         return tuple(event for event in events if event is not None)
 
-    def _meant(self, line: str) -> steps.Event | None:
+    def _parse(self, line: str) -> steps.Event | None:
         word, _, rest = line.partition(" ")
         orders: dict[str, steps.Event] = {
             "redo": steps.Redo(rest),
@@ -104,12 +104,12 @@ class Terminal:
         }
         if word in orders:
             return orders[word]
-        event = self._done() if line == "" else self._answered(line)
+        event = self._parse_enter() if line == "" else self._parse_answer(line)
         if event is None:
             self._print(f"'{line}' means nothing now. {HELP}" if line else "Nothing is waiting for Enter now.")
         return event
 
-    def _done(self) -> steps.Event | None:
+    def _parse_enter(self) -> steps.Event | None:
         """Return what Enter alone means."""
         match self._command:
             case steps.AskBegin():
@@ -125,7 +125,7 @@ class Terminal:
             case _:
                 return None
 
-    def _answered(self, line: str) -> steps.Event | None:
+    def _parse_answer(self, line: str) -> steps.Event | None:
         """Return the answer that was typed; what a keyboard cannot tell stays open."""
         number = float(line) if line.replace(".", "", 1).isdecimal() else None
         if number is None and line != "-":
@@ -149,7 +149,7 @@ class Terminal:
         self.closed = True
 
 
-def _called(trial: Trial) -> str:
+def _announcement(trial: Trial) -> str:
     """Return how a trial is announced."""
     kind = "Trial" if trial.phase == "main" else trial.phase.capitalize() + " trial"
     return f"{kind} {trial.number}"

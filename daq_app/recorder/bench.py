@@ -124,7 +124,7 @@ class Bench:
                 with _breakable(self.connected.transducer.info.uri):
                     self._start()
             except (LinkLost, DeviceFault) as error:
-                self._lost(str(error))
+                self.lose(str(error))
             except NotNow:
                 self.disconnect()
                 raise
@@ -147,7 +147,7 @@ class Bench:
         try:
             block = self.connected.transducer.read(0.0)
         except (LinkLost, DeviceFault) as error:
-            self._lost(str(error))
+            self.lose(str(error))
             return
         if not len(block):
             return
@@ -180,17 +180,13 @@ class Bench:
         self._display.device(None)
         self._stack.close()
 
-    def _lost(self, sentence: str) -> None:
+    def lose(self, sentence: str) -> None:
         """Let go of a transducer that fell silent, and look for it again later."""
-        self._before = None if self.connected is None else self.connected.transducer.info
-        self._close()
-        self._again = time.monotonic() + TRY_AGAIN
-        self._send(LinkDown(sentence))
-
-    def lost(self, sentence: str) -> None:
-        """Take the transducer for lost, as a session found it."""
         if self.connected is not None:
-            self._lost(sentence)
+            self._before = self.connected.transducer.info
+            self._close()
+            self._again = time.monotonic() + TRY_AGAIN
+            self._send(LinkDown(sentence))
 
     def _look_for_it(self) -> None:
         if self.uri is None or time.monotonic() < self._again:

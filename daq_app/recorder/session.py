@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -141,14 +142,14 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
     fold_log(folder, Recording.open(folder).events)  # fails while another recorder writes, whose transducer is left
     recording = Recording.open(folder)
     resuming.check_resumable(recording)
-    _folder_settings(folder, any_folder=ANY_FOLDER in recording.provenance.get("settings", {}))
+    _folder_settings(folder, any_folder=ANY_FOLDER in _recorded_settings(recording))
     check_room(folder, need(recording.plan, None if recording.info is None else recording.info.rate))
     factor = float(recording.provenance["clock"]["factor"])
     if clock.factor != factor:
         raise NotNow(f"{folder} was recorded at pace {factor:g}: start the recorder with this pace")
     at, last = resuming.resumption(recording.plan, recording.events), recording.last_block()
     going_on, gap = resuming.continued(recording, last, clock, datetime.now(UTC))
-    people = recorded_people(recording)
+    people = _recorded_people(recording)
     if request.people is not None:  # the bench holds the surfaces that it held
         people = replace(request.people, planted=people.planted)
     info = _reopen(request, recording, bench, going_on)
@@ -163,7 +164,10 @@ def resume(request: m.ResumeSession, bench: Bench, clock: Clock) -> Prepared:
 
 
 def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: Send) -> None:
-    """Run the session to its end, send all that happens in it, and seal it unless it can go on."""
+    """Run the session to its end, send all that happens in it, and seal it unless it can go on.
+
+    Raises RecordingError.
+    """
     writer = prepared.writer
     operator = _Operator(prepared, bench, display, inbox, send)
     writer.safe = operator.take_safe
@@ -187,35 +191,28 @@ def run(prepared: Prepared, bench: Bench, display: Display, inbox: Inbox, send: 
     resumable = end.cause in resuming.RESUMABLE
     send(m.SessionEnded(str(writer.folder), end, resumable))  # which is another one where the first was taken away
     if end.cause == "device":
-        bench.lost(end.reason)
+        bench.lose(end.reason)
     if not resumable:
-        seal(writer.folder, send)
+        from sessions.recording.archive import seal  # HDF5 is slow to load, and nothing waits for it now
+
+        send(m.Sealing(str(writer.folder)))
+        seal(writer.folder)
+        send(m.Sealed(str(writer.folder)))
 
 
-def seal(folder: Path, send: Send) -> None:
-    """Seal an ended session. Raises RecordingError."""
-    from sessions.recording.archive import seal as sealed  # HDF5 is slow to load, and nothing waits for it now
-
-    send(m.Sealing(str(folder)))
-    sealed(folder)
-    send(m.Sealed(str(folder)))
+def _recorded_settings(recording: Recording) -> dict[str, Any]:
+    return {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
 
 
-def recorded_people(recording: Recording) -> m.People:
+def _recorded_people(recording: Recording) -> m.People:
     """Return who did what was asked for when the session began."""
-    values = {name: setting["value"] for name, setting in recording.provenance.get("settings", {}).items()}
+    values = _recorded_settings(recording)
     with suppress(msgspec.DecodeError, msgspec.ValidationError):
         planted = msgspec.json.decode(values.get(PLANTED, "[]"))
         return msgspec.convert(
             {"kind": values["people"], "seed": values.get("people seed", 0), "planted": planted}, m.People
         )
     return m.People()
-
-
-def recorded_device(recording: Recording) -> str | None:
-    """Return the address the transducer was asked for at when the session began."""
-    setting = recording.provenance.get("settings", {}).get("device")
-    return None if setting is None else str(setting["value"])
 
 
 class _Operator:
@@ -350,7 +347,8 @@ def _reopen(
         if request.uri is not None:
             raise NotNow("the session began without a transducer, and goes on without one")
         return None
-    bench.connect(request.uri or recorded_device(recording) or recording.info.uri, clock, streaming=False)
+    uri = request.uri or _recorded_settings(recording).get("device") or recording.info.uri
+    bench.connect(uri, clock, streaming=False)
     info = _transducer_info(bench)
     resuming.check_same_transducer(recording.info, info)
     return info

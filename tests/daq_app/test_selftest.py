@@ -5,7 +5,7 @@ import pytest
 from recordings import ended
 
 from daq_app.cli.main import run
-from daq_app.recorder import selftest
+from daq_app.cli.verbs import selftest
 from sessions.recording import LoggedEvent, Recording
 from sessions.recording.head import certificate_for, write_certificate
 

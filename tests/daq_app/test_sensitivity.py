@@ -9,9 +9,9 @@ import pytest
 from daq_app.batch.sensitivity import (
     Index,
     TooFewAnswers,
-    checked,
+    check_design,
+    constant_numbers,
     doubts,
-    left_as_it_is,
     sensitivity,
     usual_design,
     with_values,
@@ -83,10 +83,10 @@ def test_every_corner_of_the_usual_design_is_a_scene_that_may_be():
 
 
 def test_what_a_design_leaves_as_it_is_is_named():
-    usual = set(left_as_it_is(SCENE, usual_design(SCENE)))
+    usual = set(constant_numbers(SCENE, usual_design(SCENE)))
     assert {"finger.bone_centre", "finger.shaft_length", "materials.dermis.nu", "materials.epidermis.nu"} == usual
-    assert "materials.fat.nu" in left_as_it_is(SCENE, DESIGN)
-    assert "friction.mu" not in left_as_it_is(SCENE, DESIGN)
+    assert "materials.fat.nu" in constant_numbers(SCENE, DESIGN)
+    assert "friction.mu" not in constant_numbers(SCENE, DESIGN)
 
 
 def test_values_reach_their_places_and_no_others():
@@ -107,7 +107,7 @@ def test_what_cannot_be_varied_is_named():
         ({"friction.mu": [0.5, 10**400]}, r"friction.mu = \[0.5, 1000"),
     ):
         with pytest.raises(SettingsError, match=what):
-            checked(wrong, SCENE, "design.toml")
+            check_design(wrong, SCENE, "design.toml")
 
 
 def test_scenes_without_an_answer_are_counted():

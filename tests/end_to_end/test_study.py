@@ -12,7 +12,7 @@ import msgspec
 import pytest
 
 from daq_app.batch import pool as pooling
-from daq_app.batch.pool import Shelf, computed, computed_from, content_of, visits
+from daq_app.batch.pool import Shelf, compute_sent_visit, compute_visit, content_of, visits
 from daq_app.cli.main import run
 from daq_app.console import Console
 from daq_app.simulation.synthetic import synthetic_study
@@ -124,7 +124,7 @@ def test_another_recording_or_other_options_are_another_key(study):
 
 
 def test_a_session_whose_files_are_sent_gives_the_same_bits_as_one_on_the_disk(pool, study):
-    name, sent = computed_from("S01", content_of(study / "S01"), STEADY)
+    name, sent = compute_sent_visit("S01", content_of(study / "S01"), STEADY)
     stored = next(visit for visit in pool["visits"] if visit["session"] == "S01")  # from the disk, by another process
     assert (name, json.loads(json.dumps(sent))) == ("S01", stored)
 
@@ -134,7 +134,7 @@ def test_a_worker_that_dies_costs_its_own_session_alone(study, tmp_path, monkeyp
         for folder in folders:
             if folder.name == "S02":
                 raise pooling.BrokenProcessPool
-            yield computed(folder, QUICK)
+            yield compute_visit(folder, QUICK)
 
     monkeypatch.setattr(pooling, "_in_pool", dying)
     done, failed = visits([study / "S02", study / "S01"], QUICK, Shelf(tmp_path, QUICK), Console(as_json=True))
@@ -206,7 +206,7 @@ def test_a_dask_cluster_gives_the_same_bits_as_this_computer(study, tmp_path):
             Console(as_json=True),
             scheduler=workers.scheduler_address,
         )
-    here = [msgspec.convert(computed(study / name, STEADY)[1], Visit) for name in ("S01", "S02")]
+    here = [msgspec.convert(compute_visit(study / name, STEADY)[1], Visit) for name in ("S01", "S02")]
     assert sorted(far, key=lambda visit: visit.session) == here
 
 

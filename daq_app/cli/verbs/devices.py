@@ -39,7 +39,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         return _probe(options.words[1], console)
     devices = reachable(options.words)
     lines = serial_ports()
-    described = [_described(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
+    described = [_description(device) for device in devices] + [{"uri": "sim:", "simulated": True}]
     console.result({"devices": described, "serial_ports": list(lines)})
     rows = [
         [device.uri, device.info.model, device.info.serial, device.info.calibration.source]
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return DONE
 
 
-def _described(device: Probe) -> dict[str, Any]:
+def _description(device: Probe) -> dict[str, Any]:
     if device.info is None:
         return {"uri": device.uri, "problem": device.problem}
     info = device.info
@@ -87,7 +87,7 @@ def _probe(uri: str, console: Console) -> int:
     clock = RealClock()
     with connected(uri, clock) as bench:
         transducer = bench.transducer
-        readings = _listened(transducer, clock, console)
+        readings = _listen(transducer, clock, console)
         health, info = transducer.health, transducer.info
     wrench = info.calibration.wrench(readings.raw, np.zeros(6))
     mean, noise = (wrench.mean(axis=0), wrench.std(axis=0, ddof=1)) if len(readings) > 1 else (None, None)
@@ -124,7 +124,7 @@ def _probe(uri: str, console: Console) -> int:
     return FLAWED if flawed else DONE
 
 
-def _listened(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:
+def _listen(transducer: Transducer, clock: Clock, console: Console) -> ReadingBlock:
     transducer.start()
     began = clock.now_ns()
     blocks: list[ReadingBlock] = []

@@ -62,9 +62,9 @@ def run(options: argparse.Namespace, console: Console) -> int:
     if gain_error is not None:
         settings = replace(settings, gain_error=gain_error)
     curves = _curves(options, recording, settings)
-    flaws = [*curves.left_out, *([] if options.relaxation else _relaxes(curves))]
+    flaws = [*curves.left_out, *([] if options.relaxation else _relaxation_flaws(curves))]
     console.note(*flaws)
-    outcome = _fitted(options, recording.plan, curves, settings.gain_uncertainty, console)
+    outcome = _fit(options, recording.plan, curves, settings.gain_uncertainty, console)
     simulated = recording.simulated_sentence
     if options.scene is not None:
         head = f"# {simulated}\n" if simulated else ""
@@ -122,7 +122,7 @@ def _curves(options: argparse.Namespace, recording: Recording, settings: Analysi
     return curves
 
 
-def _relaxes(curves: PressCurves) -> list[str]:
+def _relaxation_flaws(curves: PressCurves) -> list[str]:
     """Say where the finger relaxes in a hold, which bends its force over depth."""
     fall = max((one.fall for one in curves.holds if one is not None), default=0.0)
     if fall <= FALL:
@@ -133,7 +133,7 @@ def _relaxes(curves: PressCurves) -> list[str]:
     ]
 
 
-def _fitted(
+def _fit(
     options: argparse.Namespace, plan: SessionPlan, curves: PressCurves, gain_error: float, console: Console
 ) -> _Outcome:
     """Return the fit of presses, and what the solver itself says of its finger. Raises FitError."""

@@ -37,10 +37,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     from sessions.exchange.exported import exported
 
     session = exported(options.file)
-    return _foreign(options, console) if session is None else _restored(session, options, console)
+    return _import_foreign(options, console) if session is None else _restore_export(session, options, console)
 
 
-def _restored(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
+def _restore_export(session: "ExportedSession", options: argparse.Namespace, console: Console) -> int:
     """Make a session of an export of ours again."""
     from sessions.exchange.exported import import_session
     from sessions.recording.archive import seal
@@ -57,7 +57,7 @@ def _restored(session: "ExportedSession", options: argparse.Namespace, console: 
     return FLAWED if imported.differences else DONE
 
 
-def _foreign(options: argparse.Namespace, console: Console) -> int:
+def _import_foreign(options: argparse.Namespace, console: Console) -> int:
     """Import a CSV file of somebody else's."""
     from sessions.exchange.import_csv import ORIGINAL_FILE, ImportOptions, import_csv
     from sessions.recording.archive import seal

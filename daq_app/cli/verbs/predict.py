@@ -92,7 +92,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     head = ["trial", "surface", "mu", "tau_max [kPa]", f"{quantity.label} [{unit}]", "error"]
     rows = [
         [
-            _called(row),
+            _trial_label(row),
             "–" if row.stimulus is None else row.stimulus.called,
             number(row.mu),
             number(row.tau_max, factor=1e3),
@@ -108,7 +108,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         if rows
         else "nothing to predict: no forces were recorded"
     )
-    _print_beside(prediction, console)
+    _print_variants(prediction, console)
     if choices.intervals:
         _print_intervals(prediction, console)
         _print_variant_intervals(prediction, console)
@@ -116,11 +116,11 @@ def run(options: argparse.Namespace, console: Console) -> int:
         _print_firing(firing["afferent"], console)
     if seal:
         console.say(f"sealed: SHA-256 {seal['sealed_sha256']} in {recording.folder / SEAL}")
-    _print_once(console, ((_called(row), words) for row in prediction.trials for words in _without(row)))
+    _print_once(console, ((_trial_label(row), words) for row in prediction.trials for words in _reasons(row)))
     return FLAWED if any(row.sed is None for row in prediction.trials) else DONE
 
 
-def _without(row: TrialPrediction) -> Iterator[str]:
+def _reasons(row: TrialPrediction) -> Iterator[str]:
     """Yield what has no value, and why, once for each reason."""
     for reason in dict.fromkeys(row.reasons.values()):
         missing = ", ".join(name for name, why in row.reasons.items() if why == reason)
@@ -144,7 +144,7 @@ def _response(row: TrialPrediction, quantity: Quantity) -> tuple[str, str]:
     return number(value, 4, factor=1e3 if quantity.unit == "MPa" else 1.0), share
 
 
-def _print_beside(prediction: SessionPrediction, console: Console) -> None:
+def _print_variants(prediction: SessionPrediction, console: Console) -> None:
     """Print what another finger changes of signs, the SED of each trial in every variant, and why it has none."""
     console.note(*other_signs(prediction.finger))
     rows = [row for row in prediction.trials if row.alternatives]
@@ -152,9 +152,9 @@ def _print_beside(prediction: SessionPrediction, console: Console) -> None:
         return
     console.say("\nthe same trials side by side, SED [kPa] with model N [N], or the depth [mm] found under a force:")
     variants = {f"({place})": one.variant.sentence for place, one in enumerate(rows[0].alternatives, 1)}
-    console.say(table([[_called(row), *map(_cell, row.alternatives)] for row in rows], head=["trial", *variants]))
+    console.say(table([[_trial_label(row), *map(_cell, row.alternatives)] for row in rows], head=["trial", *variants]))
     console.say(*(f"  {mark} {sentence}" for mark, sentence in variants.items()))
-    pairs = [(_called(row), one) for row in rows for one in row.alternatives]
+    pairs = [(_trial_label(row), one) for row in rows for one in row.alternatives]
     _print_once(
         console, ((trial, f"none for {one.variant.sentence}: {one.reason}") for trial, one in pairs if one.sed is None)
     )
@@ -162,7 +162,7 @@ def _print_beside(prediction: SessionPrediction, console: Console) -> None:
     console.say(f"!: {doubt} (the first of those marked)" if doubt else None)
 
 
-def _called(row: TrialPrediction) -> str:
+def _trial_label(row: TrialPrediction) -> str:
     return str(row.trial or (row.stroke or 0) + 1)
 
 
@@ -180,9 +180,9 @@ def _print_variant_intervals(prediction: SessionPrediction, console: Console) ->
         return
     console.say(f"\nof the same trials side by side [kPa], {MARKED}:")
     head = ["trial", *(f"({n})" for n, _ in enumerate(rows[0].alternatives, 1))]
-    cells = [[_called(row), *(_ends(one.interval) for one in row.alternatives)] for row in rows]
+    cells = [[_trial_label(row), *(_ends(one.interval) for one in row.alternatives)] for row in rows]
     console.say(table(cells, head=head))
-    alternatives = ((_called(row), n, one) for row in rows for n, one in enumerate(row.alternatives, 1))
+    alternatives = ((_trial_label(row), n, one) for row in rows for n, one in enumerate(row.alternatives, 1))
     _print_missing(((f"{trial} ({n})", one.interval) for trial, n, one in alternatives if one.sed is not None), console)
 
 
@@ -192,8 +192,10 @@ def _print_intervals(prediction: SessionPrediction, console: Console) -> None:
         "\n95 % interval of SED from the uncertainty of friction alone, not the model's own error, " + MARKED + ":"
     )
     console.say(table([_row(row) for row in prediction.trials], head=INTERVALS))
-    forth = [(_called(row), row.sed, row.interval) for row in prediction.trials]
-    back = [(f"{_called(row)} the other way", row.opposite_sed, row.opposite_interval) for row in prediction.trials]
+    forth = [(_trial_label(row), row.sed, row.interval) for row in prediction.trials]
+    back = [
+        (f"{_trial_label(row)} the other way", row.opposite_sed, row.opposite_interval) for row in prediction.trials
+    ]
     _print_missing([(name, interval) for name, sed, interval in (*forth, *back) if sed is not None], console)
 
 
@@ -208,7 +210,7 @@ def _print_missing(intervals: Iterable[tuple[str, SedInterval | None]], console:
 def _row(row: TrialPrediction) -> list[str]:
     one = row.interval or SedInterval(None, None, None)
     return [
-        _called(row),
+        _trial_label(row),
         _ends(one),
         number(one.by_mu, factor=1e4),
         number(one.by_tau_max, factor=1e3),

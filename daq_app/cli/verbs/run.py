@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, console: Console) -> int:
     simulated_bench = options.device is not None and options.device.startswith("sim:")
     _refuse_mixtures(options, simulated_bench=simulated_bench)
-    chosen, seed, body, place = _decided(options)
+    chosen, seed, body, place = _choices(options)
     planned = plan(
         chosen,
         options.subject,
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return outcome.exit_code
 
 
-def _decided(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:
+def _choices(options: argparse.Namespace) -> tuple[Protocol, int, Body, StudyPlace | None]:
     """Return protocol, seed, the subject's own and its place, as a study or the command line decides them."""
     if options.study is None:
         seed = secrets.randbelow(2**31) if options.seed is None else options.seed

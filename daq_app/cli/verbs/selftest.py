@@ -5,16 +5,44 @@ recorded below the folder DIR later carry the certificate. It takes less than a 
 """
 
 import argparse
+import random
 import shutil
 import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
 
 from daq_app.console import DONE, FLAWED, Console
-from daq_app.recorder.selftest import SelfTestFailed, selftest
-from sessions.recording.head import write_certificate
-from sessions.recording.storage import unsafe
+from daq_app.recorder import messages as m
+from daq_app.recorder.client import Recorder
+from drivers.calibration import Calibration
+from drivers.clock import RealClock
+from drivers.readings import ReadingBlock
+from drivers.transducer import TransducerInfo
+from sessions.plan.protocols import plan, protocol
+from sessions.recording import LoggedEvent, Recording, RecordingError, SessionWriter, provenance
+from sessions.recording.head import FORMAT, machine, software_versions, write_certificate
+from sessions.recording.schema import LIVE_FILE, event_row
+from sessions.recording.storage import RESERVE, file_system, unsafe
+from sessions.run.runner import Status
 
 EXAMPLE = "daq-app selftest --out recordings"
+KILLS = 6
+STOPS = 3
+CUTS = 20
+PACE = 20.0  # simulated seconds a real second
+RUNNING = (0.2, 1.0)  # how long a session runs until it is killed [s]
+DEADLINE = 40.0  # for a recorder that does not answer [s]
+QUOTA = 4 * 2**20  # [bytes]
+RATE = 7000  # of the made-up readings that fill it [Hz]
+PLAN = plan(protocol("sensotact-friction"), "SELFTEST", 1)
+Progress = Callable[[float, str], None]
+AReport = TypeVar("AReport", bound=m.Report)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,3 +72,253 @@ def run(options: argparse.Namespace, console: Console) -> int:
     console.note(None if warning is None else f"all the same, {warning}")
     console.say(f"certificate  {path}")
     return DONE if warning is None else FLAWED
+
+
+class SelfTestFailed(Exception):
+    """Something that is promised did not hold; the message says what."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kills:
+    """What came of killing the recorder while a session ran, and going on with it."""
+
+    number: int
+    readings: int  # acknowledged, and there afterwards
+    events: int
+    most_lost: float  # of what was shown and not yet acknowledged [s, session clock]
+
+
+@dataclass(frozen=True, slots=True)
+class Quota:
+    """What came of filling all the room a session was given."""
+
+    bytes: int
+    readings: int  # acknowledged, and there afterwards
+    commit_ms: float  # median time in which a second of readings at 7000 Hz was made safe
+
+
+def selftest(room: Path, progress: Progress, seed: int | None = None) -> dict[str, Any]:
+    """Try everything in the folder `room`, which is empty, and return the certificate.
+
+    Raises SelfTestFailed where a promise did not hold, RecordingError where the disk allows no recording at all.
+    """
+    began = time.monotonic()
+    chance = random.Random(seed)
+    kills, logs = _try_kills(room, chance, progress)
+    progress(0.75, "stopping sessions")
+    stop_ms = _try_stops(room / "stopped")
+    progress(0.85, "cutting the ends off logs")
+    cuts = _try_cuts(logs, room / "cut", chance)
+    progress(0.9, "filling the room a session has")
+    quota = _try_quota(room / "full")
+    return {
+        "format": FORMAT,
+        "utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "sentence": (
+            f"On this computer and disk the recorder was killed {kills.number} times, the end of its log was cut off "
+            f"{cuts} times and its room was filled up: all it had acknowledged was there afterwards "
+            f"({kills.readings + quota.readings} readings, {kills.events} events), at most {kills.most_lost:.2f} s of "
+            f"what it had not was lost, and each session went on at the same trial. A stop took {stop_ms:.0f} ms."
+        ),
+        "kills": asdict(kills),
+        "cuts": cuts,
+        "quota": asdict(quota),
+        "stop_ms": stop_ms,
+        "disk": {"file_system": file_system(room)},
+        "machine": machine(),
+        "software": software_versions(),
+        "seconds": round(time.monotonic() - began, 1),
+    }
+
+
+class _Watched:
+    """A recorder on the simulated bench, and what it sent."""
+
+    def __init__(self) -> None:
+        self.recorder = Recorder.start(PACE)
+        self.events: list[LoggedEvent] = []
+        self.safe = 0  # readings acknowledged
+        self.shown_ns = 0  # when the newest reading shown was received [ns, session clock]
+        self._over = False
+        self._waiting: list[m.Report] = []
+
+    def until(self, kind: type[AReport]) -> AReport:
+        """Note reports until one of a kind comes, and return it."""
+        for report in self._reports(DEADLINE):
+            if isinstance(report, kind):
+                return report
+            if isinstance(report, m.Failed | m.Gone):
+                raise SelfTestFailed(report.sentence)
+        raise SelfTestFailed(f"the recorder did not answer within {DEADLINE:g} s")
+
+    def hear(self, seconds: float) -> None:
+        """Note what comes within so many seconds."""
+        for _ in self._reports(seconds):
+            pass
+
+    def kill(self) -> None:
+        """Kill it, and note what was still on its way."""
+        self.recorder.kill()
+        if not any(isinstance(report, m.Gone) for report in self._reports(DEADLINE)):
+            raise SelfTestFailed("a recorder that was killed did not end")
+
+    def _reports(self, seconds: float) -> Iterator[m.Report]:
+        """Yield what comes within so many seconds, each noted; what nobody takes any more waits for the next call."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self._waiting += self.recorder.poll(0.01)
+            while self._waiting:
+                report = self._waiting.pop(0)
+                self._note(report)
+                yield report
+
+    def _note(self, report: m.Report) -> None:
+        match report:
+            case LoggedEvent():
+                self.events.append(report)
+            case Status(safe=safe):
+                self.safe = max(self.safe, safe.readings)
+            case m.Live(received_ns=received_ns) if len(received_ns) and not self._over:
+                self.shown_ns = int(received_ns[-1])
+            case m.SessionEnded():
+                self._over = True  # what is shown from now on is not recorded
+            case _:
+                pass
+
+
+def _try_kills(room: Path, chance: random.Random, progress: Progress) -> tuple[Kills, list[Path]]:
+    """Kill the recorder again and again; also return copies of the folder as the kills left it."""
+    readings = events = 0
+    most_lost = 0.0
+    copies: list[Path] = []
+    folder = room / "killed-0"
+    for number in range(KILLS):
+        progress(0.75 * number / KILLS, f"killing the recorder, {number + 1} of {KILLS}")
+        watched = _Watched()
+        trial = _begin_or_resume(watched, folder)
+        watched.hear(chance.uniform(*RUNNING))
+        watched.kill()
+        recording = Recording.open(folder)
+        _check_kept(recording, watched, trial)
+        block = recording.last_block()
+        if len(block):
+            most_lost = max(most_lost, (watched.shown_ns - int(block.received_ns[-1])) * 1e-9)
+        readings, events = readings + watched.safe, events + len(watched.events)
+        copies.append(room / f"copy-{number}")
+        shutil.copytree(folder, copies[-1])
+        if recording.end is not None:
+            folder = room / f"killed-{number + 1}"  # this session had come to its end before it was killed
+    return Kills(KILLS, readings, events, max(most_lost, 0.0)), copies
+
+
+def _begin_or_resume(watched: _Watched, folder: Path) -> int | None:
+    """Have a session running, and return the trial at which it was resumed."""
+    if not folder.exists():
+        watched.recorder.send(m.Connect("sim:?seed=1"))
+        watched.until(m.Device)
+        watched.recorder.send(m.StartSession(PLAN, str(folder), m.People("simulated people", 1), any_folder=True))
+        watched.until(m.SessionBegun)
+        return None
+    watched.recorder.send(m.ResumeSession(str(folder)))
+    watched.until(m.SessionBegun)
+    return watched.until(Status).trial
+
+
+def _check_kept(recording: Recording, watched: _Watched, trial: int | None) -> None:
+    """Raise SelfTestFailed unless all that was acknowledged is in the file, and the session went on where it was."""
+    rows = {event.number: event_row(event) for event in recording.events}
+    if any(rows.get(event.number) != event_row(event) for event in watched.events):
+        raise SelfTestFailed("an event that had been acknowledged was not in the file after a kill")
+    block = recording.readings()
+    if len(block) < watched.safe or (np.diff(block.sequence) != 1).any():
+        raise SelfTestFailed(f"of {watched.safe} readings that had been acknowledged {len(block)} were left by a kill")
+    first = watched.events[0].number if watched.events else 1
+    done = {event.trial for event in recording.events if event.kind == "take_kept" and event.number < first}
+    if trial is not None and trial != len(done) + 1:
+        raise SelfTestFailed(f"the session went on at trial {trial}, and had been killed in trial {len(done) + 1}")
+
+
+def _try_stops(room: Path) -> float:
+    """Return the median time from a stop to the written end [ms]. Raises SelfTestFailed."""
+    took: list[float] = []
+    for number in range(STOPS):
+        watched = _Watched()
+        with watched.recorder:
+            _begin_or_resume(watched, room / str(number))
+            watched.hear(0.3)
+            began = time.monotonic()
+            watched.recorder.send(m.Stop())
+            watched.until(m.SessionEnded)
+            took.append(time.monotonic() - began)
+        if Recording.open(room / str(number)).end is None:
+            raise SelfTestFailed("a session that was stopped had no written end")
+    return round(float(np.median(took)) * 1e3, 1)
+
+
+def _try_cuts(copies: list[Path], folder: Path, chance: random.Random) -> int:
+    """Cut the ends off copies of a log, as a power cut may; return how often. Raises SelfTestFailed."""
+    for number in range(CUTS):
+        origin = copies[number % len(copies)]
+        shutil.copytree(origin, folder)
+        log = folder / f"{LIVE_FILE}-wal"
+        if log.exists():
+            content = log.read_bytes()
+            log.write_bytes(content[: max(len(content) - chance.randrange(1, 200_000), 0)])
+        try:
+            sequence = Recording.open(folder).readings().sequence
+        except RecordingError as error:
+            # A log cut back to before its first commit leaves a session that had not begun.
+            if log.stat().st_size > 100_000:
+                raise SelfTestFailed(f"a log whose end was cut off could not be read ({error})") from error
+        else:
+            if (np.diff(sequence) != 1).any():
+                raise SelfTestFailed("a log whose end was cut off gave readings with a gap inside")
+        shutil.rmtree(folder)
+    return CUTS
+
+
+class _QuotaWriter(SessionWriter):
+    """A writer whose file may grow to a size, and further when the reserve is given back."""
+
+    def give_back_reserve(self) -> None:
+        """Give it back, and let the file grow into it."""
+        super().give_back_reserve()
+        self.limit(QUOTA + RESERVE)
+
+
+def _try_quota(folder: Path) -> Quota:
+    """Record until there is no more room; all must be there, and the end written. Raises SelfTestFailed."""
+    clock = RealClock()
+    calibration = Calibration("SELFTEST", "counts", np.eye(6), np.full(6, np.nan), "made up for the selftest")
+    info = TransducerInfo("selftest:", "selftest", "SIMULATED", "SELFTEST", True, float(RATE), float(RATE), calibration)
+    writer = _QuotaWriter.create(folder, PLAN, info, provenance(clock), clock=clock, reserve=RESERVE)
+    writer.limit(QUOTA)
+    took: list[float] = []
+    position = 0
+    while writer.must_end is None:
+        if position > 100 * RATE:
+            raise SelfTestFailed("a session that had no more room went on without a word")
+        writer.readings(_numbered_readings(position, clock.now_ns()))
+        position += RATE
+        began = time.monotonic()
+        writer.commit()
+        took.append(time.monotonic() - began)
+    safe = writer.acknowledged.readings
+    writer.event("ended", data={"reason": writer.must_end, "cause": "disk", "complete": False, "readings": safe})
+    writer.close()
+    recording = Recording.open(folder)
+    block = recording.readings()
+    if len(block) != safe or safe != position or recording.end is None:
+        raise SelfTestFailed(
+            f"{safe} readings had been acknowledged when the room was full, and {len(block)} were left"
+        )
+    if not np.array_equal(block.raw, _numbered_readings(0, 0, position).raw):
+        raise SelfTestFailed("readings came back otherwise than they were written when the room was full")
+    return Quota(QUOTA, safe, round(float(np.median(took)) * 1e3, 2))
+
+
+def _numbered_readings(first: int, received_ns: int, count: int = RATE) -> ReadingBlock:
+    """Return readings whose numbers follow from their place."""
+    i = np.arange(first, first + count, dtype=np.int64)
+    raw = np.outer(i, np.arange(1.0, 7.0))
+    return ReadingBlock(i, i, i * 0, i / RATE, np.full(count, received_ns, np.int64), raw)

@@ -17,11 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from daq_app.batch import sign_map
-from daq_app.batch.sensitivity import Index, checked, doubts, left_as_it_is, saltelli_points, sensitivity, usual_design
+from daq_app.batch.sensitivity import (
+    Index,
+    check_design,
+    constant_numbers,
+    doubts,
+    saltelli_points,
+    sensitivity,
+    usual_design,
+)
 from daq_app.batch.sign_map import Answer
 from daq_app.cli.options import add_kinematics, add_quantity, add_seed, add_workers
 from daq_app.console import DONE, Console, WrongValue, number, table
-from sessions.prediction import QUANTITIES, Quantity
+from sessions.prediction import QUANTITIES
 from sessions.prediction.surface_series import SERIES
 from sessions.toml_file import load_toml, tables_in, text_of
 from solver import Scene
@@ -61,7 +69,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
         design, origin = usual_design(scene), "default: nobody set it"
     else:
         where = str(options.design)
-        design, origin = checked(tables_in(text_of(options.design), where), scene, where), "set"
+        design, origin = check_design(tables_in(text_of(options.design), where), scene, where), "set"
     count = samples * (len(design) + 2)
 
     def shown(part: float) -> None:
@@ -70,7 +78,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     indices, seds = sensitivity(scene, design, samples, options.seed, shown)
     low, high = float(seds.min()), float(seds.max())
     doubtful = doubts(indices, samples)
-    constant = left_as_it_is(scene, design)
+    constant = constant_numbers(scene, design)
     console.result(
         {
             "samples": samples,
@@ -95,7 +103,8 @@ def run(options: argparse.Namespace, console: Console) -> int:
 
 def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     """Ask all fingers and print the signs of the slope of one quantity, and the shares of all."""
-    quantity = QUANTITIES[NAMES.index(options.quantity)]
+    at = NAMES.index(options.quantity)
+    label = QUANTITIES[at].label
     changes = sign_map.single_changes(options.kinematics)
     mapped = sign_map.map_trials(options.kinematics)
     points = saltelli_points(sign_map.DESIGN, samples, options.seed)
@@ -118,12 +127,11 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
     assert not isinstance(published, str)  # a finger that can be
     kept = sign_map.kept_signs(random, published)
     shares = {name: sign_map.share(column) for name, column in zip(NAMES, kept.T, strict=True)}
-    at = NAMES.index(quantity.name)
     indices = {name: sign_map.slope_indices(random, name, at, options.seed) for name in SERIES}
     without_answer = int(np.isnan(kept[:, at]).sum())
     console.result(
         {
-            "quantity": quantity.name,
+            "quantity": options.quantity,
             "kinematics": options.kinematics,
             "quantities": NAMES,
             "changes": single,
@@ -137,15 +145,17 @@ def _signs(options: argparse.Namespace, samples: int, console: Console) -> int:
             "indices": {name: [one.to_dict() for one in computed] for name, (computed, _) in indices.items()},
         }
     )
-    _print_changes(single, quantity, console)
-    _print_map(radii, quantity, console)
+    _print_changes(single, at, console)
+    _print_map(radii, at, console)
     _print_shares(shares, len(random), without_answer, console)
-    for computed, _ in indices.values():
-        if computed:
-            _print_thirds(computed[0].name, points, kept[:, at], quantity, console)
-            break
+    if moving := next((computed[0].name for computed, _ in indices.values() if computed), None):
+        _print_thirds(moving, points, kept[:, at], label, console)
     for name, (computed, count) in indices.items():
-        _print_indices(name, computed, count, samples, quantity, console)
+        console.say(f"\nWhat moves the change of the {label} over {name} (Sobol indices, {count} fingers):")
+        if computed:
+            console.say(_index_table(computed), *doubts(computed, samples))
+        else:
+            console.say("too few whole blocks of the design have an answer: ask for more --samples")
     return DONE
 
 
@@ -166,12 +176,11 @@ def _print_shares(
     console.say(table(rows, head=["quantity", "share", "95 % interval"]))
 
 
-def _print_changes(single: dict[str, Answer | str], quantity: Quantity, console: Console) -> None:
+def _print_changes(single: dict[str, Answer | str], at: int, console: Console) -> None:
     console.say(
-        f"{quantity.label}: correlation r with the makers' index over the published surfaces, and change from the "
-        "least to the greatest mu by the mean"
+        f"{QUANTITIES[at].label}: correlation r with the makers' index over the published surfaces, and change from "
+        "the least to the greatest mu by the mean"
     )
-    at = NAMES.index(quantity.name)
     rows = [
         [name, *(text for series in SERIES for text in _cells(answer, series, at))] for name, answer in single.items()
     ]
@@ -188,12 +197,11 @@ def _cells(answer: Answer | str, series: str, at: int) -> tuple[str, str]:
     return f"{with_index:+.2f}", f"{100 * change:+.0f} %"
 
 
-def _print_map(radii: dict[float, Answer | str], quantity: Quantity, console: Console) -> None:
+def _print_map(radii: dict[float, Answer | str], at: int, console: Console) -> None:
     """Print the signs of stickiness and slipperiness for each tip radius and place of the receptor."""
-    at = NAMES.index(quantity.name)
     console.say(
-        f"\nSigns of r of the {quantity.label} with stickiness and with slipperiness, over the receptor's place along "
-        "the skin [mm, positive to the tip] and the tip radius [mm]:"
+        f"\nSigns of r of the {QUANTITIES[at].label} with stickiness and with slipperiness, over the receptor's place "
+        "along the skin [mm, positive to the tip] and the tip radius [mm]:"
     )
     rows = [
         [f"{radius:g}", *(_mark(answer, place, at) for place in range(len(sign_map.PLACES)))]
@@ -210,7 +218,7 @@ def _mark(answer: Answer | str, place: int, at: int) -> str:
 
 
 def _print_thirds(
-    name: str, points: NDArray[np.float64], kept: NDArray[np.float64], quantity: Quantity, console: Console
+    name: str, points: NDArray[np.float64], kept: NDArray[np.float64], label: str, console: Console
 ) -> None:
     """Print the share of fingers that keep the signs in each third of the number that moves the slope most."""
     values = points[:, list(sign_map.DESIGN).index(name)]
@@ -219,17 +227,7 @@ def _print_thirds(
         for low, high, part in sign_map.shares_by_thirds(kept, values)
         if part is not None
     ]
-    console.say(f"The {quantity.label} keeps both signs, by {name}: {', '.join(rows)}.")
-
-
-def _print_indices(
-    name: str, indices: tuple[Index, ...], count: int, samples: int, quantity: Quantity, console: Console
-) -> None:
-    console.say(f"\nWhat moves the change of the {quantity.label} over {name} (Sobol indices, {count} fingers):")
-    if not indices:
-        console.say("too few whole blocks of the design have an answer: ask for more --samples")
-        return
-    console.say(_index_table(indices), *doubts(indices, samples))
+    console.say(f"The {label} keeps both signs, by {name}: {', '.join(rows)}.")
 
 
 def _index_table(indices: Sequence[Index]) -> str:

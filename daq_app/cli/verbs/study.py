@@ -76,7 +76,7 @@ def print_power(options: argparse.Namespace, console: Console) -> int:
     """Print the power of designs of so many subjects and surfaces."""
     if options.folder is not None or options.synthetic is not None:
         raise WrongValue("--power simulates its own studies: leave FOLDER and --synthetic out")
-    planted = _set(options.power)
+    planted = _planted_values(options.power)
     powers = power(
         planted,
         SUBJECTS,
@@ -146,7 +146,7 @@ def _say_recovery(recoveries: Sequence[Recovery], options: argparse.Namespace, c
     )
 
 
-def _set(texts: Sequence[str]) -> Planted:
+def _planted_values(texts: Sequence[str]) -> Planted:
     """Return what is planted, with the values that were set. Raises WrongValue."""
     names = [field.name for field in fields(Planted)]
     changes = numbers_by_key(texts, "--power", "effect=20")
@@ -201,7 +201,10 @@ def run(options: argparse.Namespace, console: Console) -> int:
     model = PredictionOptions(options.tau, course="steady", kinematics=options.kinematics, intervals=intervals)
     along = options.quantity if options.paths != "none" else SED.name
     visit_options = VisitOptions(model, area_law(options) or FIXED, options.paths, calibration_error(options), along)
-    exclusions, truth = exclusions_in(folder), _planted(folder)  # what is wrong with them is said before hours of work
+    exclusions, truth = (
+        exclusions_in(folder),
+        _load_planted(folder),
+    )  # what is wrong with them is said before hours of work
     shelf = Shelf(out / "results", visit_options)
     done, failed = visits(sessions, visit_options, shelf, console, scheduler=options.scheduler, workers=options.workers)
     if truth is not None and options.quantity == SED.name:
@@ -217,7 +220,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return FLAWED if failed or flawed else DONE
 
 
-def _planted(folder: Path) -> dict[str, Any] | None:
+def _load_planted(folder: Path) -> dict[str, Any] | None:
     """Return what was planted in a synthetic study, None in any other. Raises RecordingError where that is damaged."""
     path = folder / PLANTED
     if not path.is_file():

@@ -34,7 +34,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     key = study_key(folder)
     if key is None:
         raise StudyError(f"{folder} is not blinded: there is nothing to open")
-    chosen, refused = _ready(sessions, key)
+    chosen, refused = _select(sessions, key)
     if not whole and refused:
         raise RecordingError(refused[0])
     if whole and open_study(folder).unblinded and not chosen:
@@ -57,7 +57,7 @@ def run(options: argparse.Namespace, console: Console) -> int:
     return FLAWED if refused else DONE
 
 
-def _ready(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], list[str]]:
+def _select(sessions: tuple[Recording, ...], key: Key) -> tuple[list[Recording], list[str]]:
     """Return the sessions to be unblinded, and a sentence for each that cannot be."""
     chosen: list[Recording] = []
     refused: list[str] = []
