@@ -73,10 +73,8 @@ def _keys(title: str, module: str, tables: list[str]) -> str:
         table = getattr(importlib.import_module(module), name)
         meaning = _comments(table)
         lines += [f"## {name}", "", inspect.getdoc(table).split("\n")[0], ""]
-        lines += ["| key | default | meaning |", "| --- | --- | --- |"]
-        for one in dataclasses.fields(table):
-            lines.append(f"| `{one.name}` | {_default(one)} | {_cell(meaning.get(one.name, ''))} |")
-        lines.append("")
+        rows = [(f"`{one.name}`", _default(one), _cell(meaning.get(one.name, ""))) for one in dataclasses.fields(table)]
+        lines += looks.table(("key", "default", "meaning"), rows)
     return "\n".join(lines)
 
 

@@ -29,11 +29,11 @@ def page() -> str:
         "Made from `daq_app/qt/tokens.py`. Sizes are in device-independent pixels.",
         "",
     ]
-    lines += _table(("type", "size at 100 %", "at 200 %"), [(n, f"{s}", f"{2 * s}") for n, s in sizes.items()])
+    lines += table(("type", "size at 100 %", "at 200 %"), [(n, f"{s}", f"{2 * s}") for n, s in sizes.items()])
     lines += [f"Everything keeps to a grid of {tokens.GRID}. What is pressed is at least {tokens.TARGET} high.", ""]
     fields = [field.name for field in dataclasses.fields(tokens.Tokens) if field.name != "dark"]
     rows = [(name, *(f"`{getattr(theme, name)}`" for theme in THEMES.values())) for name in fields]
-    lines += ["## Colours", "", *_table(("token", *THEMES), rows)]
+    lines += ["## Colours", "", *table(("token", *THEMES), rows)]
     lines += [
         "## Contrast",
         "",
@@ -43,7 +43,7 @@ def page() -> str:
     contrasts = [
         (f"{a} on {b}", *(f"{contrast(getattr(t, a), getattr(t, b)):.1f}" for t in THEMES.values())) for a, b in PAIRS
     ]
-    lines += _table(("written on", *THEMES), contrasts)
+    lines += table(("written on", *THEMES), contrasts)
     lines += ["## Pictures", "", *(f"![{name} theme](looks-{name}.png)\n" for name in THEMES)]
     return "\n".join(lines)
 
@@ -97,5 +97,6 @@ def _luminance(name: str) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> list[str]:
+    """Return the lines of a table in Markdown."""
     return [*(f"| {' | '.join(row)} |" for row in (head, ("---",) * len(head), *rows)), ""]

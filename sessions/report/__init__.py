@@ -21,7 +21,7 @@ from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
 from sessions.statistics.rivals import FIELDS, MODEL, MODEL_MU, NAMES, RESPONSES, rivals_of_means
-from sessions.statistics.scores import ScoreTable, by_key, joined, mean_scores, score_matrix, score_table
+from sessions.statistics.scores import ScoreTable, by_key, distinct_sessions, mean_scores, score_matrix, score_table
 from sessions.strokes import Analysis
 from sessions.strokes.stroke import FIXED, AreaLaw, rule_for
 
@@ -51,7 +51,7 @@ def findings(
     scores are always among them. `planted` is what a simulator planted, trial by trial; None for real sessions.
     `further` is what took more solves, or was asked for.
     """
-    plan, tables = recording.plan, joined((score_table(recording), *(scores or ())))
+    plan, tables = recording.plan, distinct_sessions((score_table(recording), *(scores or ())))
     stroke_findings = strokes(recording, analysis)
     more = further or Further()
     undone = {record.trial.number for record in recording.trials if record.outcome == "open"}
@@ -175,8 +175,11 @@ def experiments(
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
     number was given.
     """
-    main = [block for block in plan.blocks if block.phase == "main"]
-    return tuple(_experiment(block, plan.subject, tables, numbers, paths or {}, law, response) for block in main)
+    return tuple(
+        _experiment(block, plan.subject, tables, numbers, paths or {}, law, response)
+        for block in plan.blocks
+        if block.phase == "main"
+    )
 
 
 def _experiment(

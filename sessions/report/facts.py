@@ -15,7 +15,7 @@ from sessions.recording.manifest import file_sha256
 from sessions.recording.reader import Recording
 from sessions.recording.schema import LIVE_FILE
 from sessions.report.contents import Fact, StrokeFinding, TextFile
-from sessions.report.wording import stopped
+from sessions.report.wording import full_stop
 from sessions.statistics.multiverse import PATHS, Values
 from sessions.statistics.scores import ScoreTable, grading, reversed_subjects
 from sessions.strokes.analysis import Analysis
@@ -196,7 +196,7 @@ def excluded(
     recording: Recording, analysis: Analysis, strokes: Sequence[StrokeFinding], tables: Sequence[ScoreTable]
 ) -> tuple[str, ...]:
     """Return what was kept out of the results, by whom and why, a sentence each."""
-    sentences = [stopped(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
+    sentences = [full_stop(f"By {one.sentence}") for one in analysis.decisions if one.leaves_out]
     sentences += [table.left_out for table in tables if table.left_out]
     for record in recording.trials:
         number = record.trial.number
@@ -214,7 +214,7 @@ def excluded(
 def remarks(recording: Recording, analysis: Analysis, tables: Sequence[ScoreTable]) -> tuple[str, ...]:
     """Return what is missing though nobody excluded it, what people decided of what counts, and doubts about it."""
     sentences = [f"Lost: {loss}." for loss in recording.losses]
-    sentences += [stopped(f"By {one.sentence}") for one in analysis.decisions if not one.leaves_out]
+    sentences += [full_stop(f"By {one.sentence}") for one in analysis.decisions if not one.leaves_out]
     for record in recording.trials:
         number = record.trial.number
         if record.outcome == "not answered":

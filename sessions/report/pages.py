@@ -21,7 +21,7 @@ from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
 from sessions.report.prose import doubts, question, summary, told_apart
-from sessions.report.tables import Table, parted
+from sessions.report.tables import Table, split_off_appendix
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
 from sessions.report.tables.study_models import missing_models, missing_scores
@@ -58,7 +58,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
     `drawings` are its `plates`, where they were drawn already.
     """
     figures = {plate.name: plate for plate in (plates(report) if drawings is None else drawings)}
-    tables, further = parted(session_tables(report), BODY)
+    tables, further = split_off_appendix(session_tables(report), BODY)
     return template("report.html.jinja").render(
         report=report,
         question=question(report),
@@ -176,7 +176,7 @@ STUDY_BODY = {"table-relation", "table-scores", "table-surfaces", "table-rivals"
 def study_page(study: StudyFindings, name: str) -> str:
     """Return the page of the study called `name`; the same findings give the same bytes."""
     figures = {plate.name: plate for plate in study_plates(study)}
-    tables, further = parted(study_tables(study), STUDY_BODY)
+    tables, further = split_off_appendix(study_tables(study), STUDY_BODY)
     trials = tables.pop("trials")
     return template("study.html.jinja").render(
         study=study,

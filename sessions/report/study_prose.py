@@ -16,7 +16,7 @@ from sessions.report.prose import OTHER_FINGERS
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.scales import compared_in_study, psychometric_sentences, scale_sentences
 from sessions.report.tables.session import paths_sentence
-from sessions.report.wording import capital, correlation, digits, plural, significant, stopped
+from sessions.report.wording import capital, correlation, digits, full_stop, plural, significant
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
 from sessions.statistics.scores import by_key
 from sessions.statistics.visit import Exclusion
@@ -113,7 +113,7 @@ def excluded(study: StudyFindings) -> list[str]:
         for session, first in study.copies
     ]
     sentences += [
-        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {stopped(one.why)}"
+        f"Subject {one.subject}: {_whats(one)} left out by {one.who}: {full_stop(one.why)}"
         for one in study.excluded
         if _fits(study, one)
     ]
@@ -123,7 +123,7 @@ def excluded(study: StudyFindings) -> list[str]:
 def _decided(study: StudyFindings, *, leaving_out: bool) -> list[str]:
     """Return the decisions about strokes that leave one out, or all others."""
     decided = [(visit.session, decision) for visit in study.visits for decision in visit.decisions]
-    return [f"Session {name}: {stopped(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
+    return [f"Session {name}: {full_stop(one)}" for name, one in decided if (" is left out: " in one) == leaving_out]
 
 
 def remarks(study: StudyFindings) -> list[str]:
@@ -208,7 +208,7 @@ def _missing(study: StudyFindings) -> list[str]:
     )
     for places in alike.values():
         named, reasons = _listed([place for place, _ in places]), list(dict.fromkeys(reason for _, reason in places))
-        why = f"{'' if len(reasons) == 1 else 'of the first: '}{stopped(reasons[0])}"
+        why = f"{'' if len(reasons) == 1 else 'of the first: '}{full_stop(reasons[0])}"
         sentences.append(f"The model gives no SED for {plural(len(places), 'trial')} ({named}): {why}")
     return sentences
 

@@ -138,7 +138,7 @@ def capital(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def stopped(sentence: str) -> str:
+def full_stop(sentence: str) -> str:
     """Return a sentence with its full stop."""
     return sentence if sentence.endswith(".") else f"{sentence}."
 

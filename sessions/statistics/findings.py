@@ -243,7 +243,7 @@ def checked_planted(planted: object) -> dict[str, Any]:
     return cast("dict[str, Any]", planted)
 
 
-def recovered(descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
+def planted_effects(descriptors: Sequence[DescriptorFindings], planted: Mapping[str, Any]) -> tuple[Recovered, ...]:
     """Return the planted effects on the score, and spreads, beside what the study finds of them.
 
     `planted["score"]` holds the slopes of the scores on index, place and index before, and on µ by descriptor.
@@ -300,7 +300,7 @@ def _with_sed(one: DescriptorFindings, planted: Mapping[str, Any]) -> list[Recov
 _FLAWS = {"lost": "lost_readings", "frozen": "frozen_sensor", "light": "too_little_force"}
 
 
-def found_flaws(
+def planted_flaws(
     visits: Sequence[Visit], failed: Mapping[str, str], spoilt: Mapping[str, Mapping[str, Any]]
 ) -> tuple[PlantedFlaw, ...]:
     """Return for each session that was spoilt whether what it brings, or that it brings nothing, says so."""
@@ -325,7 +325,7 @@ def found_flaws(
     )
 
 
-def found_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
+def planted_friction(visits: Sequence[Visit], strokes: Sequence[Mapping[str, Any]]) -> PlantedFriction | None:
     """Return how the planted µ of the strokes was recovered; None where no stroke has both."""
     truth = {(stroke["subject"], stroke["trial"]): float(stroke["mu"]) for stroke in strokes}
     rows = [

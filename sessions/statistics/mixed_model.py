@@ -199,8 +199,7 @@ def akaike_weights(deviances: Sequence[float]) -> tuple[float, ...]:
     >>> tuple(round(weight, 3) for weight in akaike_weights([204.0, 202.0, 206.0]))
     (0.245, 0.665, 0.09)
     """
-    shares = np.exp(-0.5 * (np.asarray(deviances, np.float64) - min(deviances)))
-    return tuple((shares / shares.sum()).tolist())
+    return tuple(special.softmax(-0.5 * np.asarray(deviances, np.float64)).tolist())
 
 
 @dataclass(frozen=True, slots=True)

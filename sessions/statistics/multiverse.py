@@ -86,15 +86,11 @@ CHOICE_LABELS: Mapping[str, str] = {
 }
 
 
-def _paths() -> tuple[Path, ...]:
-    small = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
-    first = (next(iter(FILTERS)), next(iter(WINDOWS)))
-    # Finite strain takes many times as long: filter, window and area are the usual ones there.
-    finite = tuple(Path(*first, mu, next(iter(AREAS)), receptor, "finite") for mu, receptor in product(MUS, RECEPTORS))
-    return (*small, *finite)
-
-
-PATHS = _paths()
+_FIRST = (next(iter(FILTERS)), next(iter(WINDOWS)), next(iter(AREAS)))
+_SMALL = tuple(Path(*choice, "small") for choice in product(FILTERS, WINDOWS, MUS, AREAS, RECEPTORS))
+# Finite strain takes many times as long: filter, window and area are the usual ones there.
+_USUAL = (path for path in _SMALL if (path.filter, path.window, path.area) == _FIRST)
+PATHS = (*_SMALL, *(replace(path, kinematics="finite") for path in _USUAL))
 
 
 def trial_paths(

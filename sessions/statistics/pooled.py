@@ -21,9 +21,9 @@ from sessions.statistics.findings import (
     Normalised,
     StudyFindings,
     SurfaceMean,
-    found_flaws,
-    found_friction,
-    recovered,
+    planted_effects,
+    planted_flaws,
+    planted_friction,
 )
 from sessions.statistics.mixed_model import MixedModel, Spread, mixed_model, spreads
 from sessions.statistics.multiverse import PathTrial, path_findings
@@ -104,9 +104,9 @@ def pooled(
         excluded=exclusions,
         reversed=reversed_subjects(tables),
         descriptors=descriptors,
-        effects=() if planted is None else recovered(descriptors, planted),
-        friction=None if planted is None else found_friction(ordered, planted["strokes"]),
-        flaws=() if planted is None else found_flaws(ordered, dict(failed), planted.get("spoilt", {})),
+        effects=() if planted is None else planted_effects(descriptors, planted),
+        friction=None if planted is None else planted_friction(ordered, planted["strokes"]),
+        flaws=() if planted is None else planted_flaws(ordered, dict(failed), planted.get("spoilt", {})),
         synthetic=None if planted is None else planted.get("seed"),
         response=quantity.name,
     )
@@ -274,20 +274,16 @@ def estimates(trials: Trials, quantity: str) -> Estimates | None:
     logs = [(subject, i, math.log(value), x) for subject, i, value, x in rows if subject not in no_logarithm]
     own = by_key((subject, (index, log)) for subject, index, log, _ in logs)
     table = {
-        subject: {index: math.exp(float(np.mean(values))) for index, values in by_key(pairs).items()}
+        subject: {index: float(np.mean(values)) for index, values in by_key(pairs).items()}
         for subject, pairs in sorted(own.items())
     }
     pairs = [(subject, x, log) for subject, _, log, x in logs if x is not None]
     return Estimates(
-        _averages(_logs(table)),
-        _averages(_logs(equal_moduli(table))),
+        _averages(table),
+        _averages(equal_moduli(table)),
         repeated_correlation(*zip(*pairs, strict=True)) if pairs else None,
         tuple(sorted(no_logarithm)),
     )
-
-
-def _logs(table: Table) -> dict[str, dict[int, float]]:
-    return {subject: {index: math.log(value) for index, value in row.items()} for subject, row in table.items()}
 
 
 def exponent(trials: Trials) -> Exponent | None:

@@ -93,6 +93,11 @@ def psychometric(levels: Sequence[Level], lapse: float | None = None) -> Psychom
     )
 
 
+def binomial_deviance(k: Array, n: Array, p: Array) -> float:
+    """Return the deviance of chances p from k of n answers, against a chance of its own for each."""
+    return 2.0 * float((special.rel_entr(k, n * p) + special.rel_entr(n - k, n * (1.0 - p))).sum())
+
+
 class _Task:
     """The likelihood of answers, its maximum, and its profiles."""
 
@@ -101,17 +106,11 @@ class _Task:
         self.side = np.array([float(one.order) for one in levels])
         self.k = np.array([float(one.chosen) for one in levels])
         self.n = np.array([float(one.presented) for one in levels])
-        # Of every answer: level, whether the comparison was chosen, how many like it came before, and how many at all.
-        rows = [
-            (n, yes, before, place)
-            for n, one in enumerate(levels)
-            for place in range(one.presented)
-            for yes in [place < one.chosen]
-            for before in [place if yes else place - one.chosen]
-        ]
-        self.level = np.array([row[0] for row in rows])
-        self.yes = np.array([row[1] for row in rows])
-        self.before, self.place = (np.array([float(row[n]) for row in rows]) for n in (2, 3))
+        # Of every answer: level, how many came before, whether the comparison was chosen, and how many like it before.
+        self.level = np.repeat(np.arange(len(levels)), [one.presented for one in levels])
+        self.place = np.concatenate([np.arange(float(one.presented)) for one in levels])
+        self.yes = self.place < self.k[self.level]
+        self.before = np.where(self.yes, self.place, self.place - self.k[self.level])
         self.spread = float(np.std(self.x))
         self.steepest = STEEPEST / self.spread
         self.ordered = len(set(self.side.tolist())) > 1
@@ -149,11 +148,7 @@ class _Task:
 
     def deviance(self) -> float:
         """Return the binomial deviance of the chances that were fitted."""
-        p = self._chances(self.best)[0]
-        terms = special.xlogy(self.k, self.k / (self.n * p)) + special.xlogy(
-            self.n - self.k, (self.n - self.k) / (self.n * (1.0 - p))
-        )
-        return float(2.0 * terms.sum())
+        return binomial_deviance(self.k, self.n, self._chances(self.best)[0])
 
     def _search(self) -> tuple[Array, float]:
         """Return the best parameters and their log likelihood, from starts with few lapses and with many."""

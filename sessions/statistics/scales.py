@@ -29,7 +29,7 @@ from scipy.sparse import csgraph
 
 from sessions.statistics.correlations import TAILS
 from sessions.statistics.mixed_model import Term, mixed_model
-from sessions.statistics.psychometric import QUARTILE
+from sessions.statistics.psychometric import QUARTILE, binomial_deviance
 from sessions.statistics.scores import IntervalEstimate, by_key
 
 Array = NDArray[np.float64]
@@ -88,8 +88,7 @@ def paired_scale(choices: Sequence[Choice], model: Model = "Bradley–Terry") ->
         return replace(none, reason="there are no two surfaces to compare")
     counts = _counts(choices, indices, subjects)
     whole = counts.sum(axis=0)
-    unbounded = _unbounded(whole, indices)
-    if unbounded:
+    if unbounded := _unbounded(whole, indices):
         return replace(none, reason=unbounded)
     fitted = _fit(whole, model)
     if fitted is None:
@@ -132,9 +131,8 @@ def _counts(choices: Sequence[Choice], indices: Sequence[int], subjects: Sequenc
     """Return how often each subject met each ordered pair, and chose its first (s, 2, n, n)."""
     out = np.zeros((len(subjects), 2, len(indices), len(indices)))
     for one in choices:
-        place = subjects.index(one.subject), indices.index(one.first), indices.index(one.second)
-        out[place[0], 0, place[1], place[2]] += 1.0
-        out[place[0], 1, place[1], place[2]] += one.first_chosen
+        own = out[subjects.index(one.subject), :, indices.index(one.first), indices.index(one.second)]
+        own += (1.0, one.first_chosen)
     return out
 
 
@@ -219,10 +217,8 @@ def _deviance(counts: Array, fitted: Array, model: Model) -> tuple[float, int]:
     eta = fitted[:-1, None] - fitted[None, :-1] + fitted[-1]
     compared = met > 0
     chance = _chances(eta, model)[0][compared]
-    n, y = met[compared], chosen[compared]
-    terms = np.asarray(special.xlogy(y, y / (n * chance)), np.float64)
-    terms += np.asarray(special.xlogy(n - y, (n - y) / (n * (1.0 - chance))), np.float64)
-    return float(2.0 * terms.sum()), int(compared.sum()) - len(fitted) + 1
+    deviance = binomial_deviance(chosen[compared], met[compared], chance)
+    return deviance, int(compared.sum()) - len(fitted) + 1
 
 
 NAME = "log magnitude"

@@ -126,11 +126,11 @@ def _left_out(recording: "Recording") -> str:
     )
 
 
-def joined(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
+def distinct_sessions(tables: Iterable[ScoreTable]) -> tuple[ScoreTable, ...]:
     """Return each session once, in the order first met.
 
     >>> table = ScoreTable("a", "P01", False, ())
-    >>> len(joined([table, table]))
+    >>> len(distinct_sessions([table, table]))
     1
     """
     return tuple(same[0] for same in by_key((table.session, table) for table in tables).values())

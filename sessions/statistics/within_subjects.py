@@ -201,24 +201,16 @@ def standardised(table: Table) -> dict[str, dict[int, float]]:
     return rows
 
 
-def equal_moduli(table: Table) -> dict[str, dict[int, float]]:
-    """Return free-modulus estimates brought to one modulus: divided by the subject's geometric mean, times that of all.
+def equal_moduli(logs: Table) -> dict[str, dict[int, float]]:
+    """Return logarithms of free-modulus estimates with one mean for all subjects, that of their own means.
 
-    With a free modulus each subject chooses its own unit (Stevens 1957, Psychol. Rev. 64:153). Raises ValueError for an
-    estimate that is not above 0: a free modulus has no zero.
+    With a free modulus each subject chooses its own unit (Stevens 1957, Psychol. Rev. 64:153).
     """
-    for subject, row in table.items():
-        for value in row.values():
-            if value <= 0.0:
-                why = f"{subject} gave the estimate {value:g}; with a free modulus every estimate is above 0"
-                raise ValueError(why)
-    logs = {subject: {index: math.log(value) for index, value in row.items()} for subject, row in table.items()}
-    means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items() if row}
+    means = {subject: float(np.mean(list(row.values()))) for subject, row in logs.items()}
     grand = float(np.mean(list(means.values()))) if means else 0.0
     return {
-        subject: {index: math.exp(value - means[subject] + grand) for index, value in row.items()}
+        subject: {index: value - means[subject] + grand for index, value in row.items()}
         for subject, row in logs.items()
-        if row
     }
 
 

@@ -17,7 +17,7 @@ from sessions.exchange.session_tables import tables
 from sessions.prediction.sealed_predictions import SEAL, digest, sealed_sentence
 from sessions.recording import Recording, RecordingError
 from sessions.recording.derived import revealed
-from sessions.statistics.findings import checked_planted, found_flaws, found_friction, recovered
+from sessions.statistics.findings import checked_planted, planted_effects, planted_flaws, planted_friction
 
 VERB = {ANALYSIS: "'daq-app analyse' makes it anew", PREDICTION: "'daq-app predict' makes it anew"}
 NONSENSE = st.sampled_from([None, "x", "", -7, 0.5, True, [], {}, [None], {"a": 1}, [[1, 2, 3]], "delete"])
@@ -162,6 +162,6 @@ def test_what_was_planted_is_refused_as_a_whole_or_held_against_what_was_found(p
         held = checked_planted(planted)
     except ValueError:
         return
-    recovered(pooled_study.descriptors, held)
-    found_friction(pooled_study.visits, held["strokes"])
-    assert len(found_flaws(pooled_study.visits, {}, held.get("spoilt", {}))) == len(held.get("spoilt", {}))
+    planted_effects(pooled_study.descriptors, held)
+    planted_friction(pooled_study.visits, held["strokes"])
+    assert len(planted_flaws(pooled_study.visits, {}, held.get("spoilt", {}))) == len(held.get("spoilt", {}))

@@ -12,8 +12,8 @@ from sessions.statistics.correlations import relation
 from sessions.statistics.scores import (
     Score,
     ScoreTable,
+    distinct_sessions,
     grading,
-    joined,
     mean_scores,
     reversed_subjects,
     score_matrix,
@@ -52,7 +52,7 @@ def test_repeats_of_one_subject_are_averaged_before_subjects_are_counted():
 
 def test_a_session_handed_in_twice_counts_once():
     visit = table("P01", [10, 20])
-    assert joined([visit, table("P02", [5]), visit]) == (visit, table("P02", [5]))
+    assert distinct_sessions([visit, table("P02", [5]), visit]) == (visit, table("P02", [5]))
 
 
 def test_one_subject_alone_has_a_mean_and_a_reason_instead_of_an_interval():

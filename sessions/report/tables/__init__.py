@@ -153,7 +153,7 @@ def sections_of(sections: Mapping[str, Iterable[Table | None]]) -> dict[str, tup
     return {name: tuple(each for each in tables if each is not None) for name, tables in sections.items()}
 
 
-def parted(
+def split_off_appendix(
     sections: Mapping[str, tuple[Table, ...]], body: Set[str]
 ) -> tuple[dict[str, tuple[Table, ...]], tuple[Table, ...]]:
     """Return the sections with those tables that are named in `body`, and all others, for the appendix."""

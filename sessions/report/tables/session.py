@@ -187,12 +187,9 @@ def score_cells(mean: MeanScore, notes: Notes) -> Row:
     return mean.index, mean.n, digits(mean.mean, 1), interval, sd
 
 
-def spread_cell(
-    sd: float | None, n: int, shown: Callable[[float], str], reason: str | None, notes: Notes, unit: float = 1.0
-) -> Cell:
+def spread_cell(sd: float | None, n: int, shown: Format, reason: str | None, notes: Notes) -> Cell:
     """Return the standard deviation of n values over its interval."""
-    ends = None if sd is None else sd_interval(sd, n)
-    return notes.estimate(sd, shown, reason, ends, unit=unit)
+    return notes.estimate(sd, shown, reason, None if sd is None else sd_interval(sd, n))
 
 
 def answer_tables(report: Report) -> tuple[Table | None, ...]:
@@ -213,8 +210,8 @@ def relation_table(report: Report) -> Table | None:
     notes = Notes()
     groups: list[Rows] = []
     for e in report.experiments:
-        related = [("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation)]
-        groups.append((e.name, tuple(_relation_row(name, r, notes) for name, r in related if r is not None)))
+        related = (("mean score", e.score_relation), ("own score", e.own_relation), ("index", e.index_relation))
+        groups.append((e.name, [_relation_row(name, r, notes) for name, r in related if r is not None]))
     columns = (
         f"{shown.label} against | stimuli | Pearson's r | 95 % interval | Spearman's rho | rho's 95 % interval | "
         f"exact p of rho | slope [{shown.step} a point] | r without one"

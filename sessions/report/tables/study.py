@@ -21,7 +21,7 @@ from sessions.report.wording import (
 )
 from sessions.statistics.correlations import Relation
 from sessions.statistics.findings import DescriptorFindings, StudyFindings
-from sessions.statistics.scores import Average, MeanScore, bounds
+from sessions.statistics.scores import Average, MeanScore
 from sessions.statistics.visit import Visit
 from sessions.statistics.within_subjects import Difference, RepeatedCorrelation
 
@@ -146,12 +146,15 @@ def _differences(study: StudyFindings) -> Table | None:
 def _estimates(study: StudyFindings) -> Table | None:
     notes = Notes()
 
+    def shown(log: float) -> str:
+        return three_figures(math.exp(log))
+
     def rows(one: DescriptorFindings) -> Iterable[Row]:
         if one.estimates is None:
             return
         for index, geometric in one.estimates.geometric.items():
             means = (geometric, one.estimates.equal_moduli[index])
-            yield (index, geometric.n, *(cell for mean in means for cell in _geometric(mean, notes)))
+            yield (index, geometric.n, *(cell for mean in means for cell in _mean(mean, shown, notes)))
 
     columns = "index | subjects | geometric mean | 95 % interval | at one modulus | 95 % interval"
     out = [f"{o.descriptor}: {', '.join(s)}" for o in study.descriptors if o.estimates and (s := o.estimates.left_out)]
@@ -163,21 +166,16 @@ def _estimates(study: StudyFindings) -> Table | None:
     return table("table-estimates", caption, columns, _by_descriptor(study, rows), notes)
 
 
-def _geometric(mean: Average, notes: Notes) -> Row:
-    """Return the geometric mean and its interval of an average of logarithms."""
-    ends = bounds(mean.low, mean.high)
-    low, high = (None, None) if ends is None else map(math.exp, ends)
-    interval = notes.interval(low, high, three_figures, "one subject alone has no interval")
-    return three_figures(math.exp(mean.mean)), interval
-
-
 def _surfaces(study: StudyFindings) -> Table | None:
     notes = Notes()
 
     def row(one: DescriptorFindings) -> Iterable[Row]:
         for s in one.surfaces:
-            cells = (*_mean(s.mu, 3, notes), *_mean(s.response, shown.places, notes, shown.factor))
+            cells = (*_mean(s.mu, places(3), notes), *_mean(s.response, written, notes))
             yield (s.index, s.subjects, *cells, _spread(s.response, shown.factor, notes))
+
+    def written(response: float) -> str:
+        return digits(shown.factor * response, shown.places)
 
     shown = shown_response(study.response)
     unit = shown.unit
@@ -208,7 +206,7 @@ def _forces(study: StudyFindings) -> Table | None:
         for s in one.surfaces:
             if s.normal_force is not None or s.model_normal_force is not None:
                 numbers = (s.normal_force, s.model_normal_force, s.matching_depth)
-                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, 2, notes)))
+                yield (s.index, s.subjects, *(cell for number in numbers for cell in _mean(number, places(2), notes)))
 
     columns = (
         "index | subjects | measured N [N] | 95 % interval [N] | model N [N] | 95 % interval [N] | "
@@ -232,14 +230,10 @@ def _with_interval(mean: MeanScore | Average | Difference, decimals: int) -> Row
 _NO_STROKE = "no subject's stroke gives this number"
 
 
-def _mean(mean: Average | None, decimals: int, notes: Notes, factor: float = 1.0) -> Row:
+def _mean(mean: Average | None, shown: Callable[[float], str], notes: Notes) -> Row:
     """Return a mean and its interval, or dashes with the reason."""
     if mean is None:
         return (notes.number(None, str, _NO_STROKE),) * 2
-
-    def shown(value: float) -> str:
-        return digits(factor * value, decimals)
-
     return shown(mean.mean), notes.interval(mean.low, mean.high, shown, "one subject alone has no interval")
 
 
