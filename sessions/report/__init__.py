@@ -10,13 +10,23 @@ from sessions.plan.plan import Block, SessionPlan
 from sessions.prediction import BY_NAME, SED, SessionPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing
 from sessions.prediction.sealed_predictions import NUMBERS, sealed_sentence
+from sessions.prediction.stored import model_facts
 from sessions.prediction.surface_series import other_signs
 from sessions.recording.head import software_versions
 from sessions.recording.reader import Recording
 from sessions.report import facts
-from sessions.report.contents import Answers, Experiment, Fact, Planted, PredictionFinding, Report, StrokeFinding
+from sessions.report.contents import (
+    Answers,
+    Experiment,
+    Fact,
+    Planted,
+    PredictionFinding,
+    Report,
+    StrokeFinding,
+    same_fields,
+)
 from sessions.report.facts import scene_file, session_commands
-from sessions.report.trials import course, fields, flaws, left_out, model_in_short, modelled, predictions, strokes
+from sessions.report.trials import course, fields, flaws, left_out, model_in_short, predictions, strokes
 from sessions.statistics.correlations import Relation, relation
 from sessions.statistics.multiverse import PathTrial, Values, path_findings
 from sessions.statistics.psychometric import Psychometric, function_of
@@ -80,7 +90,7 @@ def findings(
         sealed=_sealed(recording, tables, predicted),
         response=more.response,
         model="" if prediction is None else model_in_short(prediction.options, analysis.settings.area),
-        modelled=modelled(prediction),
+        modelled=tuple(Fact(*fact) for fact in model_facts(prediction)),
         left_out=left_out(prediction),
         other_signs=() if prediction is None else tuple(other_signs(prediction.finger)),
         again=facts.again(recording, analysis),
@@ -175,61 +185,44 @@ def experiments(
     trial along many paths of the analysis, where they were asked for, and `law` the contact area by which every other
     number was given.
     """
-    return tuple(
-        _experiment(block, plan.subject, tables, numbers, paths or {}, law, response)
-        for block in plan.blocks
-        if block.phase == "main"
-    )
-
-
-def _experiment(
-    block: Block,
-    subject: str,
-    tables: Sequence[ScoreTable],
-    numbers: Quantities,
-    paths: Mapping[int, Values],
-    law: AreaLaw,
-    response: str,
-) -> Experiment:
-    descriptor = block.trials[0].stimulus.descriptor
-    indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
-    means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
-    score_of = {mean.index: mean.mean for mean in means}
-    answers = score_matrix(tables, descriptor)
-    own = {index: score for index, score in answers.get(subject, {}).items() if len(answers) > 1 and index in indices}
-    series = {
-        name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
-        for name, values in numbers.items()
-    }
     label = BY_NAME[response].label
-    predicted = series.get(label, {})
-    return Experiment(
-        name=block.name,
-        descriptor=descriptor,
-        instruction=block.instruction,
-        direction=block.direction,
-        indentation=block.indentation,
-        scale_ends=block.scale_ends,
-        indices=indices,
-        scores=means,
-        answers=tuple(Answers(subject, tuple(row.get(index) for index in indices)) for subject, row in answers.items()),
-        score_relation=_related(score_of, predicted),
-        index_relation=_related({index: float(index) for index in indices}, predicted),
-        own_relation=_related(own, predicted),
-        own_scores=own,
-        rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
-        response=response,
-        paths=path_findings(
-            [
-                PathTrial("", index, score_of.get(index), rule_for(trial), paths.get(trial.number, ()))
-                for trial in block.trials
-                for index in [trial.stimulus.known_index]
-            ],
-            "small",
-            law,
-            within=False,
-        ),
-    )
+    judged: list[Experiment] = []
+    for block in plan.blocks:
+        if block.phase != "main":
+            continue
+        descriptor = block.trials[0].stimulus.descriptor
+        indices = tuple(sorted({trial.stimulus.known_index for trial in block.trials}))
+        means = tuple(one for one in mean_scores(tables) if one.descriptor == descriptor and one.index in indices)
+        score_of = {mean.index: mean.mean for mean in means}
+        rows = score_matrix(tables, descriptor)
+        own = {i: score for i, score in rows.get(plan.subject, {}).items() if len(rows) > 1 and i in indices}
+        series = {
+            name: {index: values[block.name, index] for index in indices if (block.name, index) in values}
+            for name, values in numbers.items()
+        }
+        predicted = series.get(label, {})
+        along = [
+            PathTrial("", index, score_of.get(index), rule_for(trial), (paths or {}).get(trial.number, ()))
+            for trial in block.trials
+            for index in [trial.stimulus.known_index]
+        ]
+        judged.append(
+            Experiment(
+                **same_fields(block, Experiment),
+                descriptor=descriptor,
+                indices=indices,
+                scores=means,
+                answers=tuple(Answers(subject, tuple(map(row.get, indices))) for subject, row in rows.items()),
+                score_relation=_related(score_of, predicted),
+                index_relation=_related({index: float(index) for index in indices}, predicted),
+                own_relation=_related(own, predicted),
+                own_scores=own,
+                rivals=rivals_of_means(score_of, series, label) if predicted and score_of else (),
+                response=response,
+                paths=path_findings(along, "small", law, within=False),
+            )
+        )
+    return tuple(judged)
 
 
 def _related(x: Mapping[int, float], responses: Mapping[int, float]) -> Relation | None:

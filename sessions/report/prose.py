@@ -26,26 +26,27 @@ OTHER_FINGERS = "On a finger of another size or stiffness the sign may differ; '
 _Value = Callable[[PredictionFinding], float | None]
 
 
-def robustness(report: Report) -> list[str]:
-    """Return what the other strain, the ending's place, a given force and another finger make of r with the scores."""
+def doubts(report: Report) -> tuple[str, ...]:
+    """Return what would change the sign of r between prediction and scores; nothing without a prediction.
+
+    That is the other strain, the ending's place, a given force, and another finger.
+    """
+    if all(p.sed is None for p in report.predictions):
+        return ()
     kind: Literal["small", "finite"] = "small" if report.model.startswith("small") else "finite"
     other: Literal["small", "finite"] = "finite" if kind == "small" else "small"
-    return [
-        _in_variant(
-            report,
-            Variant(other, "computed", "depth"),
-            f"At {other} strain, r of the SED with the mean scores",
-            f"At {other} strain, which was not tried here, the sign of r may differ.",
-        ),
+    strain, force = f"At {other} strain", "Under the measured normal force"
+    untried = "which was not tried here, the sign of r may differ."
+    opening = f"{strain}, r of the SED with the mean scores"
+    return (
+        _in_variant(report, Variant(other, "computed", "depth"), opening, f"{strain}, {untried}"),
         _by_place(report),
         _in_variant(
-            report,
-            Variant(kind, "computed", "force"),
-            "Under the measured normal force, in place of a given depth",
-            "Under the measured normal force, which was not tried here, the sign of r may differ.",
+            report, Variant(kind, "computed", "force"), f"{force}, in place of a given depth", f"{force}, {untried}"
         ),
         OTHER_FINGERS,
-    ]
+        *report.other_signs,
+    )
 
 
 def _in_variant(report: Report, variant: Variant, opening: str, untried: str) -> str:
@@ -70,9 +71,8 @@ def _related(report: Report, experiment: Experiment, value: _Value) -> Relation:
     means = {mean.index: mean.mean for mean in experiment.scores}
     scored = [(p.index, value(p)) for p in report.predictions if p.experiment == experiment.name and p.index in means]
     known = [(index, number) for index, number in scored if number is not None]
-    return relation(
-        [number for _, number in known], [means[index] for index, _ in known], [index for index, _ in known]
-    )
+    indices = [index for index, _ in known]
+    return relation([number for _, number in known], [means[index] for index in indices], indices)
 
 
 def _by_place(report: Report) -> str:
@@ -154,12 +154,6 @@ def summary(report: Report) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def doubts(report: Report) -> tuple[str, ...]:
-    """Return what would change the sign between prediction and scores; nothing without a prediction."""
-    predicted = any(p.sed is not None for p in report.predictions)
-    return (*robustness(report), *report.other_signs) if predicted else ()
-
-
 def told_apart(report: Report) -> tuple[str, ...]:
     """Return what scores can and cannot tell apart."""
     return tuple(s for e in report.experiments if e.rivals for s in rivals_sentences(e.name, e.rivals))
@@ -170,9 +164,8 @@ def _strokes(report: Report) -> str:
     n = len(report.strokes)
     if n == 0:
         return "No stroke was found in the recording; the flaws below say why."
-    measured = sum(s.mu_dynamic is not None for s in report.strokes)
-    words = f"{capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {measured} gave a dynamic friction"
     values = [s.mu_dynamic for s in report.strokes if s.mu_dynamic is not None]
+    words = f"{capital(plural(n, 'stroke'))} {'was' if n == 1 else 'were'} found; {len(values)} gave a dynamic friction"
     if len(values) < 2:
         return words + (f", µ = {digits(values[0], 2)}." if values else ".")
     return words + f", from µ = {digits(min(values), 2)} to {digits(max(values), 2)}."
@@ -188,14 +181,10 @@ def _predicted(experiment: Experiment, shown: ShownResponse, ends: tuple[float, 
         words += f" (a range of {spread_share(low, high)})"
     else:
         words += f" is {digits(low, decimals)}{unit}"
-    return words + related_words(experiment.score_relation) + "."
-
-
-def related_words(related: Relation | None) -> str:
-    """Return r with its interval and n as the end of a sentence, or why there is none."""
+    related = experiment.score_relation
     if related is None:
-        return "; there are no scores to hold it against"
+        return f"{words}; there are no scores to hold it against."
     if related.pearson is None:
-        return f"; no correlation with the scores: {related.reason}"
-    words = f"; against the mean scores r = {correlation(related.pearson)}{ends_of(related)}"
-    return words + f", n = {related.n} stimuli"
+        return f"{words}; no correlation with the scores: {related.reason}."
+    r = f"{correlation(related.pearson)}{ends_of(related)}"
+    return f"{words}; against the mean scores r = {r}, n = {related.n} stimuli."

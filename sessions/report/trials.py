@@ -4,6 +4,7 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 from sessions.prediction import PredictionOptions, SessionPrediction, TrialPrediction
 from sessions.prediction.afferent import AfferentSettings, Firing, parameters
 from sessions.prediction.scenes import doubt_of
-from sessions.prediction.stored import model_facts
 from sessions.recording.reader import Recording
 from sessions.report.contents import Course, Fact, Field, History, PredictionFinding, StrokeFinding, Trace, same_fields
 from sessions.statistics.scores import by_key
@@ -153,7 +153,7 @@ def predictions(
         replace(row, reasons=dict.fromkeys(row.reasons, "The trial was not done.")) if row.trial in undone else row
         for row in prediction.trials
     )
-    return tuple(_with_rates(finding_of(row), rates.get(row.trial)) for row in rows)
+    return tuple(finding_of(row, rates.get(row.trial)) for row in rows)
 
 
 def afferent_facts(settings: AfferentSettings, reference: float | None) -> tuple[Fact, ...]:
@@ -175,13 +175,13 @@ def fields(prediction: SessionPrediction | None) -> tuple[Field, ...]:
     """Return the settled finger of each experiment's greatest index that has a prediction."""
     if prediction is None:
         return ()
-    chosen: dict[str, TrialPrediction] = {}
-    for row in prediction.trials:
-        if row.prediction is not None and row.stimulus is not None and row.block is not None:
-            before = chosen.get(row.block)
-            if before is None or before.stimulus is None or before.stimulus.known_index < row.stimulus.known_index:
-                chosen[row.block] = row
-    return tuple(field for name, row in chosen.items() if (field := field_of(name, row)) is not None)
+    by_block = by_key(
+        (row.block, (row.stimulus.known_index, row))
+        for row in prediction.trials
+        if row.prediction is not None and row.stimulus is not None and row.block is not None
+    )
+    greatest = {name: max(rows, key=itemgetter(0))[1] for name, rows in by_block.items()}
+    return tuple(field for name, row in greatest.items() if (field := field_of(name, row)) is not None)
 
 
 def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
@@ -191,11 +191,6 @@ def model_in_short(options: PredictionOptions, area: AreaLaw) -> str:
     'small strain, settled sliding, τ max computed, contact area fixed'
     """
     return f"{options.kinematics} strain, settled sliding, τ max {options.tau_reading}, contact area {area.law}"
-
-
-def modelled(prediction: SessionPrediction | None) -> tuple[Fact, ...]:
-    """Return what the model holds, with the greatest residual of each audit over all trials."""
-    return tuple(Fact(*fact) for fact in model_facts(prediction))
 
 
 def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
@@ -210,8 +205,8 @@ def left_out(stored: SessionPrediction | None) -> tuple[Fact, ...]:
     )
 
 
-def finding_of(row: TrialPrediction) -> PredictionFinding:
-    """Return the finding of one trial."""
+def finding_of(row: TrialPrediction, firing: Firing | None = None) -> PredictionFinding:
+    """Return the finding of one trial, with the rates of an afferent where it was computed."""
     history = row.history
     reasons = {name: row.reasons[other] for name, other in _FROM_ROW.items() if other in row.reasons}
     numbers: dict[str, Any] = {
@@ -226,6 +221,9 @@ def finding_of(row: TrialPrediction) -> PredictionFinding:
         "doubt": "" if row.prediction is None else doubt_of(row.prediction),
         "opposite_doubt": "" if row.opposite is None else doubt_of(row.opposite),
     }
+    if firing is not None:
+        numbers |= {"peak_rate": float(firing.rate.max()), "settled_rate": firing.settled_rate}
+        numbers |= {"peak_rate_interval": firing.peak_interval, "settled_rate_interval": firing.settled_interval}
     return PredictionFinding(**{**same_fields(row, PredictionFinding), **numbers})
 
 
@@ -235,19 +233,6 @@ def _row(row: TrialPrediction) -> tuple[tuple[float, float], ...]:
         return ()
     pairs = zip(row.prediction.row.arc.tolist(), row.prediction.row.sed.tolist(), strict=True)
     return tuple((arc, sed) for arc, sed in pairs if np.isfinite(sed))
-
-
-def _with_rates(finding: PredictionFinding, firing: Firing | None) -> PredictionFinding:
-    """Return the finding with an afferent's rates."""
-    if firing is None:
-        return finding
-    return replace(
-        finding,
-        peak_rate=float(firing.rate.max()),
-        settled_rate=firing.settled_rate,
-        peak_rate_interval=firing.peak_interval,
-        settled_rate_interval=firing.settled_interval,
-    )
 
 
 def field_of(experiment: str, row: TrialPrediction) -> Field | None:
