@@ -20,7 +20,7 @@ from sessions.report import study_prose
 from sessions.report.contents import Report
 from sessions.report.figures import Panel, Plate, plates
 from sessions.report.figures.relation import study_plates
-from sessions.report.prose import doubts, question, summary, told_apart
+from sessions.report.prose import distinctions, doubts, question, summary
 from sessions.report.tables import Table, split_off_appendix
 from sessions.report.tables.session import tables as session_tables
 from sessions.report.tables.study import study_tables
@@ -64,7 +64,7 @@ def page(report: Report, drawings: Sequence[Plate] | None = None) -> str:
         question=question(report),
         summary=summary(report),
         doubts=doubts(report),
-        told_apart=told_apart(report),
+        distinctions=distinctions(report),
         figures=figures,
         drawing=drawn,
         text_address=text_address,

@@ -154,7 +154,7 @@ def summary(report: Report) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def told_apart(report: Report) -> tuple[str, ...]:
+def distinctions(report: Report) -> tuple[str, ...]:
     """Return what scores can and cannot tell apart."""
     return tuple(s for e in report.experiments if e.rivals for s in rivals_sentences(e.name, e.rivals))
 

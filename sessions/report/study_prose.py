@@ -49,7 +49,7 @@ def summary(study: StudyFindings) -> list[str]:
     return sentences
 
 
-def told_apart(study: StudyFindings) -> list[str]:
+def distinctions(study: StudyFindings) -> list[str]:
     """Return what scores can and cannot tell apart."""
     return [
         sentence

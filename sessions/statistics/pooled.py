@@ -60,8 +60,8 @@ from sessions.statistics.within_subjects import (
     equal_moduli,
     holm,
     repeated_correlation,
-    standardised,
     within_means,
+    z_scores,
 )
 
 Trials = Sequence[tuple[Visit, TrialRow]]
@@ -147,7 +147,7 @@ def _descriptor(
         rivals=rivals_within(competing, quantity.label),
         rivals_of_means=rivals_of_surfaces(competing, quantity.label),
         without_subject=_without_subject([(subject, x, score) for subject, _, x, score in plain]),
-        normalised=_normalised(standardised(matrix), plain),
+        normalised=_normalised(z_scores(matrix), plain),
         differences=differences(matrix),
         estimates=estimates(trials, quantity.name),
         exponent=exponent(trials),

@@ -186,7 +186,7 @@ def holm(ps: Sequence[float]) -> tuple[float, ...]:
     return tuple(adjusted)
 
 
-def standardised(table: Table) -> dict[str, dict[int, float]]:
+def z_scores(table: Table) -> dict[str, dict[int, float]]:
     """Return scores as each subject's own z-scores, which takes away the part of the scale a subject uses.
 
     A subject whose scores do not vary is left out: nothing can be said of the order it gave. So is one who did not

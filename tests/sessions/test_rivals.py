@@ -11,7 +11,7 @@ from study_example import study
 
 from sessions.report.figures import picture
 from sessions.report.pages import rivals_csv, study_page
-from sessions.report.prose import told_apart
+from sessions.report.prose import distinctions
 from sessions.report.tables.rivals import rivals_sentences
 from sessions.report.tables.session import tables
 from sessions.statistics.correlations import (
@@ -229,7 +229,7 @@ def test_a_session_shows_every_rival_beside_the_sed_in_table_picture_data_and_su
     assert "τ max +0.95" in drawn
     in_data = asdict(report)["experiments"][0]["rivals"][1]["contrast"]
     assert in_data["z"] == report.experiments[0].rivals[1].contrast.z
-    said = " ".join(told_apart(report))
+    said = " ".join(distinctions(report))
     assert "µ of the model and τ max order these 5 surfaces as the SED does, so no order of scores" in said
     needed = cases_needed(*correlations_of(report.experiments[0]))
     assert f"{float(f'{needed:.2g}'):.0f} (µ of the model)" in said

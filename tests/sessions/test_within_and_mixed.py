@@ -14,8 +14,8 @@ from sessions.statistics.within_subjects import (
     equal_moduli,
     holm,
     repeated_correlation,
-    standardised,
     within_means,
+    z_scores,
 )
 
 # Intramural pH and PaCO2 of eight subjects: Bland & Altman 1995 (BMJ 310:446), table 1.
@@ -153,7 +153,7 @@ def test_where_nothing_can_be_said_nothing_is():
 
 def test_standardised_scores_have_no_level_and_equal_moduli_keep_ratios():
     table = {"a": {0: 10.0, 1: 20.0, 2: 40.0}, "b": {0: 1.0, 1: 2.0, 2: 4.0}, "flat": {0: 5.0, 1: 5.0}}
-    z = standardised(table)
+    z = z_scores(table)
     assert list(z) == ["a", "b"]
     assert sum(z["a"].values()) == pytest.approx(0.0)
     assert z["a"][2] == pytest.approx(z["b"][2])

@@ -264,9 +264,9 @@ def _write(study: StudyFindings, name: str, out: Path) -> dict[str, str]:
 
 
 def _print(study: StudyFindings, files: dict[str, str], console: Console) -> None:
-    from sessions.report.study_prose import excluded, remarks, summary, told_apart
+    from sessions.report.study_prose import distinctions, excluded, remarks, summary
 
-    console.say(study.simulated or None, *summary(study), *told_apart(study), *excluded(study), *remarks(study))
+    console.say(study.simulated or None, *summary(study), *distinctions(study), *excluded(study), *remarks(study))
     for one in study.effects:
         inside = "inside" if one.covered else "OUTSIDE"
         console.say(

@@ -146,9 +146,9 @@ def planted_table(report: Report) -> Table | None:
         for name, truth, value, shown, unit in quantities:
             reason = stroke.reasons.get(name) if stroke else "no stroke was found in this trial"
             ends = stroke.bootstrap.get(name) if stroke else None
-            found_cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
+            cell = notes.estimate(value, shown, reason, ends, _TOO_SHORT, unit=unit)
             off = None if value is None else 100 * (value / truth - 1)
-            cells += [shown(truth), found_cell, notes.number(off, signed, reason)]
+            cells += [shown(truth), cell, notes.number(off, signed, reason)]
         right = stroke is not None and stroke.direction == p.direction
         cells.append(Cell("as planted" if right else NONE if stroke is None or stroke.direction is None else "wrong"))
         return tuple(cells)
