@@ -34,7 +34,7 @@ DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # what drives the body: its depth
 UNSETTLED, SINGULAR = 0, -1  # what `solve_active_set` returns in place of the number of systems it solved
 
 
-@compiled
+@subroutine
 def contradictions(
     states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments, changes: StateChanges
 ) -> int:
@@ -71,7 +71,7 @@ def contradictions(
     return changed
 
 
-@compiled
+@subroutine
 def touching_state(load: LoadArguments) -> int:
     """Return the state in which a node is first thought to touch.
 
@@ -82,7 +82,7 @@ def touching_state(load: LoadArguments) -> int:
     return STICK if load.mu > 0.0 and load.tau > 0.0 else SLIP
 
 
-@compiled
+@subroutine
 def friction_state(
     was: int, sense: int, reaction: Array, slip: float, bound: float, load: LoadArguments, slack: Slack
 ) -> tuple[int, int, float]:

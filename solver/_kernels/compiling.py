@@ -108,9 +108,9 @@ def compiled(function: Loop) -> Loop:
 
 
 def subroutine(function: Loop) -> Loop:
-    """Return `function` as a part of the one loop that calls it, into which LLVM copies it.
+    """Return `function` as a part of loops, into which LLVM copies it; Python cannot call it.
 
-    To copy it so takes a quarter less time to compile than to copy its source, but hides the shapes of small arrays.
+    That takes less time to compile than to copy its source, but hides the shapes of small arrays from LLVM.
     """
     return cast("Loop", _numba.njit(**_OPTIONS, no_cpython_wrapper=True, forceinline=True)(function))
 

@@ -108,7 +108,7 @@ def assemble_contact_system(
     return f
 
 
-@compiled
+@subroutine
 def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: ContactSystem) -> int:
     """Fill the `steps` that states of contact prescribe, and list the `free` unknowns; return how many those are."""
     free, steps, held = system.free, system.steps, skin.held
@@ -131,7 +131,7 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
     return f
 
 
-@compiled
+@subroutine
 def add_bound(
     i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
 ) -> None:
@@ -251,7 +251,7 @@ def assemble_force_system(
     return f
 
 
-@compiled
+@subroutine
 def list_forces(
     held: Narrow, states: ContactStates, tau: float, system: ContactSystem, forces: Array
 ) -> tuple[int, int]:

@@ -256,13 +256,13 @@ def test_no_bit_depends_on_which_loops_a_process_called_before():
     before = (
         "import numpy as np\n"
         "from solver._kernels import active_set, contact_system, skin as skin_loops\n"
-        "from solver.arrays import ContactStates, LoadArguments, Skin, StateChanges\n"
-        "states, zero = np.zeros(3, np.int32), np.zeros(3)\n"
+        "from solver.arrays import ContactStates, LoadArguments, Skin, SkinPosition\n"
+        "state, zero = np.zeros(3, np.int32), np.zeros(3)\n"
+        "skin, load = Skin(state, state, zero), LoadArguments(0.1, 0.1, 0.1, 1)\n"
         "contact_system.tributary(np.arange(3.0), np.array([0, 1, 0], np.int32), zero)\n"
-        "contact_system.bounded_length(zero, Skin(states, states, zero), states, 0.1, zero)\n"
-        "states = ContactStates(states, states.copy(), np.zeros((3, 2)))\n"
-        "changes = StateChanges(states.state.copy(), states.sense.copy(), zero.copy())\n"
-        "active_set.contradictions(states, zero, zero, zero, LoadArguments(0.1, 0.1, 0.1, 1), changes)\n"
+        "contact_system.bounded_length(zero, skin, state, 0.1, zero)\n"
+        "states = ContactStates(state, state.copy(), np.zeros((3, 2)))\n"
+        "active_set.meet(states, SkinPosition(zero, zero, zero), load, skin, zero.copy())\n"
     )
     first, then = (
         subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
