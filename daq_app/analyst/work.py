@@ -18,7 +18,7 @@ from daq_app.wording import tr
 from sessions.exchange import ExportSource, export
 from sessions.plan.plan import Blinded
 from sessions.prediction import PredictionOptions, TrialPrediction, predict
-from sessions.prediction.predicting import Way
+from sessions.prediction.scenes import Way
 from sessions.prediction.uncertainty import with_intervals
 from sessions.recording import Recording
 from sessions.recording.derived import revealed

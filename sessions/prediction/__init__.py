@@ -4,8 +4,7 @@ Each trial becomes a scene: its measured friction, its block's indentation, its 
 """
 
 from sessions.prediction.options import BY_NAME, PredictionOptions, finger_in, shown_unit, with_own_finger
-from sessions.prediction.predicting import predict
-from sessions.prediction.scenes import Progress, part_of
+from sessions.prediction.scenes import Progress, part_of, predict
 from sessions.prediction.stored import SessionPrediction, TrialPrediction
 from solver import Friction, Prediction, Scene
 from solver.prediction import Response

@@ -185,7 +185,7 @@ class Likelihood:
         return np.asarray(len(self.wide) * np.log(misfit), np.float64)
 
     def maximum(self, grid: _Grid) -> tuple[Array, Array, float]:
-        """Return contrast (2,), touches and mean of the posterior's maximum, by the model's derivatives."""
+        """Return contrast (2,), touches and mean of the posterior's maximum."""
         best = int(np.argmax(grid.weight))
         sigma = float(np.sqrt((grid.misfit[best] + self.floor) / self.free))
         start = np.concatenate([grid.contrast[best], [grid.mean[best]], grid.touch[best]])
@@ -193,36 +193,21 @@ class Likelihood:
         width_sigma = float(np.exp(of_width / max(len(self.wide), 1) / 2.0)) / max(len(self.wide), 1) ** 0.5
         scale = np.concatenate([np.full(len(self.force), sigma), np.full(len(self.wide), width_sigma), np.ones(3)])
 
+        knots, width = np.log(self.model.depth), np.log(self.model.scene.finger.width)
+
         def residual(at: Array) -> Array:
-            return self._at(at)[0] / scale
+            """Return residuals of forces, contacts and prior, each by its standard deviation."""
+            depth, contrast = self.displacement - at[3:][self.which], at[None, :2]
+            logs = (
+                (self.model.log_force(contrast) + width + at[2], depth),
+                (self.model.log_width(contrast), depth[self.wide]),
+            )
+            values = [at_depths(CubicSpline(knots, log, axis=1), where[None])[0][0] for log, where in logs]
+            prior = at[:3] * [1.0, 1.0, np.sqrt(3.0) / self.model.spread]
+            return np.concatenate([values[0] - self.force, values[1] - self.width, prior]) / scale
 
-        def jacobian(at: Array) -> Array:
-            return self._at(at)[1] / scale[:, None]
-
-        optimum = least_squares(residual, start, jacobian, x_scale="jac").x
+        optimum = least_squares(residual, start, "3-point", x_scale="jac").x
         return optimum[:2], optimum[3:], float(optimum[2])
-
-    def _at(self, at: Array) -> tuple[Array, Array]:
-        """Return residuals of forces, contacts and prior, and their Jacobian by both contrasts, mean and touches."""
-        model, contrast, knots = self.model, at[None, :2], np.log(self.model.depth)
-        depth = self.displacement - at[3:][self.which]
-        log = model.log_force(contrast) + np.log(model.scene.finger.width) + at[2]
-        parts: list[Array] = []
-        rows: list[Array] = []
-        for values, slopes, measured, only in (
-            (log, model.slopes(contrast), self.force, np.arange(len(depth))),
-            (model.log_width(contrast), model.width_slopes(contrast), self.width, self.wide),
-        ):
-            value, slope = (one[0] for one in at_depths(CubicSpline(knots, values, axis=1), depth[only][None]))
-            by_contrast = CubicSpline(knots, slopes[0], axis=1)(np.log(np.maximum(depth[only], model.depth[0])))
-            by_mean = value if values is log else np.zeros(len(only))
-            parts.append(value - measured)
-            by_touch = -slope[:, None] * self.presses.T[only]
-            rows.append(np.column_stack([(value * by_contrast).T, by_mean, by_touch]))
-        prior = np.diag([1.0, 1.0, np.sqrt(3.0) / model.spread])
-        parts.append(prior @ at[:3])
-        rows.append(np.column_stack([prior, np.zeros((3, len(at) - 3))]))
-        return np.concatenate(parts), np.vstack(rows)
 
     def profile(self, grids: Sequence[_Grid], layer: int) -> Interval:
         """Return a layer's log factor of greatest likelihood with the 95 % interval of its profile, 0 as published."""

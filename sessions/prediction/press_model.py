@@ -55,17 +55,9 @@ class PressModel:
         """Return log N (g, k) [N/mm] for `contrast` (g, 2) in deviations of the prior, the mean log stiffness kept."""
         return _basis(contrast, DEGREE)[0] @ self.coefficients
 
-    def slopes(self, contrast: Array) -> Array:
-        """Return how that changes with both contrasts (g, 2, k)."""
-        return np.stack([part @ self.coefficients for part in _basis(contrast, DEGREE)[1:]], axis=1)
-
     def log_width(self, contrast: Array) -> Array:
         """Return the log of the contact's length (g, k) [mm]; the mean log stiffness does not matter."""
         return _basis(contrast, DEGREE_OF_WIDTH)[0] @ self.width
-
-    def width_slopes(self, contrast: Array) -> Array:
-        """Return how that changes with both contrasts (g, 2, k)."""
-        return np.stack([part @ self.width for part in _basis(contrast, DEGREE_OF_WIDTH)[1:]], axis=1)
 
     def force(self, stiffness: Array, depth: Array) -> Array:
         """Return N (n,) [N] of the whole finger with layers of a `stiffness` (3,) [MPa] at depths (n,) [mm]."""

@@ -126,6 +126,19 @@ def known_error(prediction: Prediction, error: float | None) -> float | None:
     return None if prediction.nested is None else error
 
 
+def settled_numbers(answer: Prediction) -> dict[str, Any]:
+    """Return SED [MPa] and forces of the whole finger [N] with their relative errors, as `TrialNumbers` names them."""
+    width = answer.scene.finger.width
+    return {
+        "sed": answer.sed_ending,
+        "error_estimate": known_error(answer, answer.error_estimate),
+        "normal_force": answer.normal_force * width,
+        "tangential_force": answer.tangential_force * width,
+        "normal_force_error": known_error(answer, answer.normal_force_error),
+        "tangential_force_error": known_error(answer, answer.tangential_force_error),
+    }
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialNumbers:
     """The numbers that the model gives of one trial, or of one stroke of a recording without trials.

@@ -36,7 +36,6 @@ class Slopes:
     """How every quantity at the ending goes with the surfaces of one series. nan where too few have an answer."""
 
     surfaces: int  # with a settled state
-    with_mu: Array  # (q,) correlation with the coefficient of friction [-]
     with_index: Array  # (q,) correlation with the maker's index [-]
     change: Array  # (q,) by the least-squares line over the range of mu, by the mean size; its sign is the slope's [-]
 
@@ -99,12 +98,12 @@ def _slopes(series: Sequence[Surface], responses: Array) -> Slopes:
     count = int(known.sum())
     none = np.full(responses.shape[1], np.nan)
     if count < LEAST:
-        return Slopes(count, none, none, none)
+        return Slopes(count, none, none)
     values = responses[known]
     mu, index = (np.array(column)[known] for column in zip(*((s.mu, float(s.index)) for s in series), strict=True))
     slope = (mu - mu.mean()) @ (values - values.mean(axis=0)) / np.sum((mu - mu.mean()) ** 2)
     change = slope * np.ptp(mu) / np.abs(values).mean(axis=0)
-    return Slopes(count, _correlation(mu, values), _correlation(index, values), change)
+    return Slopes(count, _correlation(index, values), change)
 
 
 def _correlation(x: Array, values: Array) -> Array:

@@ -36,6 +36,7 @@ from sessions.prediction.stored import (
     TrialPrediction,
     Variant,
     known_error,
+    settled_numbers,
     variants,
 )
 from sessions.strokes import Analysis
@@ -296,18 +297,12 @@ def _alternative(
     if isinstance(answer, str):
         depth = None if variant.driven == "force" else row.indentation
         return Alternative(variant, tau_max, depth, None, None, None, None, answer)
-    width = answer.scene.finger.width
     return Alternative(
         variant,
         tau_max,
         answer.indentation,
-        answer.sed_ending,
-        known_error(answer, answer.error_estimate),
-        answer.normal_force * width,
-        answer.tangential_force * width,
+        **settled_numbers(answer),
         traction=traction_reached(answer),
-        normal_force_error=known_error(answer, answer.normal_force_error),
-        tangential_force_error=known_error(answer, answer.tangential_force_error),
         indentation_error=known_error(answer, answer.indentation_error),
         doubt=doubt_of(answer),
     )

@@ -230,7 +230,7 @@ def test_where_the_nested_mesh_has_no_such_state_the_error_is_not_known_and_its_
     def bounded_by_nothing(scenes, *rest, **options):
         return [replace(answer, nested=None) for answer in solve_many(scenes, *rest, **options)]
 
-    monkeypatch.setattr("sessions.prediction.predicting.solve_many", bounded_by_nothing)
+    monkeypatch.setattr("sessions.prediction.scenes.solve_many", bounded_by_nothing)
     row = predict(beginning(tables, 1), PLAN, PredictionOptions(course="steady")).trials[0]
     assert row.sed is not None
     errors = (row.error_estimate, row.opposite_error, row.normal_force_error, row.tangential_force_error)
