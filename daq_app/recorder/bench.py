@@ -17,7 +17,8 @@ from drivers.transducer import DeviceFault, Health, LinkLost, SetupError, Transd
 from sessions.recording import RecordingError
 from sessions.run.interruptions import interruptions
 from sessions.run.resuming import check_same_transducer
-from sessions.strokes.onset import DetectorSettings, is_quiet
+from sessions.strokes.contacts import is_quiet
+from sessions.strokes.settings import DetectorSettings
 
 TRY_AGAIN = 1.0  # between two attempts to reach a transducer that was lost [real s]
 GLANCE = 0.01  # between two looks while no session runs [real s]

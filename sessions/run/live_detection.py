@@ -13,8 +13,9 @@ from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Frame
 from sessions.run.steps import ContactOnset, FingerLifted, Settled, Zeroed
+from sessions.strokes.contacts import ContactDetector, Onset, is_quiet
 from sessions.strokes.forces import normal_force
-from sessions.strokes.onset import ContactDetector, DetectorSettings, Onset, is_quiet
+from sessions.strokes.settings import DetectorSettings
 
 Array = NDArray[np.float64]
 Noticed = Zeroed | ContactOnset | FingerLifted | Settled

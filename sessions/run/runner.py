@@ -16,7 +16,7 @@ from sessions.run.machine import advance, start, trial_in_hand
 from sessions.run.resuming import Resumption, Seam
 from sessions.run.states import Ended, Ready, Resting, Scoring, Settling, Stroking, Taring
 from sessions.run.steps import Abort, AskRest, Command, Event, MeasureZero, Refuse, RestOver, Tell, UndoRedo
-from sessions.strokes.onset import DetectorSettings
+from sessions.strokes.settings import DetectorSettings
 
 Cause = Literal["finished", "aborted", "stopped", "device", "client", "disk", "program"]
 STOPPED = "stopped by the user"

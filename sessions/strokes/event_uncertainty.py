@@ -10,7 +10,7 @@ speed, at which it is detected, that decides.
 import numpy as np
 from numpy.typing import NDArray
 
-from sessions.strokes.onset import onset_threshold
+from sessions.strokes.contacts import onset_threshold
 from sessions.strokes.settings import BootstrapSettings
 from sessions.strokes.stick import ClimbReadings, thin
 

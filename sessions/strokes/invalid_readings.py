@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
-from sessions.strokes.onset import NORMAL_STEP
+from sessions.strokes.contacts import NORMAL_STEP
 from sessions.strokes.settings import SignalSettings
 
 Array = NDArray[np.float64]

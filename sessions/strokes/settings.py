@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from sessions.strokes.onset import DetectorSettings
 from sessions.strokes.stroke import FIXED, AreaLaw
 
 ASSUMED_GAIN_ERROR = 0.01  # standard uncertainty of each axis' gain where nobody stated the transducer's own [-]
@@ -15,6 +14,23 @@ TILT_PRIOR = 1.0  # standard uncertainty of the lean about an axis: 1 mm under o
 
 Pair = tuple[float, float]
 WindowRule = Literal["widened", "least variance", "middle half", "whole slide"]
+
+
+@dataclass(frozen=True, slots=True)
+class DetectorSettings:
+    """What counts as touching; forces are above the measured zero."""
+
+    onset_floor: float = 0.05  # a contact exceeds this [N] ...
+    onset_noise: float = 5.0  # ... and so many standard deviations of the noise [-] ...
+    onset_hold: float = 0.010  # ... for so long [s]
+    leave_noise: float = 3.0  # its onset is walked back to where the force left so many standard deviations [-]
+    lift_fraction: float = 0.6  # lifted below this fraction of the onset threshold [-] ...
+    lift_hold: float = 0.020  # ... for so long [s]
+    baseline: float = 0.3  # unloaded stretch that gives zero and noise [s]
+    baseline_readings: int = 12  # and the fewest readings it may have
+    baseline_parts: int = 6  # in which it is renewed
+    quiet_noise: float = 2.0  # it is unloaded when its spread stays within so many times the noise [-] ...
+    quiet_floor: float = 0.02  # ... or within this, for readings that were smoothed before they came [N]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from drivers.calibration import Calibration
 from drivers.readings import ReadingBlock
 from sessions.plan.plan import Frame
-from sessions.strokes.contacts import Contact
+from sessions.strokes.contacts import NORMAL_STEP, Contact, onset_threshold
 from sessions.strokes.forces import Filter, centre_of_pressure, friction_ratio, in_face_frame, level
-from sessions.strokes.onset import NORMAL_STEP, onset_threshold
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.signal_quality import SignalQuality, segments
 from sessions.strokes.stroke import FlawName, StrokeCurve

@@ -15,9 +15,15 @@ from numpy.typing import NDArray
 from drivers.readings import ReadingBlock
 from drivers.transducer import TransducerInfo
 from sessions.plan.plan import SessionPlan, Trial
-from sessions.strokes.contacts import Contact, find_contacts, split_at_reversals, split_at_valleys
+from sessions.strokes.contacts import (
+    Baseline,
+    Contact,
+    find_contacts,
+    onset_threshold,
+    split_at_reversals,
+    split_at_valleys,
+)
 from sessions.strokes.decisions import Decisions, StrokeDecisions
-from sessions.strokes.onset import Baseline, onset_threshold
 from sessions.strokes.settings import AnalysisSettings
 from sessions.strokes.signal_quality import signal_quality
 from sessions.strokes.sliding import block_means, displacement

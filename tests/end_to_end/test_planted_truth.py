@@ -14,8 +14,8 @@ from drivers.transducer import TransducerInfo
 from sessions.plan.plan import Block, Frame, SessionPlan, Stimulus, Trial
 from sessions.strokes import AnalysisSettings
 from sessions.strokes.analysis import analyse_blocks
+from sessions.strokes.contacts import ContactDetector, Lift, Onset
 from sessions.strokes.forces import normal_force
-from sessions.strokes.onset import ContactDetector, Lift, Onset
 from simulators.bench import RATED, Bench, BenchSettings, PlantedStroke
 from simulators.stroke import paper_surfaces
 from simulators.subject import SimulatedSubject

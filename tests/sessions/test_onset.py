@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_strokes import times, trapezium
 
-from sessions.strokes.onset import Baseline, ContactDetector, DetectorSettings, Lift, Onset, onset_threshold
+from sessions.strokes.contacts import Baseline, ContactDetector, Lift, Onset, onset_threshold
+from sessions.strokes.settings import DetectorSettings
 
 
 def noisy(force, sd=0.004, seed=0):

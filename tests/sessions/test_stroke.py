@@ -137,7 +137,7 @@ def test_a_recording_that_ends_in_contact_has_no_lift():
 
 
 def test_onset_is_the_same_live_and_offline():
-    from sessions.strokes.onset import ContactDetector
+    from sessions.strokes.contacts import ContactDetector
 
     raw = felt(PLAIN)
     live = ContactDetector().feed(T, normal_force(raw, Frame("-z")))
