@@ -31,17 +31,17 @@ def main() -> None:
 
 def _work(folder: Path) -> None:
     """Print the processor time of each thing that is asked for."""
-    begun = time.process_time()
+    start = time.process_time()
     from daq_app.analyst import state as m
     from daq_app.analyst.work import Work
 
-    print(f"loading the work                 {time.process_time() - begun:6.2f} s")
-    begun = time.process_time()
+    print(f"loading the work                 {time.process_time() - start:6.2f} s")
+    start = time.process_time()
     known: dict[str, float] = {}
     said: list[m.Said] = []
 
     def say(message: m.Said) -> None:
-        known.setdefault(type(message).__name__, time.process_time() - begun)
+        known.setdefault(type(message).__name__, time.process_time() - start)
         said.append(message)
 
     work = Work(folder, say)
@@ -51,7 +51,7 @@ def _work(folder: Path) -> None:
         f"the first finger after {known['Answered']:.2f} s"
     )
     answers = sum(isinstance(one, m.Answered) for one in said)
-    print(f"all {answers} trials are answered after {time.process_time() - begun:4.2f} s")
+    print(f"all {answers} trials are answered after {time.process_time() - start:4.2f} s")
     report = next(one.report for one in said if isinstance(one, m.ReportReady))
     stroke = next(s for s in report.strokes if s.steady is not None)
     for words, request in (
@@ -65,9 +65,9 @@ def _work(folder: Path) -> None:
         ("first picture of the session", m.Draw("course")),
         ("second picture", m.Draw("friction")),
     ):
-        begun = time.process_time()
+        start = time.process_time()
         work.do(request)
-        print(f"{words:36s} {time.process_time() - begun:4.2f} s")
+        print(f"{words:36s} {time.process_time() - start:4.2f} s")
     film = next(one.film for one in said if isinstance(one, m.Filmed))
     _painting(film)
 
@@ -87,9 +87,9 @@ def _painting(film) -> None:  # noqa: ANN001
         took: list[float] = []
         for frame in film.frames[::4]:
             canvas.show_frame(frame, film.parts, "", Look(FIELD_CHOICES[0], (0.0, 30.0), near))
-            begun = time.process_time()
+            start = time.process_time()
             canvas.grab()
-            took.append(time.process_time() - begun)
+            took.append(time.process_time() - start)
         print(
             f"painting the {'contact' if near else 'finger '}                  {1e3 * statistics.median(took):5.0f} ms"
         )
@@ -105,10 +105,10 @@ def _stops(folder: Path) -> None:
     for _ in range(STOPS):
         analyst = Analyst(folder)
         _until(analyst, m.Answered)
-        begun = time.monotonic()
+        start = time.monotonic()
         analyst.ask(m.Stop())
         _until(analyst, m.Cancelled)
-        took.append(time.monotonic() - begun)
+        took.append(time.monotonic() - start)
         analyst.close()
     median, longest = 1e3 * statistics.median(took), 1e3 * max(took)
     print(f"a stop is answered after {median:.0f} ms by the wall, the longest {longest:.0f} ms")

@@ -24,10 +24,10 @@ REPEATS = 2
 
 def measure(folders: list[Path], shelf: Path, options: VisitOptions, workers: int) -> tuple[float, float]:
     """Return the wall time and the workers' processor time [s] of computing all sessions."""
-    before, begun = _children(), time.perf_counter()
+    before, start = _children(), time.perf_counter()
     done, failed = visits(folders, options, Shelf(shelf, options), Console(as_json=True), workers=workers)
     assert len(done) == len(folders), failed
-    return time.perf_counter() - begun, _children() - before
+    return time.perf_counter() - start, _children() - before
 
 
 def _children() -> float:

@@ -156,7 +156,7 @@ class Console:
         Yields what the work may tell the part done (0 to 1), where it knows it; the answer is always to go on. Of what
         is left of the whole, half is thought to be what the solver is at: so the part shown moves, and never back.
         """
-        begun, over = time.monotonic(), threading.Event()
+        start, over = time.monotonic(), threading.Event()
         at = Underway(text)
 
         def reach(done: float) -> bool:
@@ -167,7 +167,7 @@ class Console:
             pause = PATIENCE
             while not over.wait(pause):
                 self.progress(
-                    at.part, f"{at.doing}, {time.monotonic() - begun:.0f} s so far; Ctrl-C stops", end_known=False
+                    at.part, f"{at.doing}, {time.monotonic() - start:.0f} s so far; Ctrl-C stops", end_known=False
                 )
                 pause = 0.2
 

@@ -99,10 +99,10 @@ class Prony(Isotropic):
         return 1.0 - sum(g for g, _ in self.terms)
 
     @property
-    def relaxed(self) -> Moduli:
+    def long_term_moduli(self) -> Moduli:
         """The moduli in the end.
 
-        >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).relaxed.shear / Prony(0.08, 0.48).shear, 6)
+        >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).long_term_moduli.shear / Prony(0.08, 0.48).shear, 6)
         0.7
         """
         return self._with(self.long_term)
@@ -115,14 +115,14 @@ class Prony(Isotropic):
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).within(1.0).shear / Prony(0.08, 0.48).shear, 6)
         0.889636
         """
-        return self._with(self.long_term + sum(g * float(kept(np.asarray(step / tau))) for g, tau in self.terms))
+        return self._with(self.long_term + sum(g * float(mean_decay(np.asarray(step / tau))) for g, tau in self.terms))
 
     def _with(self, part: float) -> Moduli:
         shear = part * self.shear
         return Moduli(shear, self.bulk - 2.0 / 3.0 * shear)
 
 
-def kept(times: Array) -> Array:
+def mean_decay(times: Array) -> Array:
     """Return what is left of a strain that grew evenly over so many relaxation times (> 0): (1 - exp(-x)) / x."""
     return -np.expm1(-times) / times
 
@@ -199,12 +199,12 @@ class LocalState:
     @property
     def volume(self) -> Array:
         """J: volume by undeformed volume at the place itself [-]."""
-        return 1.0 + self._grown
+        return 1.0 + self._volume_growth
 
     @property
     def log_volume(self) -> Array:
         """Logarithm of the volume to the digits of the strains [-]."""
-        return log1p(self._grown)
+        return log1p(self._volume_growth)
 
     @property
     def excess(self) -> Array:
@@ -213,7 +213,7 @@ class LocalState:
         return 2.0 * (self.trace - self.log_volume) + squares
 
     @property
-    def _grown(self) -> Array:
+    def _volume_growth(self) -> Array:
         return self.trace + self.xx * self.yy - self.xy * self.yx
 
     @property
@@ -291,10 +291,10 @@ def tangent(law: Law, F: Array) -> Array:
     return shear * (unit + crossed) + more * stretched - pressure * crossed + law.lame * squeezed
 
 
-def unstrained(F: Array) -> Array:
+def inverse_metric(F: Array) -> Array:
     """Return B (..., 4) for deformation gradients F (..., 2, 2).
 
-    >>> unstrained(np.array([[1.0, 0.5], [0.0, 1.0]])).tolist()  # simple shear
+    >>> inverse_metric(np.array([[1.0, 0.5], [0.0, 1.0]])).tolist()  # simple shear
     [1.25, 1.0, -0.5, 1.0]
     """
     J = determinant(F)
@@ -305,7 +305,7 @@ def unstrained(F: Array) -> Array:
     return np.stack([scale * yy / J**2, scale * xx / J**2, -scale * xy / J**2, scale + 0.0 * J], axis=-1)
 
 
-def turned(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
+def stress_parts(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
     """Return J (...), F^-T (..., 2, 2), F T (..., 2, 2) and T:C (...)."""
     pulled = F @ np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
     return determinant(F), inverse(np.swapaxes(F, -2, -1)), pulled, np.sum(pulled * F, axis=(-2, -1)) + T[..., 3]
@@ -320,7 +320,7 @@ def overstress(T: Array, F: Array) -> Array:
     >>> (overstress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
     0.5
     """
-    J, inverse, pulled, whole = turned(F, T)
+    J, inverse, pulled, whole = stress_parts(F, T)
     return (J ** (-2.0 / 3.0))[..., None, None] * (pulled - (whole / 3.0)[..., None, None] * inverse)
 
 
@@ -353,20 +353,20 @@ class Past:
         one = np.array([1.0, 1.0, 0.0, 1.0])
         return Past(shear, tau, np.broadcast_to(one, (*shear.shape, 4)), np.broadcast_to(one, (len(shear), 4)))
 
-    def _faded(self, step: float) -> Array:
+    def _decay(self, step: float) -> Array:
         """Return A' (p, m, 4) at the end of a `step` [s]."""
         ages = step / self.tau
-        left, grown = np.exp(-ages), kept(ages)
+        left, grown = np.exp(-ages), mean_decay(ages)
         return left[..., None] * self.metric + (grown - left)[..., None] * self.before[:, None]
 
     def over(self, step: float) -> Array:
         """Return T (p, 4) [MPa] of a `step` [s]."""
-        return np.sum(self.shear[..., None] * self._faded(step), axis=1)
+        return np.sum(self.shear[..., None] * self._decay(step), axis=1)
 
     def after(self, F: Array, step: float) -> "Past":
         """Return the past at the end of a `step` [s] that led to the deformation gradients F (p, 2, 2)."""
-        now = unstrained(F)
-        metric = self._faded(step) + (1.0 - kept(step / self.tau))[..., None] * now[:, None]
+        now = inverse_metric(F)
+        metric = self._decay(step) + (1.0 - mean_decay(step / self.tau))[..., None] * now[:, None]
         return replace(self, metric=metric, before=now)
 
     def energy(self) -> Array:

@@ -68,12 +68,12 @@ class ContactLost(NotConverged):
     """No set of contact states was found that contradicts nothing; the message says what was tried."""
 
 
-def followed_to(depth: float, travel: float, reason: object) -> NotConverged:
+def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:
     """Return the failure of a course that could be followed to a `depth` after a `travel` [mm] and not beyond.
 
-    >>> str(followed_to(1.5, -0.2, "no equilibrium"))[:67]
+    >>> str(at_end_of_path(1.5, -0.2, "no equilibrium"))[:67]
     'the course was followed to 1.5 mm of indentation and 0.2 mm of slid'
-    >>> str(followed_to(-4.754, 0.0, "no equilibrium"))[:75]
+    >>> str(at_end_of_path(-4.754, 0.0, "no equilibrium"))[:75]
     'the course was followed to where the drag holds the bone 4.754 mm above fir'
     """
     lifted = f"where the drag holds the bone {-depth:.4g} mm above first touch"

@@ -43,7 +43,7 @@ class Tree:
 
         Unknowns in `fixed` take no part (their displacement is zero); those in `kept` are passed on to the end.
         """
-        order, ranges, children = _halved(centres, leaf)
+        order, ranges, children = _bisect(centres, leaf)
         position = np.empty(len(order), np.int64)
         position[order] = np.arange(len(order))
         size = int(elements.max()) + 1
@@ -69,7 +69,7 @@ class Tree:
         return Tree(order, tuple(parts), kept, size)
 
 
-def _halved(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:
+def _bisect(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], list[tuple[int, ...]]]:
     """Return an order of elements, the range of each part in it, and each part's children; children come first."""
     order = np.arange(len(centres))
     ranges: list[tuple[int, int]] = []
@@ -129,11 +129,11 @@ def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
 
     It does not depend on where nodes lie, so the last ones are kept for meshes that differ in nothing else.
     """
-    return _planned(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
+    return _plan(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
 @lru_cache(maxsize=16)  # a search for a tolerance plans 8 meshes: 4 made each anew, 32 gain nothing more
-def _planned(count: int, *numbers: bytes) -> SymbolicFactorization:
+def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
     elements = elements.reshape(-1, 9)
@@ -253,7 +253,7 @@ class Elimination:
         self._condense(force)
         return force[self.plan.size - len(self.stiffness) :]
 
-    def needed(self, unknowns: Narrow) -> Flags:
+    def parts_holding(self, unknowns: Narrow) -> Flags:
         """Return which parts (p,) hold the displacements of some `unknowns`, -1 being those of none."""
         plan = self.plan
         part = np.full(plan.size + 1, len(plan.inner))  # the last stands for no part

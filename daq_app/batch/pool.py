@@ -266,7 +266,7 @@ def visits(
         console.note(f"{len(done)} of {len(folders)} sessions were computed before and are taken as they are")
     failed: list[tuple[str, str]] = []
     named = {folder.name: keys[folder] for folder in missing}
-    begun = time.monotonic()
+    start = time.monotonic()
     if missing:
         console.progress(0.0, f"0 of {len(missing)} sessions")
     here = scheduler is None or not missing
@@ -279,7 +279,7 @@ def visits(
             else:
                 shelf.keep(named[name], answer)
                 done.append(converted(answer, Visit))
-            left = (time.monotonic() - begun) / count * (len(missing) - count)
+            left = (time.monotonic() - start) / count * (len(missing) - count)
             remaining = "" if console.at_terminal else f", {left:.0f} s left"
             console.progress(0.95 * count / len(missing), f"{count} of {len(missing)} sessions{remaining}")
     except KeyboardInterrupt:

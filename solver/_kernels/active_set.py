@@ -6,7 +6,7 @@ contradict the solution change all at once; where that goes round in circles, th
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled, subroutine
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver._kernels.contact_system import (
     COLUMNS,
     STEEP,
@@ -105,7 +105,7 @@ def friction_state(
     return now, way, bad
 
 
-@compiled
+@compile_loop
 def solve_active_set(
     body: CondensedArrays,
     compliance: Array,
@@ -214,7 +214,7 @@ def look_ahead(
         slip[i] = 0.0 if loose else ahead[i] - position.anchor[i] - motion[1]
 
 
-@compiled
+@compile_loop
 def count_in(state: Narrow, which: int) -> int:
     """Return how many nodes are in a state of contact."""
     count = 0
@@ -223,7 +223,7 @@ def count_in(state: Narrow, which: int) -> int:
     return count
 
 
-@compiled
+@compile_loop
 def hold(state: Narrow) -> None:
     """Let every node that touches stick."""
     for i in range(state.shape[0]):
@@ -340,7 +340,7 @@ def balance(
     return True
 
 
-@compiled
+@compile_loop
 def meet(states: ContactStates, position: SkinPosition, load: LoadArguments, skin: Skin, length: Array) -> int:
     """Change `states` where the forces on the skin, or its position, contradict them; return how many were changed.
 

@@ -94,7 +94,7 @@ def _alone(folder: Path) -> Generator[None]:
         yield
 
 
-def compiled(function: Loop) -> Loop:
+def compile_loop(function: Loop) -> Loop:
     """Return `function` as a loop that numba compiles when Python first calls it, and keeps on disk.
 
     In another loop that calls it, it is copied: of two versions of it in two loops, the one that a process loads first

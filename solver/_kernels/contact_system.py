@@ -5,7 +5,7 @@ First the length of skin that each node of it stands for.
 
 import numpy as np
 
-from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compiled, subroutine
+from solver._kernels.compiling import HELD_X, HELD_Y, OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop, subroutine
 from solver.arrays import (
     Array,
     CondensedArrays,
@@ -27,7 +27,7 @@ LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.
 STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
 
 
-@compiled
+@compile_loop
 def tributary(x: Array, at: Narrow, out: Array) -> None:
     """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
 
@@ -41,7 +41,7 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
                 out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
 
 
-@compiled
+@compile_loop
 def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
     """Fill `out` (k,) with the length of skin on which a bound acts: what is fixed, and the `tributary` that `rubs`."""
     for i in range(out.shape[0]):
@@ -54,7 +54,7 @@ def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -
                     out[i - 1 + n] += row[0] * x[i - 1] + row[1] * x[i] + row[2] * x[i + 1]
 
 
-@compiled
+@compile_loop
 def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
     """Return whether a bound acts on the part of an edge, judged at its middle, that one of its nodes stands for.
 
@@ -66,7 +66,7 @@ def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
     return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
 
 
-@compiled
+@compile_loop
 def assemble_contact_system(
     body: CondensedArrays,
     skin: Skin,
@@ -180,7 +180,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
     return True
 
 
-@compiled
+@compile_loop
 def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
     """Take from row r of a system the rows before it, four at a time, whose pivots are one over `over` (r,)."""
     row = a[r]

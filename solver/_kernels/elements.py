@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from solver._kernels.compiling import compiled
+from solver._kernels.compiling import compile_loop
 from solver.arrays import (
     Array,
     BodyState,
@@ -18,8 +18,8 @@ from solver.arrays import (
 PLAIN = 2.0  # exponent of tissue that does not stiffen
 
 
-@compiled
-def stiffened(exponent: float, excess: float) -> tuple[float, float]:
+@compile_loop
+def shear_growth(exponent: float, excess: float) -> tuple[float, float]:
     """Return by how much the shear modulus has grown, and how fast it grows: `hyperelastic.slopes`."""
     if excess > 0.04:
         s = np.arcsinh(0.5 * np.sqrt(excess))
@@ -35,7 +35,7 @@ def stiffened(exponent: float, excess: float) -> tuple[float, float]:
     return grown, growth
 
 
-@compiled
+@compile_loop
 def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[float, float, float, float]:
     """Return du/dX at a point, xx, xy, yx, yy, of nodal displacements `ux`, `uy` (9,) and gradients `gx`, `gy` (9,)."""
     xx, xy, yx, yy = 0.0, 0.0, 0.0, 0.0
@@ -47,26 +47,26 @@ def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[f
     return xx, xy, yx, yy
 
 
-@compiled
+@compile_loop
 def volume_growth(xx: float, xy: float, yx: float, yy: float) -> float:
     """Return det F - 1 of a displacement gradient, to its own digits: stiff tissue multiplies them."""
     return xx + yy + xx * yy - xy * yx
 
 
-@compiled
+@compile_loop
 def excess_of(xx: float, xy: float, yx: float, yy: float, log: float) -> float:
     """Return F:F - 2 - 2 ln J of a displacement gradient and `log` J, to its own digits."""
     return 2.0 * (xx + yy - log) + xx * xx + xy * xy + yx * yx + yy * yy
 
 
-@compiled
+@compile_loop
 def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> None:
     """Fill `ux`, `uy` (9,) with the displacements of the nodes of an element."""
     for i in range(9):
         ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
 
 
-@compiled
+@compile_loop
 def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
     """Fill the `geometry` of elements whose `nodes` (e, 9) lie at `place` (n, 2); False where one is folded."""
     px, py, work = np.empty(9), np.empty(9), np.empty(9)
@@ -102,7 +102,7 @@ def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: El
     return True
 
 
-@compiled
+@compile_loop
 def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
     """Fill gradients and weights of an element with nodes at `px`, `py` (9,), and x, y in place of its modes."""
     values, along, up, weights = shapes
@@ -128,7 +128,7 @@ def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: E
     return True
 
 
-@compiled
+@compile_loop
 def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
@@ -170,7 +170,7 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
     return least
 
 
-@compiled
+@compile_loop
 def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: ElementWork, volume: Array) -> float:
     """Fill what an element's quadrature points are strained, and its modes of `volume`; return its least det F."""
     turned, exceeds, wide, push, more = work.turned, work.exceeds, work.wide, work.push, work.more
@@ -193,7 +193,7 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
         v2 += w2 * log
         wg = w * shear
         if exponent != PLAIN:
-            factor, growth = stiffened(exponent, excess_of(h00, f01, f10, h11, log))
+            factor, growth = shear_growth(exponent, excess_of(h00, f01, f10, h11, log))
             more[q] = 2.0 * growth * wg
             wg *= factor
         push[q] = wg
@@ -206,7 +206,7 @@ def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: E
     return least
 
 
-@compiled
+@compile_loop
 def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's forces `f` (18,)."""
     turned, exceeds, wide, push, f = work.turned, work.exceeds, work.wide, work.push, work.f
@@ -226,7 +226,7 @@ def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: Eleme
         f[17] += p10 * gx[8] + p11 * gy[8]
 
 
-@compiled
+@compile_loop
 def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementArrays, work: ElementWork) -> None:
     """Fill the deformed gradients of shape functions, the derivatives of an element's volume modes, and `bend`."""
     h, s, wide, bend, d, left, lam = work.h, work.s, work.wide, work.bend, work.d, work.left, elements.lame[e]
@@ -246,7 +246,7 @@ def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementA
         left[c, 0], left[c, 1], left[c, 2] = lam * d0, lam * d1, lam * d2
 
 
-@compiled
+@compile_loop
 def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
     """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient: x of all, y of all, centre."""
     for i in range(8):
@@ -254,7 +254,7 @@ def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
     out[16], out[17] = by[0] * gx[8] + by[1] * gy[8], by[2] * gx[8] + by[3] * gy[8]
 
 
-@compiled
+@compile_loop
 def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
     """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus, which is `push` (q,) by weight."""
     for i in range(9):
@@ -266,7 +266,7 @@ def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
                 out[i, c] += x * grad_x[q, c] + y * grad_y[q, c]
 
 
-@compiled
+@compile_loop
 def sum_geometric(work: ElementWork) -> None:
     """Fill the products of deformed gradients: each node's x, then its y, by all of the outer nodes.
 
@@ -283,7 +283,7 @@ def sum_geometric(work: ElementWork) -> None:
             by_x[i, c], by_y[i, c] = x, y
 
 
-@compiled
+@compile_loop
 def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
     """Fill `own` (18, 18) with what makes an element stiffer as it is strained, and with what relaxing tissue adds."""
     s, more, own = work.s, work.more, work.own
@@ -296,7 +296,7 @@ def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) 
                 own[i, c] += x * s[q, c]
 
 
-@compiled
+@compile_loop
 def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill what eliminates an element's centre, which meets no other element: in the `system`, `left` and `right`."""
     h, bend, d, own, by_x, by_y = work.h, work.bend, work.d, work.own, work.by_x, work.by_y
@@ -328,7 +328,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
         system.recovery_matrix[e, 0, 2 * i + a], system.recovery_matrix[e, 1, 2 * i + a] = right[3, c], right[4, c]
 
 
-@compiled
+@compile_loop
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
     """Fill an element's tangent, lower half, its centre eliminated, and how its volume modes follow displacements."""
     left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
@@ -350,7 +350,7 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
             tangent[e, 2 * i + 1, 2 * c + 1] = product[8 + i, 8 + c] + own[8 + i, 8 + c] + by_y[i, 8 + c] + even[i, c]
 
 
-@compiled
+@compile_loop
 def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None:
     """Add an element's forces `f` (18,), its centre eliminated, and fill what recovers the centre under them."""
     recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse
@@ -364,7 +364,7 @@ def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None
                 system.force[row] += f[i + 8 * a] - centre
 
 
-@compiled
+@compile_loop
 def advance(
     before: BodyState, step: Array, scale: float, after: BodyState, elements: ElementArrays, system: ElementSystem
 ) -> float:

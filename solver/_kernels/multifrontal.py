@@ -7,13 +7,13 @@ U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows 
 
 import numpy as np
 
-from solver._kernels.compiling import compiled
+from solver._kernels.compiling import compile_loop
 from solver.arrays import Array, Factors, Flags, Narrow, SymbolicFactorization
 
 UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # what `eliminate` returns
 
 
-@compiled
+@compile_loop
 def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> int:
     """Fill `factors` and the skin's stiffness `skin` (m, m); return UNSOLVABLE where a pivot is zero, else the sign.
 
@@ -52,7 +52,7 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
     return sign
 
 
-@compiled
+@compile_loop
 def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
     """Add an element's tangent `own` (16, 16), lower half, to a front in which its unknowns stand `at` (16,)."""
     k = top.shape[0]
@@ -65,7 +65,7 @@ def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
                 rest[low - k, high - k] += own[i, j]
 
 
-@compiled
+@compile_loop
 def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Array) -> None:
     """Add what a child passes on, `below` (b, b), to the front in which its border stands `where` (b,).
 
@@ -87,7 +87,7 @@ def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Arra
             j += count
 
 
-@compiled
+@compile_loop
 def _factorised(top: Array, rest: Array) -> bool:
     """Replace the inner rows `top` (k, k + b) by their factor, and `rest` (b, b) by what it leaves; upper halves.
 
@@ -121,7 +121,7 @@ def _factorised(top: Array, rest: Array) -> bool:
     return True
 
 
-@compiled
+@compile_loop
 def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Array) -> None:
     """Take from rows r and r + 1 of a front, both given from column r on, what the first `count` rows hold of them."""
     size = one.shape[0]
@@ -145,7 +145,7 @@ def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Ar
         p += 1
 
 
-@compiled
+@compile_loop
 def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three: Array, four: Array) -> None:
     """Take from rows r to r + 3 of a front, all given from column r on, what the rows of `top` hold of them."""
     p, count = 0, top.shape[0]
@@ -175,7 +175,7 @@ def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three:
         p += 1
 
 
-@compiled
+@compile_loop
 def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None:
     """Take from row r of a front, given from column r on, what the first `count` rows hold of it."""
     for p in range(count):
@@ -185,7 +185,7 @@ def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None
             one[c] -= a0 * s0[c]
 
 
-@compiled
+@compile_loop
 def condense(force: Array, factors: Factors) -> None:
     """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors
@@ -207,7 +207,7 @@ def condense(force: Array, factors: Factors) -> None:
             force[numbers[border_at[p] + j]] -= passed[j]
 
 
-@compiled
+@compile_loop
 def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -> None:
     """Fill the displacements of `out` (n,) which part `p` of the body eliminates; those of its border are there."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors
@@ -236,7 +236,7 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
         out[first + i] = near[i]
 
 
-@compiled
+@compile_loop
 def back_substitute(carried: Array, skin: Array, needed: Flags, out: Array, factors: Factors) -> None:
     """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,).
 
@@ -250,7 +250,7 @@ def back_substitute(carried: Array, skin: Array, needed: Flags, out: Array, fact
             back_substitute_part(p, carried, factors, out)
 
 
-@compiled
+@compile_loop
 def displace(
     carried: Array,
     skin: Array,

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from solver._kernels.compiling import compiled
+from solver._kernels.compiling import compile_loop
 from solver._kernels.elements import displacement_gradient, gather
 from solver.arrays import Array, ElementArrays
 
 
-@compiled
+@compile_loop
 def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, tangent: Array, points: Array) -> None:
     """Fill `force` (e, 18) and `tangent` (e, 18, 18) of W = 1/2 J^-2/3 T:C at displacements `u` (nodes, 2).
 

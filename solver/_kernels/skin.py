@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from solver._kernels.compiling import OPEN, compiled
+from solver._kernels.compiling import OPEN, compile_loop
 from solver.arrays import Array, Flags, Indices, Narrow
 
 SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
 
 
-@compiled
-def pinched(
+@compile_loop
+def measure_compression(
     nodes: Array, u: Array, outline: Indices, loose: Flags, state: Narrow, first: int
 ) -> tuple[float, int, float, float]:
     """Return how far the skin is squeezed where its elements are `loose` (a,), as in `SkinCompression`.
@@ -44,7 +44,7 @@ def pinched(
     return least, place, min(lowest, least), kink
 
 
-@compiled
+@compile_loop
 def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
     """Return whether the deformed line meets itself other than at the nodes that join its pieces."""
     count = outline.shape[0]
@@ -66,7 +66,7 @@ def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
     return False
 
 
-@compiled
+@compile_loop
 def _overlap(at: Array, i: int, j: int) -> bool:
     """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from solver.accuracy.error_estimate import NestedState, Steps, choose_steps, edge_changes, nested_state
 from solver.continuation.existence import folded, refuse_far_beyond, sound, steep
-from solver.continuation.finite_states import nearby, roughly, settled
+from solver.continuation.finite_states import nearby, roughly, settled_state
 from solver.equilibrium import EquilibriumState
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import end, march
@@ -126,7 +126,7 @@ def _solve_uniform(scene: Scene, sizing: Sizing, meshes: Meshes) -> MeshSolution
     start = perf_counter()
     finger = meshes.finger(scene, sizing)
     setup = perf_counter() - start
-    state = settled(finger, scene)
+    state = settled_state(finger, scene)
     if sizing.margin < WIDER and state.reaches_end:
         return _solve_uniform(scene, replace(sizing, margin=WIDER), meshes)
     return MeshSolution(finger, sizing, state, setup)
@@ -164,17 +164,17 @@ def solution_on(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshe
     """
     start = _starting_solution(scene, sizing, below, meshes)
     try:
-        return replace(start, state=settled(start.finger, scene, start.state, times))
+        return replace(start, state=settled_state(start.finger, scene, start.state, times))
     except NotConverged:
         if not steep(sliding_load(scene)):
             raise
     lines = sizing.fineness
     if isinstance(lines, Lines):
-        offset = lines.divided(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
+        offset = lines.divide(np.full(len(lines.arcs) - 1, 2), np.ones(lines.rows, np.int64))
     else:
         offset = OFFSET_FINENESS * lines
     start = _starting_solution(scene, replace(sizing, fineness=offset), below, meshes)
-    return replace(start, state=settled(start.finger, scene, start.state, times))
+    return replace(start, state=settled_state(start.finger, scene, start.state, times))
 
 
 def _starting_solution(scene: Scene, sizing: Sizing, below: MeshSolution, meshes: Meshes) -> MeshSolution:
@@ -204,7 +204,7 @@ def solve_nested(
             state = end(scene, finger)
         else:
             steps = None
-            state = nearby(finger, scene, start.state) or settled(finger, scene, start.state)
+            state = nearby(finger, scene, start.state) or settled_state(finger, scene, start.state)
     except SolveFailure:
         return None, steps
     forces = None if scene.viscoelastic else forces_of(scene, state.load)

@@ -158,7 +158,7 @@ def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxin
     lost = -float(np.sum(mean[..., 0] * slip[..., 0]))
     friction = -np.sum(reaction[1:, :, 0] * slip[..., 0], axis=1)
     scale = max(abs(bone), np.finfo(float).tiny)
-    stored = newton.condensed.stored(states[-1].u, states[-1].reaction)
+    stored = newton.condensed.stored_energy(states[-1].u, states[-1].reaction)
     least = {"course_least_dissipation": float(friction.min()) / scale}
     if relaxing:
         return {"course_viscous_work": (bone - lost - stored) / scale} | least

@@ -212,7 +212,7 @@ def _move_edge(
         return None
     deeper, along = newton.system.motion.tolist() if forces is not None else (0.0, 0.0)
     load = state.load._replace(depth=state.load.depth + deeper, travel=state.load.travel + along)
-    moved = newton.moved(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+    moved = newton.apply_step(start, load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
     return replace(moved, state=states, sense=senses)  # the prescribed states, not those that would follow
 
 

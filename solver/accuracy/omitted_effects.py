@@ -246,7 +246,7 @@ MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
     """Return `prediction` with measured differences in place of estimates where they can be had."""
-    begun = perf_counter()
+    start = perf_counter()
     scene = replace(prediction.scene, solve=replace(prediction.scene.solve, evidence="estimated", tolerance=COARSE))
     left_out = {name: dict(entry) for name, entry in prediction.model["left_out"].items()}
     plain = replace(scene, solve=replace(scene.solve, course="steady"))
@@ -256,7 +256,7 @@ def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
             if name in left_out:
                 estimated = left_out[name]["estimate"]
                 left_out[name] |= {"estimated": estimated, **entry}
-    return with_left_out(prediction, left_out, begun)
+    return with_left_out(prediction, left_out, start)
 
 
 def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], begun: float) -> Prediction:

@@ -107,7 +107,7 @@ def adjoint(finger: LinearFinger, displacement: Array, state: EquilibriumState) 
     goal = finger.ending.gradient(displacement)
     goal[finger.geometry.mesh.driven] = 0.0
     loaded, recover = finger.body.under(goal)
-    compliance, free = loaded.compliance, loaded.untouched().ravel()
+    compliance, free = loaded.compliance, loaded.free_displacement().ravel()
     movable = compliance.diagonal().reshape(-1, 2).all(axis=1)
     touching, stuck = (np.flatnonzero(movable & which) for which in (state.state != OPEN, state.state == STICK))
     lever = np.where(state.state == SLIP, state.load.mu * state.sense, 0.0)[touching, None]
@@ -154,7 +154,7 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
     counts = np.array([len(lines.arcs) - 1, lines.rows])
     if parts is None:
         halves = np.full(counts.sum(), 2)
-        return lines.divided(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST_UNKNOWNS else None
+        return lines.divide(*np.split(halves, counts[:1])) if _unknowns(halves, counts) <= MOST_UNKNOWNS else None
     most = np.clip(_lengths(mesh) // (FINEST * mesh.outline.finger.tip_radius), 1.0, MOST_PARTS)
     per_line = parts * np.repeat(counts, counts)
     least = GROWTH * _unknowns(np.ones(len(parts)), counts)
@@ -169,7 +169,7 @@ def refine_lines(mesh: FingerMesh, parts: Array | None) -> Lines | None:
             break
     if chosen is None or chosen.max() == 1.0:
         return None
-    return lines.divided(*np.split(chosen.astype(np.int64), counts[:1]))
+    return lines.divide(*np.split(chosen.astype(np.int64), counts[:1]))
 
 
 def _unknowns(parts: Array, counts: Indices) -> float:

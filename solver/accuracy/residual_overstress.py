@@ -16,7 +16,7 @@ import numpy as np
 from solver.accuracy.adaptivity import MARGIN
 from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import roughly
-from solver.continuation.small_states import settled
+from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_path import PRESSING_TIME, Aim, Way, way_of
 from solver.equilibrium.load_stepping import load_of
@@ -61,12 +61,12 @@ def relaxing_scene(scene: Scene) -> Scene | None:
 
 def with_viscosity(prediction: Prediction) -> Prediction:
     """Return `prediction` with the evidence on viscosity marched, where that can be. Raises Cancelled."""
-    scene, begun = prediction.scene, perf_counter()
+    scene, start = prediction.scene, perf_counter()
     if scene.materials.relax and scene.solve.course == "history":
         return prediction
     still = residual_overstress(prediction)
     if still is None:
-        return replace(prediction, evidence_s=perf_counter() - begun)
+        return replace(prediction, evidence_s=perf_counter() - start)
     whose = "with the scene's own series"
     if not scene.materials.relax:
         whose = (
@@ -79,7 +79,7 @@ def with_viscosity(prediction: Prediction) -> Prediction:
         "how": "change of the ending's SED when an elastic finger's slide has settled, all soft tissues relaxing "
         f"{whose}: press and slide marched on a coarse mesh in few steps",
     }
-    return with_left_out(prediction, {**before, "viscosity": entry}, begun)
+    return with_left_out(prediction, {**before, "viscosity": entry}, start)
 
 
 def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
@@ -120,7 +120,7 @@ def _small(scene: Scene) -> tuple[Way, float]:
     body.rest()
     tissue = LinearTissue(body, (finger.ending.endings,))
     way = Way(finger.newton, load_of(scene), scene.loading_per_mm, tissue=tissue)
-    return way, finger.sed_ending(finger.displacement(settled(scene, finger)))
+    return way, finger.sed_ending(finger.displacement(settled_state(scene, finger)))
 
 
 @lru_cache(maxsize=1)

@@ -61,7 +61,7 @@ class CondensedBody(Protocol):
         """Return a state after `scale` times the skin's `step` (2 k,), and the largest move of the full step [mm]."""
         ...
 
-    def stored(self, u: Array, reaction: Array) -> float:
+    def stored_energy(self, u: Array, reaction: Array) -> float:
         """Return the energy stored at displacements `u` that forces `reaction` (k, 2) hold [N mm per mm]."""
         ...
 
@@ -162,7 +162,7 @@ class CondensedLinear:
         size = len(forces)
         return (self.compliance[:size, :size] @ forces).reshape(-1, 2)
 
-    def loaded(self, load: Array) -> "CondensedLinear":
+    def with_load(self, load: Array) -> "CondensedLinear":
         """Return the same body under another dead `load` (2 k,) [N/mm]."""
         other = copy(self)
         other.load, other.force, other._compliance = load, -load, self.compliance  # noqa: SLF001 - of its own kind
@@ -172,17 +172,17 @@ class CondensedLinear:
         """Return displacements (k, 2) of the skin at rest, and no pressures."""
         return np.zeros(self.rest.shape), np.zeros((0, 3))
 
-    def untouched(self) -> Array:
+    def free_displacement(self) -> Array:
         """Return the displacements (k, 2) under the dead loads alone, motions left out that nothing holds."""
         return self._follow(self.load)
 
-    def held_by(self, reaction: Array) -> Array:
+    def displacement_under(self, reaction: Array) -> Array:
         """Return the displacements (k, 2) that forces `reaction` (k, 2) of the surface hold."""
         return self._follow(self.load + reaction.ravel())
 
-    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
+    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - tissues that relax may be elsewhere
         """Return the energy stored once forces `reaction` (k, 2) alone hold the body [N mm per mm]."""
-        return 0.5 * float(np.sum(reaction * self.held_by(reaction)))
+        return 0.5 * float(np.sum(reaction * self.displacement_under(reaction)))
 
     def work(self, way: Sequence[Array], trapezoid: float) -> float:  # noqa: ARG002 - as every body is asked
         """Do as `CondensedBody` says: forces grow in proportion, so that the rule is exact."""
@@ -288,7 +288,7 @@ class MeshElements:
     @classmethod
     def of(cls, mesh: Mesh, materials: Sequence[Elasticity]) -> Self:
         """Integrate the elements of `mesh`, of `materials` by region. Raises LinAlgError where one is folded."""
-        return cls(*integrated(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
+        return cls(*integrate_elements(mesh, materials, np.full((len(mesh.elements), 16), -1, np.int32)))
 
     def volume_modes(self, volume: Array, element: Indices | slice = slice(None)) -> Array:
         """Return the modes (e, 3, ...) that fit a measure of `volume` (e, q, ...) best."""
@@ -304,7 +304,7 @@ class MeshElements:
         along = np.tile([1.0, 0.0], (len(element), 1)) if tangent is None else tangent
         constants = np.stack([of.shear[element], of.lame[element], of.stiffening[element], *along.T])
         gradients = np.stack([of.grad_x[held], of.grad_y[held]])
-        return Places(probes, held, np.searchsorted(held, element), gradients, self.combined(probes), constants)
+        return Places(probes, held, np.searchsorted(held, element), gradients, self.modes_at(probes), constants)
 
     def state(self, places: "Places", displacement: Array) -> LocalState:
         """Return what is known of places for displacements (nodes, 2, ...): arrays (p, ...)."""
@@ -327,7 +327,7 @@ class MeshElements:
         by_axis = np.stack([weighted @ self.elements.grad_x, weighted @ self.elements.grad_y], axis=-1)
         return by_axis.reshape(-1, 3, 18)
 
-    def combined(self, probes: "Probes") -> Array:
+    def modes_at(self, probes: "Probes") -> Array:
         """Return the elements' own modes (p, 3) at probes."""
         return (self.combination[probes.element] @ probes.modes[:, :, None])[:, :, 0]
 
@@ -343,7 +343,7 @@ def _geometry(mesh: Mesh) -> tuple[Array, ...]:
     return out
 
 
-def integrated(
+def integrate_elements(
     mesh: Mesh, materials: Sequence[Elasticity], unknown: Narrow
 ) -> tuple[Mesh, ElementArrays, Array, Array]:
     """Return what `MeshElements` are made of; `unknown` (e, 16) are those of their outer nodes, -1 where fixed.
@@ -362,7 +362,7 @@ def integrated(
     return mesh, elements, centre, combination
 
 
-def held(mesh: Mesh) -> Narrow:
+def held_directions(mesh: Mesh) -> Narrow:
     """Return whether each node of the skin is held (k,): along x HELD_X, along y HELD_Y, both their sum."""
     return (mesh.driven[mesh.skin] @ np.array([HELD_X, HELD_Y])).astype(np.int32)
 

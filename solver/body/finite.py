@@ -11,7 +11,7 @@ import numpy as np
 from solver._kernels import elements as element_loops
 from solver._kernels.compiling import bind_arguments
 from solver.arrays import Array, BodyState, ElementSystem, Indices, Narrow, SymbolicFactorization
-from solver.body import MeshElements, Patches, held, integrated
+from solver.body import MeshElements, Patches, held_directions, integrate_elements
 from solver.body.validation import check_body, check_driven, check_laws
 from solver.constitutive import Elasticity, log1p, shape, slopes
 from solver.linalg import Elimination, Some, symbolic_factorization
@@ -44,7 +44,7 @@ class FiniteBody(MeshElements):
             check_driven(mesh)
         plan = symbolic_factorization(mesh)
         middle = (np.arange(len(mesh.skin)) % 2).astype(np.int32)
-        return cls(*integrated(mesh, materials, plan.unknown), plan, held(mesh), middle)
+        return cls(*integrate_elements(mesh, materials, plan.unknown), plan, held_directions(mesh), middle)
 
     @property
     def condensed(self) -> "CondensedFinite":
@@ -92,7 +92,7 @@ class FiniteBody(MeshElements):
 
     def energy(self, u: Array) -> float:
         """Return the energy stored in the body [N mm per mm]."""
-        return self._stored(self.gradient(u)).real
+        return self._energy(self.gradient(u)).real
 
     def energy_slope(self, u: Array, way: Array) -> float:
         """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
@@ -101,7 +101,7 @@ class FiniteBody(MeshElements):
         asked.
         """
         H = self.gradient(cast("Array", u + 1j * IMAGINARY * way))
-        return self._stored(H).imag / IMAGINARY
+        return self._energy(H).imag / IMAGINARY
 
     def energy_growth(self, displacement: Array) -> float:
         """Do as `Body` says, from the energy alone."""
@@ -111,7 +111,7 @@ class FiniteBody(MeshElements):
         """Do as `Body` says."""
         H = self.gradient(displacement)
         log, volume = self._logarithm(H)
-        inverse, exceeds = _turned(H)
+        inverse, exceeds = _inverse_and_excess(H)
         G = self.elements.shear[:, None] * slopes(self.elements.stiffening[:, None], _excess(H, log))[0]
         pressure = self.elements.lame[:, None] * (self.elements.modes @ volume[:, :, None])[:, :, 0]
         stress = self.elements.weight[:, :, None, None] * (
@@ -134,14 +134,14 @@ class FiniteBody(MeshElements):
         log = self.volume(H[..., 0, 0], H[..., 0, 1], H[..., 1, 0], H[..., 1, 1])
         return log, self.volume_modes(log)
 
-    def _stored(self, H: Array) -> complex:
+    def _energy(self, H: Array) -> complex:
         log, volume = self._logarithm(H)
         grown = shape(self.elements.stiffening[:, None], _excess(H, log))
         shear = np.sum(self.elements.weight * self.elements.shear[:, None] / 2.0 * grown)
         return complex(shear + np.sum(self.elements.lame / 2.0 * (volume**2).T))
 
 
-def _turned(H: Array) -> tuple[Array, Array]:
+def _inverse_and_excess(H: Array) -> tuple[Array, Array]:
     """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
     grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
     across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
@@ -223,7 +223,7 @@ class CondensedFinite:
         largest = self._advance(BodyState(u, pressure), moved, scale, after)
         return after.u, after.pressure, largest
 
-    def stored(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked
+    def stored_energy(self, u: Array, reaction: Array) -> float:  # noqa: ARG002 - as every body is asked
         """Return the energy stored in the body at `u` (nodes, 2) [N mm per mm]."""
         return self.body.energy(u)
 

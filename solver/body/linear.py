@@ -13,7 +13,7 @@ from numpy.linalg import LinAlgError
 from solver._kernels import elements as element_loops
 from solver._kernels.multifrontal import DEFINITE
 from solver.arrays import Array, ElementSystem, Indices, determinant, inverse
-from solver.body import CondensedLinear, MeshElements, Patches, Probes, held, integrated
+from solver.body import CondensedLinear, MeshElements, Patches, Probes, held_directions, integrate_elements
 from solver.body.validation import check_body, check_held, check_loads, loose
 from solver.constitutive import Elasticity
 from solver.linalg import Elimination, Some, symbolic_factorization
@@ -68,7 +68,7 @@ class LinearElimination:
         Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
         """
         plan = symbolic_factorization(mesh)
-        self.elastic = Elastic(*integrated(mesh, materials, plan.unknown))
+        self.elastic = Elastic(*integrate_elements(mesh, materials, plan.unknown))
         count = len(mesh.elements)
         still, self._inverse, self._recovery_matrix = (
             np.zeros(mesh.nodes.shape),
@@ -114,13 +114,13 @@ class LinearElimination:
 
         With `only` (node numbers), other nodes may be left at 0.
         """
-        mesh, (used, some) = self.elastic.mesh, self._used(only)
+        mesh, (used, some) = self.elastic.mesh, self._elements_of(only)
         out = np.zeros((*mesh.nodes.shape, skin.shape[1]))
         self._inside.displace(carried[0], skin.T, some, out)
         out[some.nodes[:, 8]] += carried[1][used, :, None]
         return out
 
-    def _used(self, only: Indices | None) -> tuple[Indices, Some]:
+    def _elements_of(self, only: Indices | None) -> tuple[Indices, Some]:
         """Return the elements of the nodes `only`, or of all."""
         key = None if only is None else only.tobytes()
         if key not in self._some:
@@ -128,7 +128,7 @@ class LinearElimination:
             wanted = np.full(len(self.elastic.mesh.nodes), only is None)
             wanted[only] = True
             used = np.flatnonzero(wanted[of.nodes].any(axis=1))
-            parts = self._inside.needed(of.unknown[used])
+            parts = self._inside.parts_holding(of.unknown[used])
             self._some[key] = used, Some(parts, of.nodes[used], of.unknown[used], self._recovery_matrix[used])
         return self._some[key]
 
@@ -181,7 +181,7 @@ class LinearBody:
         if prescribed is not None:
             force -= mesh.assemble(whole.elastic.forces(moved[mesh.elements]))
         carried = whole.condense(force) if force.any() else whole.unloaded
-        condensed = _condensed(mesh, whole.stiffness, whole.skin_load(carried), free)
+        condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
             _ = condensed.compliance  # which is none where the body can move
         return LinearBody(mesh, whole.elastic, whole, carried, condensed, moved)
@@ -210,7 +210,7 @@ class LinearBody:
         k = len(self.mesh.skin)
         return self.displacement(np.eye(2 * k).reshape(k, 2, 2 * k)) - self.displacement(np.zeros((k, 2, 1)))
 
-    def linearised(self, displacement: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
+    def linearise_about(self, displacement: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
         """Return the body about a `displacement` (nodes, 2), and what makes displacements of its skin's steps (k, 2).
 
         The forces it leaves over are those of the elements, so that a step from it takes round-off out of a state: one
@@ -232,7 +232,7 @@ class LinearBody:
         def recover(u: Array) -> Array:
             return self.elimination.displacement(u.reshape(-1, 1), carried)[:, :, 0]
 
-        return self.condensed.loaded(self.elimination.skin_load(carried)), recover
+        return self.condensed.with_load(self.elimination.skin_load(carried)), recover
 
     def following(self, skin: Array) -> Array:
         """Do as `Body` says."""
@@ -315,7 +315,7 @@ class LinearPatches(Patches):
         roots = np.zeros((len(first), int(place.max(initial=0)) + 1, 21))  # d/dx and d/dy of shape functions, modes
         sizes = np.sqrt(self.endings.weights[order])[:, None]
         roots[part, place, :18] = np.swapaxes(probes.gradient[order], 1, 2).reshape(-1, 18) * sizes
-        roots[part, place, 18:] = self.elements.combined(probes)[order] * sizes
+        roots[part, place, 18:] = self.elements.modes_at(probes)[order] * sizes
         sums = np.swapaxes(roots, 1, 2) @ roots
         xx, yx, yy, element = sums[:, :9, :9], sums[:, 9:18, :9], sums[:, 9:18, 9:18], element[first]
         form = np.empty((len(first), 9, 2, 9, 2))  # of eps:eps
@@ -330,13 +330,13 @@ class LinearPatches(Patches):
         return element, patch[first], shear * form.reshape(-1, 18, 18) + lame / 2.0 * volume
 
 
-def _condensed(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
+def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
     """Return the skin of a body by its `stiffness` (2 k, 2 k) and dead `load` (2 k,)."""
     place = mesh.nodes[mesh.skin]
     (x, y), one, zero = place.T, np.ones(len(place)), np.zeros(len(place))
     shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
     rigid = np.stack(list(shapes.values()), axis=1) @ loose(mesh)
-    skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held(mesh))
+    skin = CondensedLinear(place, stiffness, load, skin_lengths(mesh), held_directions(mesh))
     skin.springs = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid
     skin.motions = np.stack([shapes[name] for name in free], axis=1) if free else np.zeros((2 * len(place), 0))
     return skin

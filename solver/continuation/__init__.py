@@ -52,7 +52,7 @@ class BranchControl:
 BRANCH = BranchControl()
 
 
-class Followed(Protocol):
+class BranchBody(Protocol):
     """What a branch is followed on: the finger, or a body handed in."""
 
     @property
@@ -86,7 +86,7 @@ class Branch:
         return self.states[-1]
 
 
-def continue_branch(finger: Followed, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
+def continue_branch(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
     """Do as `follow`, and go on where the branch only turns back for a moment."""
     branch = follow(finger, start, by, target, folds)
     for _ in range(BRANCH.hops):
@@ -98,7 +98,7 @@ def continue_branch(finger: Followed, start: EquilibriumState, by: int, target: 
     return branch
 
 
-def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
+def _beyond(finger: BranchBody, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
     """Return a state of the branch a little beyond its end, None where it ends there indeed.
 
     Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
@@ -123,7 +123,7 @@ def _beyond(finger: Followed, branch: Branch, by: int, target: float, folds: flo
     return None
 
 
-def follow(finger: Followed, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
+def follow(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
     It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length (`folds_at`).
@@ -175,7 +175,7 @@ class _Point:
 
 
 def _further(
-    finger: Followed,
+    finger: BranchBody,
     last: _Point,
     by: int,
     direction: Array,
@@ -207,7 +207,7 @@ def with_value(load: LoadState, by: int, value: float) -> LoadState:
     return load._replace(mu=value) if by == BY_FRICTION else load._replace(depth=value)
 
 
-def jumped_branch(finger: Followed, before: EquilibriumState, after: EquilibriumState) -> bool:
+def jumped_branch(finger: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
     """Return whether a step went to another branch, where the skin is folded."""
     one, other = finger.skin_compression(before), finger.skin_compression(after)
     return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
@@ -244,7 +244,7 @@ def _next(
             change = (length - direction @ (gone + to) - rate * (now - value)) / ahead
         step = to + change * along
         load = with_value(load, by, now + change)
-        state, largest, changed = newton.moved(state, load, step * root, newton.skin_x)
+        state, largest, changed = newton.apply_step(state, load, step * root, newton.skin_x)
         gone = gone + step
         if not largest < 10.0:
             return None

@@ -18,7 +18,7 @@ from solver.arrays import Array
 from solver.continuation import BRANCH, LARGEST_MU, Branch, continue_branch, folds_at, follow
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.failures import NoSteadyState, NotConverged
 from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Scene
@@ -107,32 +107,32 @@ class _Search:
         """Return the finger on a rough mesh, or on one that is fine at the arc position of a `fold` [mm]."""
         return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=MARGIN, fold=fold))
 
-    def followed(self, finger: FiniteFinger, start: EquilibriumState) -> Branch:
+    def trace_branch(self, finger: FiniteFinger, start: EquilibriumState) -> Branch:
         """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and the target is a step away."""
         target = self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
         branch = continue_branch(finger, start, self.by, target, self.folds)
         if branch.limited or target == self.target:
             return branch
         load = branch.last.load._replace(mu=self.target)
-        last = settled(finger.newton, load, branch.last, BRANCH.tolerance)
+        last = solve_full_slip(finger.newton, load, branch.last, BRANCH.tolerance)
         return Branch((*branch.states, last), self.target, limited=False)
 
-    def followed_finely(
+    def trace_on_fine_mesh(
         self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
     ) -> tuple[FiniteFinger, Branch, float]:
         """Follow the branch on a mesh that is fine where the last of `states` is squeezed most; return that place."""
-        place = _squeezed(finger, states[-1])
+        place = _place_of_least_stretch(finger, states[-1])
         fine = self.finger(place)
-        return fine, self.followed(fine, self._begun(fine, finger, states)), place
+        return fine, self.trace_branch(fine, self._start_on_fine_mesh(fine, finger, states)), place
 
     def start(self, finger: FiniteFinger) -> EquilibriumState:
         """Return the state at which the branch begins. Raises NotConverged."""
         if self.by == BY_FRICTION:
-            return settled(finger.newton, self.load, None, BRANCH.tolerance)
+            return solve_full_slip(finger.newton, self.load, None, BRANCH.tolerance)
         for part in PROOF.starts:
             with suppress(NotConverged):
                 load = self.load._replace(depth=part * self.target)
-                start = settled(finger.newton, load, None, BRANCH.tolerance)
+                start = solve_full_slip(finger.newton, load, None, BRANCH.tolerance)
                 if sound(finger, start):
                     return start
         raise NotConverged(
@@ -140,13 +140,15 @@ class _Search:
             "mm: ask for less friction"
         )
 
-    def _begun(self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]) -> EquilibriumState:
+    def _start_on_fine_mesh(
+        self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]
+    ) -> EquilibriumState:
         """Return the state on the `fine` mesh of the last of `states` that the rough mesh has as well as that."""
         for state in reversed(states):
             if rough.skin_compression(state).lowest < PROOF.smooth:
                 continue
             with suppress(NotConverged):
-                start = settled(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
+                start = solve_full_slip(fine.newton, state.load, fine.transfer(state, rough), BRANCH.tolerance)
                 if sound(fine, start) or state is states[0]:
                     return start
         return self.start(fine)
@@ -156,17 +158,17 @@ class _Search:
 def _reach(search: _Search) -> Reach:
     """Answer, and keep what was answered: all meshes of a scene ask the same."""
     finger = search.finger()
-    branch = search.followed(finger, search.start(finger))
+    branch = search.trace_branch(finger, search.start(finger))
     if branch.limited or not sound(finger, branch.last, PROOF.plain):
-        finger, branch, place = search.followed_finely(finger, branch.states)
-        if abs(_squeezed(finger, branch.last) - place) > PROOF.astray:
-            finger, branch, _ = search.followed_finely(finger, branch.states)
+        finger, branch, place = search.trace_on_fine_mesh(finger, branch.states)
+        if abs(_place_of_least_stretch(finger, branch.last) - place) > PROOF.astray:
+            finger, branch, _ = search.trace_on_fine_mesh(finger, branch.states)
     least = finger.skin_compression(branch.last).least
     numbers = finger.numbers([branch.last])[0]
     return Reach(float(branch.value), branch.limited, branch.lost, least, search.folds, numbers)
 
 
-def _squeezed(finger: FiniteFinger, state: EquilibriumState) -> float:
+def _place_of_least_stretch(finger: FiniteFinger, state: EquilibriumState) -> float:
     """Return the arc position where the skin is squeezed most [mm]."""
     place = finger.skin_compression(state).place
     return float(finger.geometry.arcs[place : place + 2].mean())
@@ -185,15 +187,15 @@ def steady(
     limits where the branch ends before, NotConverged where it cannot be begun, Cancelled.
     """
     candidates: list[EquilibriumState] = []
-    for state in _tried(finger.newton, load, tolerance, start):
+    for state in _direct_states(finger.newton, load, tolerance, start):
         if sound(finger, state, PROOF.plain):
             return state
         candidates.append(state)
     proof = _reach_towards(finger.scene, load)
     if proof.lost:
-        raise _not_known(load, proof.value)
+        raise _undecided(load, proof.value)
     if proof.limited:
-        raise _refused(finger.scene, load, proof)
+        raise _refusal(finger.scene, load, proof)
     for state in candidates:
         if _proven(finger, state, proof):
             return state
@@ -202,10 +204,10 @@ def steady(
             f"At {load.depth:.3g} mm of indentation there is settled sliding at mu = {load.mu:.3g}, nearly all of the "
             "skin slipping at the bound, and this mesh does not find it: another tolerance has another mesh"
         )
-    begin = settled(finger.newton, load._replace(mu=0.0), None, tolerance)
+    begin = solve_full_slip(finger.newton, load._replace(mu=0.0), None, tolerance)
     branch = follow(finger, begin, BY_FRICTION, load.mu, 0.0)
     if not branch.limited:
-        state = settled(finger.newton, load, branch.last, tolerance)
+        state = solve_full_slip(finger.newton, load, branch.last, tolerance)
         if _proven(finger, state, proof):
             return state
     raise NotConverged(
@@ -241,10 +243,10 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     with suppress(NotConverged):
         proof = _reach_towards(scene, load)
         if proof.limited and not proof.lost and proof.value < PROOF.far * load.mu:
-            raise _refused(scene, load, proof)
+            raise _refusal(scene, load, proof)
 
 
-def _tried(
+def _direct_states(
     newton: Newton, load: LoadState, tolerance: float, start: EquilibriumState | None
 ) -> Iterator[EquilibriumState]:
     """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
@@ -253,11 +255,11 @@ def _tried(
     """
     ways: list[Callable[[], EquilibriumState]] = []
     if not steep(load):
-        ways.append(lambda: settled(newton, load, None, tolerance))
+        ways.append(lambda: solve_full_slip(newton, load, None, tolerance))
     if load.tau < np.inf:
         ways.append(lambda: all_at_the_bound(newton, load, tolerance))
     if start is not None:
-        ways.insert(0, lambda: settled(newton, load, start, tolerance))
+        ways.insert(0, lambda: solve_full_slip(newton, load, start, tolerance))
     for way in ways:
         with suppress(NotConverged):
             yield way()
@@ -290,11 +292,11 @@ def _reach_towards(scene: Scene, load: LoadState) -> Reach:
     return proof
 
 
-def _refused(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
+def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
     """Return why there is no state: with both limits, each only where no state lies a little beyond it."""
     largest, depth = proof.value, None
     if not _none_at(scene, load._replace(mu=(1.0 + APART) * largest), load):
-        return _not_known(load, largest)
+        return _undecided(load, largest)
     ends = (
         "the skin behind the contact folds"
         if proof.near or all(tissue.law != "ogden" for tissue in scene.materials.by_region)
@@ -315,7 +317,7 @@ def _refused(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | Not
     )
 
 
-def _not_known(load: LoadState, largest: float) -> NotConverged:
+def _undecided(load: LoadState, largest: float) -> NotConverged:
     return NotConverged(
         f"At {load.depth:.3g} mm of indentation settled sliding was followed up to mu = {largest:.3g} and lost "
         f"there; whether there is any at mu = {load.mu:.3g} is not known: ask for less friction or depth"
@@ -348,6 +350,6 @@ def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float) -> Equil
     A low bound with a large coefficient of friction acts where hardly anything presses: there slip is a bad guess.
     Raises NotConverged.
     """
-    bare = settled(newton, load._replace(mu=0.0), None, tolerance)
+    bare = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)
     state = np.where(bare.touching, SHEAR_LIMITED, OPEN).astype(bare.state.dtype)
-    return settled(newton, load, replace(bare, state=state, load=load._replace(tau=0.0)), tolerance)
+    return solve_full_slip(newton, load, replace(bare, state=state, load=load._replace(tau=0.0)), tolerance)

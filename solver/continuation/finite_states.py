@@ -17,7 +17,7 @@ from solver.continuation.existence import APART, Reach, all_at_the_bound, of_dep
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_stepping
 from solver.equilibrium.finger import FiniteFinger
 from solver.equilibrium.load_path import march, slide_or_hold
-from solver.equilibrium.load_stepping import balanced, sliding_load
+from solver.equilibrium.load_stepping import sliding_load, solve_under_forces
 from solver.failures import NoSteadyState, NotConverged
 from solver.progress import report_progress
 from solver.scene import Scene
@@ -39,7 +39,7 @@ class ForceSearch:
 FORCE_SEARCH = ForceSearch()
 
 
-def settled(
+def settled_state(
     finger: FiniteFinger, scene: Scene, start: EquilibriumState | None = None, times: float = 1.0
 ) -> EquilibriumState:
     """Return the settled state of a scene, sought first from `start`, a proven state nearby.
@@ -50,7 +50,7 @@ def settled(
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
         return march(scene, finger, times).last
     if scene.normal_force is not None:
-        return _settled_under(finger, scene, scene.normal_force, start, times)
+        return _state_under_force(finger, scene, scene.normal_force, start, times)
     return steady(finger, sliding_load(scene), start=start)
 
 
@@ -62,7 +62,7 @@ def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> Equil
             state = newton.settle(start, sliding_load(scene), limit=FORCE_SEARCH.few)
         else:
             near = replace(start, load=sliding_load(scene)._replace(depth=start.load.depth, travel=start.load.travel))
-            state = balanced(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.few)
+            state = solve_under_forces(newton, near, ForceLoad(force, None), limit=FORCE_SEARCH.few)
             state = newton.settle(state, state.load, limit=FORCE_SEARCH.few)
         return state if stands(finger, state) else None
     except NotConverged:
@@ -70,7 +70,7 @@ def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> Equil
 
 
 def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
-    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled`.
+    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled_state`.
 
     It is sought first from `near`, the settled state of a surface that slides the same way.
     """
@@ -78,18 +78,18 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
         alike = near.load.sense == -(scene.loading.direction or 1)
         near = replace(near, iterations=0) if alike else None
     if scene.normal_force is not None or (scene.loading.direction == 0 and scene.friction.mu > 0.0):
-        return settled(finger, scene, near)
+        return settled_state(finger, scene, near)
     load = sliding_load(scene)
     if near is not None:
         with suppress(NotConverged):
-            return load_stepping.settled(finger.newton, load, near, FORCE_SEARCH.leading)
-    return load_stepping.settled(finger.newton, load, None, FORCE_SEARCH.leading)
+            return load_stepping.solve_full_slip(finger.newton, load, near, FORCE_SEARCH.leading)
+    return load_stepping.solve_full_slip(finger.newton, load, None, FORCE_SEARCH.leading)
 
 
-def _settled_under(
+def _state_under_force(
     finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, times: float
 ) -> EquilibriumState:
-    """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled`."""
+    """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled_state`."""
 
     def hold() -> EquilibriumState:
         return march(scene, finger, times).last
@@ -128,17 +128,19 @@ def _sliding_under(
     if start is not None:
         near = replace(start, load=load._replace(depth=start.load.depth, travel=start.load.travel))
         with suppress(NotConverged):
-            state = _at_force(newton, near, force) if capped else balanced(newton, near, ForceLoad(force, None))
+            state = (
+                _at_force(newton, near, force) if capped else solve_under_forces(newton, near, ForceLoad(force, None))
+            )
             return steady(finger, state.load, start=state)
     if capped:
         with suppress(NotConverged):
-            *_, bare = _grown(newton, load._replace(mu=0.0), force)
+            *_, bare = _increase_force(newton, load._replace(mu=0.0), force)
             begin = all_at_the_bound(newton, load._replace(depth=bare.load.depth), FORCE_SEARCH.leading)
             state = _at_force(newton, begin, force)
             return steady(finger, state.load, start=state)
     last: EquilibriumState | None = None
     try:
-        for reached in _grown(newton, load, force):
+        for reached in _increase_force(newton, load, force):
             last = reached
     except NotConverged:
         if last is None:
@@ -148,7 +150,7 @@ def _sliding_under(
     return steady(finger, last.load, start=last)
 
 
-def _grown(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
+def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[EquilibriumState]:
     """Yield slides with the friction of `load` as the normal force grows to `force`. Raises NotConverged."""
     begin = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, load.mu, load.tau, load.sense))
     grows = [ForceLoad(force * part, None) for part in (0.02, 0.1, 0.25, 0.5, 0.75, 1.0)]
@@ -159,7 +161,7 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
     """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
-        state = load_stepping.settled(newton, state.load._replace(depth=depth), state)
+        state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
         if abs(state.force[1] / force - 1.0) < FORCE_SEARCH.met:
             return state
         if not newton.linearise(state, state.load, newton.skin_x):
@@ -177,16 +179,18 @@ def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> Equi
     """Return settled sliding under `force` [N/mm] deeper than `state`, from where it did not grow on.
 
     How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
-    deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled`.
+    deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled_state`.
     """
     proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
     if proof.limited and not proof.lost and proof.numbers[1] < force:
-        state = _risen_to(finger, state, proof, force)
+        state = _slide_reaching_force(finger, state, proof, force)
     state = _at_force(finger.newton, state, force)
     return steady(finger, state.load, start=state)
 
 
-def _risen_to(finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float) -> EquilibriumState:
+def _slide_reaching_force(
+    finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float
+) -> EquilibriumState:
     """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
 
     Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
@@ -203,7 +207,7 @@ def _risen_to(finger: FiniteFinger, state: EquilibriumState, proof: Reach, force
     return state
 
 
-def loaded(
+def solve_dead_load(
     body: FiniteBody,
     loads: Array | None = None,
     prescribed: Array | None = None,
@@ -223,7 +227,7 @@ def loaded(
     check_loads(body.mesh, loads, prescribed)
     loads, prescribed = (None if array is None else np.asarray(array, np.float64) for array in (loads, prescribed))
     state = EquilibriumState.undeformed(condensed) if start is None else start
-    load = (state.load if load is None else load).checked()
+    load = (state.load if load is None else load).validate()
     state = replace(state, load=load)
     vector = np.zeros(body.size) if loads is None else _on_unknowns(body, loads)
     driven = body.mesh.driven
@@ -266,14 +270,14 @@ def steady_body(
     """
     newton = Newton(whole.condensed)
     body = _OwnBody(whole, newton)
-    bare = load_stepping.settled(newton, load._replace(mu=0.0), start)
+    bare = load_stepping.solve_full_slip(newton, load._replace(mu=0.0), start)
     branch = continue_branch(body, bare, BY_FRICTION, min(load.mu, LARGEST_MU), folds_at(skin))
     where = f"at {load.depth:.4g} mm settled sliding was followed up to mu = {branch.value:.3g}"
     if branch.limited and (branch.lost or body.spoilt(branch.last)):
         raise NotConverged(f"{where} and lost there; whether there is any at mu = {load.mu:.3g} is not known")
     if branch.limited:
         raise NoSteadyState(f"{where}, where it ends on this mesh", limit_mu=branch.value)
-    state = load_stepping.settled(newton, load, branch.last)
+    state = load_stepping.solve_full_slip(newton, load, branch.last)
     if jumped_branch(body, branch.last, state):
         raise NotConverged(f"{where}, and beyond only with its skin folded")
     return state
@@ -289,7 +293,7 @@ class _OwnBody:
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
         """Return how far the skin is squeezed, and whether it has a crease."""
         mesh, every = self.body.mesh, np.ones(len(state.state) // 2, bool)
-        return SkinCompression(*skin_loops.pinched(mesh.nodes, state.u, mesh.skin, every, state.state, 0))
+        return SkinCompression(*skin_loops.measure_compression(mesh.nodes, state.u, mesh.skin, every, state.state, 0))
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""

@@ -20,8 +20,8 @@ from solver.arrays import Array
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import march, slide_or_hold
-from solver.equilibrium.load_stepping import forces_of, slide_beside, slide_under, sliding_load
-from solver.equilibrium.load_stepping import settled as full_slip
+from solver.equilibrium.load_stepping import forces_of, slide_from_guess, slide_under, sliding_load
+from solver.equilibrium.load_stepping import solve_full_slip as full_slip
 from solver.failures import ContactLost, NoSteadyState, NotConverged
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -66,7 +66,7 @@ def continue_in_friction(
     while reached < load.mu and step > LIMIT_SEARCH.close * max(reached, min(0.01, load.mu)):
         aim = min(reached + step, load.mu)
         try:
-            further = slide_beside(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
+            further = slide_from_guess(newton, load._replace(mu=aim), state.state, force, LIMIT_SEARCH.patience)
         except ContactLost:
             step /= 2.0
             continue
@@ -174,7 +174,7 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
     return sqrt(low * high)
 
 
-def settled(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
+def settled_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
     """Return the settled state, without its history where it has none left, else in `times` the usual load steps.
 
     Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where a given drag is more than
@@ -216,7 +216,7 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
     if force is None or scene.loading.direction == 0 or state.sticking > 0.0:
         return False
     try:
-        harder = slide_beside(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
+        harder = slide_from_guess(finger.newton, sliding_load(scene), state.state, (1.0 + LIMIT_SEARCH.nudge) * force)
     except ContactLost:
         return False
     return harder.load.depth < state.load.depth
@@ -231,7 +231,7 @@ def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
     within_reach(scene, depth, most)
 
 
-def refined(
+def remove_round_off(
     scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array
 ) -> tuple[EquilibriumState, Array]:
     """Return a state and its displacement (nodes, 2) once more, with less round-off: balanced, the skin on the surface.
@@ -239,10 +239,10 @@ def refined(
     The elimination leaves some 1e-13 of the forces unbalanced, which falls by processor: a Newton step from the forces
     of the elements takes it out. The contact states stay if they can.
     """
-    about, recover = finger.body.linearised(displacement)
+    about, recover = finger.body.linearise_about(displacement)
     newton = Newton(about)
     try:
-        again = newton.solved(
+        again = newton.solve_linear(
             replace(state, u=np.zeros_like(state.u)), state.load, newton.skin_x, forces_of(scene, state.load)
         )
     except ContactLost:
@@ -253,14 +253,14 @@ def refined(
 def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
     """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
 
-    Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled`.
+    Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled_state`.
     """
     try:
-        return settled(scene, finger)
+        return settled_state(scene, finger)
     except NoSteadyState:
         if not scene.loading.dragged:
             raise
-        return settled(scene.without_drag(), finger)
+        return settled_state(scene.without_drag(), finger)
     except ContactLost:
         if scene.normal_force is not None or scene.loading.direction == 0:
             raise
@@ -278,7 +278,7 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
     """
     direction = scene.loading.direction
     try:
-        state = settled(scene, finger, times)
+        state = settled_state(scene, finger, times)
         # in states that no sliding leads to tissue is turned inside out somewhere
         if direction == 0 or state.load.path_dependent or finger.body.smallest_det(finger.displacement(state)) > 0.0:
             return state

@@ -92,7 +92,7 @@ class LoadState(NamedTuple):
         )
         return LoadState(depth, self.mu + part * (other.mu - self.mu), tau, other.sense, travel)
 
-    def checked(self) -> "LoadState":
+    def validate(self) -> "LoadState":
         """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
         law = FrictionLaw(float(self.mu), float(self.tau))
         if self.sense not in (-1, 0, 1):
@@ -111,7 +111,7 @@ class ForceLoad(NamedTuple):
     tangential: float | None  # [N/mm]; None: `travel` is given instead
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
-    def checked(self) -> "ForceLoad":
+    def validate(self) -> "ForceLoad":
         """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
         drag = None if self.tangential is None else finite("tangential", self.tangential)
         return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
@@ -143,7 +143,7 @@ class EquilibriumState:
         """Return the body before anything touches it, under a surface with the friction of `load`."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
-        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.checked(), 0)
+        return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.validate(), 0)
 
     def place(self, body: CondensedBody) -> Array:
         """Return the deformed positions of the skin's nodes (k, 2) [mm]."""
@@ -255,7 +255,7 @@ class Newton:
         """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
-    def moved(
+    def apply_step(
         self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
         """Return the state after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
@@ -277,14 +277,14 @@ class Newton:
         """
         x = start.place(self.condensed)[:, 0].copy()  # as loops are compiled for
         anchor = x + (load.travel - start.load.travel)
-        begin = self._entered(start, load, x)
+        begin = self._enter(start, load, x)
         if self.condensed.constant:
             if self.condensed.motions.shape[1]:
-                begin = lowered(self.condensed, replace(begin, load=load))
-            return self.solved(begin, load, anchor)
-        return self._iterated(begin, load, anchor, tolerance, limit)
+                begin = lower_onto_surface(self.condensed, replace(begin, load=load))
+            return self.solve_linear(begin, load, anchor)
+        return self._iterate(begin, load, anchor, tolerance, limit)
 
-    def _iterated(
+    def _iterate(
         self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
     ) -> EquilibriumState:
         """Do as `settle` from `start`, whose states are those that `load` brings at once, `anchor` (k,) being known."""
@@ -308,7 +308,7 @@ class Newton:
                 state = before
             elif state is not before:
                 before, scale = state, min(1.0, 2.0 * scale)
-            state, largest, changed = self.moved(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
+            state, largest, changed = self.apply_step(before, load, self.steps[:, EQUILIBRIUM].copy(), anchor, scale)
             if not largest < CONTROL.unbounded:
                 raise NotConverged("the displacements grow without bound")
             fall = min(largest / last, 1.0) if last > 0.0 else 1.0
@@ -326,7 +326,7 @@ class Newton:
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
 
-    def solved(
+    def solve_linear(
         self,
         state: EquilibriumState,
         load: LoadState,
@@ -355,14 +355,14 @@ class Newton:
             u, state.pressure, contact.state.copy(), contact.sense.copy(), contact.reaction.copy(), load, iterations
         )
 
-    def _entered(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
+    def _enter(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
         """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `load` brings at once."""
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
         self._meet(states, self._position(start.u, load, x), load_arguments(load))
         return replace(start, state=states.state, sense=states.sense)
 
 
-def lowered(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:
+def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:
     """Return the state with its lowest node on the surface where nothing touches: forces need one that does.
 
     A body that nothing holds needs as many nodes as it has motions.

@@ -109,12 +109,12 @@ class Finger(ABC, Generic[Placed]):
 
     def ending_and_middle(self, states: Sequence[EquilibriumState]) -> Array:
         """Return every quantity at the reference ending and in its middle (c, q, 2) of several states."""
-        displacement = self.recovered(states, self.ending, self.point)
+        displacement = self.recover(states, self.ending, self.point)
         return np.stack([patch.responses(displacement)[:, 0].T for patch in (self.ending, self.point)], axis=2)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
         """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""
-        sed = self.ending.average(self.recovered(states, self.ending))[0]
+        sed = self.ending.average(self.recover(states, self.ending))[0]
         return np.column_stack([sed, [state.force[::-1] for state in states]])
 
     def all_numbers(self, states: Sequence[EquilibriumState]) -> Array:
@@ -123,7 +123,7 @@ class Finger(ABC, Generic[Placed]):
         They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
         quantity at the ending.
         """
-        return self._numbers(states, self.recovered(states, self.ending, self.point))
+        return self._numbers(states, self.recover(states, self.ending, self.point))
 
     def _numbers(self, states: Sequence[EquilibriumState], displacement: Array) -> Array:
         responses = self.ending.responses(displacement)[:, 0].T
@@ -132,14 +132,14 @@ class Finger(ABC, Generic[Placed]):
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
         """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
-        displacement = self.recovered(states, self.ending, self.point, self.row)
+        displacement = self.recover(states, self.ending, self.point, self.row)
         return np.hstack([self._numbers(states, displacement), self.row.average(displacement).T])
 
     def responses(self, states: Sequence[EquilibriumState]) -> Array:
         """Return every quantity at the reference ending of several states (c, q)."""
-        return self.ending.responses(self.recovered(states, self.ending))[:, 0].T
+        return self.ending.responses(self.recover(states, self.ending))[:, 0].T
 
-    def recovered(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
+    def recover(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
         """Return the displacements (nodes, 2, c) of states, of the nodes that patches need alone."""
         return self.displacements(states, distinct(np.concatenate([patch.nodes() for patch in patches])))
 
@@ -164,9 +164,9 @@ class LinearFinger(Finger[LinearPatches]):
     @classmethod
     def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
         """Do as `Finger` says."""
-        begun = perf_counter()
+        start = perf_counter()
         body = LinearBody.of(geometry.mesh, settled_moduli(scene.materials), checked=True)
-        return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - begun)
+        return cls(scene, geometry, Newton(body.condensed), body, perf_counter() - start)
 
     def patches(self, placed: Endings) -> LinearPatches:
         """Do as `Finger` says."""
@@ -215,7 +215,7 @@ class FiniteFinger(Finger[FinitePatches]):
         """Return `state`, found on `other`, as a start on this mesh."""
         if other not in self._bridges:
             self._bridges[other] = MeshTransfer.of(other.places, self.places)
-        return self._bridges[other].carried(state)
+        return self._bridges[other].transfer_state(state)
 
     @cached_property
     def _bridges(self) -> "WeakKeyDictionary[FiniteFinger, MeshTransfer]":
@@ -230,7 +230,9 @@ class FiniteFinger(Finger[FinitePatches]):
         """Return how far the skin is squeezed, and whether it has a crease."""
         at = self.geometry
         touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first of it that may touch
-        return SkinCompression(*skin_loops.pinched(at.mesh.nodes, state.u, at.whole, at.loose, state.state, touchable))
+        return SkinCompression(
+            *skin_loops.measure_compression(at.mesh.nodes, state.u, at.whole, at.loose, state.state, touchable)
+        )
 
     def crosses(self, state: EquilibriumState) -> bool:
         """Return whether the skin crosses itself."""
@@ -242,7 +244,7 @@ KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": Finit
 
 def settled_moduli(materials: Materials) -> list[Moduli]:
     """Return the small-strain moduli of a settled response: those that a tissue has once it has relaxed."""
-    return [law.relaxed for law in relaxing_laws(materials)]
+    return [law.long_term_moduli for law in relaxing_laws(materials)]
 
 
 def relaxing_laws(materials: Materials) -> list[Prony]:
@@ -253,7 +255,7 @@ def relaxing_laws(materials: Materials) -> list[Prony]:
 def finite_laws(materials: Materials) -> list[Law]:
     """Return the laws at finite strain of a settled response: the shear modulus relaxed, the bulk modulus as it was."""
     pairs = zip(materials.by_region, relaxing_laws(materials), strict=True)
-    return [_finite(tissue, law.relaxed) for tissue, law in pairs]
+    return [_finite(tissue, law.long_term_moduli) for tissue, law in pairs]
 
 
 def _finite(tissue: Material, moduli: Moduli) -> Law:
@@ -317,11 +319,11 @@ class MeshTransfer:
         nearest = np.abs(new.skin[:, None] - old.skin).argmin(axis=1)
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
-    def carried(self, state: EquilibriumState) -> EquilibriumState:
+    def transfer_state(self, state: EquilibriumState) -> EquilibriumState:
         """Return `state`, found on the old mesh, as a start on the new one."""
-        return self.touched(state, *self.fields(state.u, state.pressure))
+        return self.touch(state, *self.fields(state.u, state.pressure))
 
-    def touched(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
+    def touch(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
         """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `start` does."""
         state, sense = start.state[self.nearest], start.sense[self.nearest]
         state[state == STICK] = SLIP

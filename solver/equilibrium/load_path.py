@@ -12,11 +12,11 @@ import numpy as np
 
 from solver._kernels.compiling import OPEN, STICK
 from solver.body import Patches
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
-from solver.equilibrium.load_stepping import StepControl, advance, balanced, load_of
+from solver.equilibrium.load_stepping import StepControl, advance, load_of, solve_under_forces
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
-from solver.failures import NotConverged, SolveFailure, beyond_friction, followed_to
+from solver.failures import NotConverged, SolveFailure, at_end_of_path, beyond_friction
 from solver.progress import report_progress
 from solver.scene import Scene
 from solver.scene.tables import Loading
@@ -141,7 +141,7 @@ class Way:
         advance(step, self._refusal, CONTROL)
 
     def _refusal(self, _done: float, _part: float, reason: NotConverged) -> NotConverged:
-        return followed_to(self.last.load.depth, self.last.load.travel, reason)
+        return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
 
     def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
         """Return the state at `aim`, coming from `before`, and let tissues come to it. Raises NotConverged."""
@@ -151,12 +151,12 @@ class Way:
             before = replace(before, load=before.load._replace(sense=self.sense))
         if self.by_force:
             forces = ForceLoad(aim.press, aim.along) if self.by_drag else ForceLoad(aim.press, None, -aim.along)
-            state = balanced(self.newton, lowered(self.newton.condensed, before), forces)
+            state = solve_under_forces(self.newton, lower_onto_surface(self.newton.condensed, before), forces)
         else:
             load = before.load._replace(depth=aim.press, travel=-aim.along)
             state = self.newton.settle(before, load, self._tolerance)
         if self.tissue is not None:
-            self.energies.append(self.tissue.took(state, step))
+            self.energies.append(self.tissue.commit(state, step))
         return state
 
 
@@ -255,14 +255,14 @@ def follow(
             report(doing, share * (steps.press + number) / count)
         return
     for direction in loading.directions:
-        _slide(way, direction * loading.speed, steps, _Settled(way, finger, direction, times), report)
+        _slide(way, direction * loading.speed, steps, _EndOfSlide(way, finger, direction, times), report)
 
 
 def _why(way: Way) -> str:
     return ", since the tissues relax" if way.tissue is not None else ""
 
 
-class _Settled:
+class _EndOfSlide:
     """Whether a slide has settled, asked before every step of it."""
 
     def __init__(self, way: Way, finger: Finger[Patches], direction: int, times: float) -> None:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.arrays import Array
-from solver.equilibrium import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lowered
-from solver.failures import ContactLost, NotConverged, followed_to
+from solver.equilibrium import CONTROL, EQUILIBRIUM, EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
+from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
 
@@ -95,7 +95,7 @@ def march(
     load state or forces that are none.
     """
     state = EquilibriumState.undeformed(newton.condensed) if start is None else start
-    for number, aim in enumerate(aims := [aim.checked() for aim in course]):
+    for number, aim in enumerate(aims := [aim.validate() for aim in course]):
         if len(aims) > 1:
             report_progress("pressing and sliding step by step", number / len(aims))
 
@@ -104,11 +104,11 @@ def march(
             if isinstance(aim, ForceLoad):
                 drag, normal = begin.force.tolist()
                 there = ForceLoad(normal, drag, begin.load.travel).towards(aim, part)
-                state = balanced(newton, lowered(newton.condensed, state), there)
+                state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), there)
             else:
                 state = newton.settle(state, begin.load._replace(mu=aim.mu, tau=aim.tau).towards(aim, part), tolerance)
 
-        advance(step, lambda _done, _part, why: followed_to(state.load.depth, state.load.travel, why))
+        advance(step, lambda _done, _part, why: at_end_of_path(state.load.depth, state.load.travel, why))
         yield state
 
 
@@ -148,7 +148,7 @@ def find_root(at: Callable[[float], tuple[float, State]], start: float, close: f
     return None
 
 
-def corrected(
+def correct(
     newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, kept: bool = False
 ) -> tuple[EquilibriumState, float, int] | None:
     """Return the state after one iteration towards the forces, its largest displacement, and changed contact states.
@@ -163,11 +163,13 @@ def corrected(
         return None
     deeper, along = newton.system.motion.tolist()
     load = load._replace(depth=load.depth + deeper, travel=load.travel + along)
-    after, largest, changed = newton.moved(state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before)
+    after, largest, changed = newton.apply_step(
+        state, load, newton.steps[:, EQUILIBRIUM], origin + load.travel - before
+    )
     return after, max(largest, abs(deeper), abs(along)), changed
 
 
-def balanced(
+def solve_under_forces(
     newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-8, limit: int = 30
 ) -> EquilibriumState:
     """Return the equilibrium under `forces`, one backward Euler step from `start`, whose load has friction and sense.
@@ -175,15 +177,15 @@ def balanced(
     Raises NotConverged where `limit` iterations do not do it.
     """
     try:
-        state = _iterated(newton, start, start, forces, tolerance, limit)
+        state = _iterate(newton, start, start, forces, tolerance, limit)
     except ContactLost:  # as where friction is so small that all but one node slip
         if forces.tangential is None:
             raise
-        return _met_by_travel(newton, start, start, forces, tolerance, limit)
-    return _met_by_travel(newton, start, state, forces, tolerance, limit) if _slips_freely(state, forces) else state
+        return _find_travel(newton, start, start, forces, tolerance, limit)
+    return _find_travel(newton, start, state, forces, tolerance, limit) if _slips_freely(state, forces) else state
 
 
-def _iterated(
+def _iterate(
     newton: Newton, start: EquilibriumState, begin: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
     """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
@@ -192,9 +194,9 @@ def _iterated(
     if newton.condensed.constant:
         if forces.tangential is None:
             state = replace(state, load=state.load._replace(travel=forces.travel))
-        return newton.solved(state, state.load, origin + state.load.travel - before, forces)
+        return newton.solve_linear(state, state.load, origin + state.load.travel - before, forces)
     for _ in range(limit):
-        done = corrected(newton, state, forces, origin, before)
+        done = correct(newton, state, forces, origin, before)
         if done is None:
             raise NotConverged("the body would turn inside out, or nothing holds it along the surface")
         state, largest, changed = done
@@ -212,7 +214,7 @@ def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
     return abs(state.force[0] - forces.tangential) > UNMET * state.load.mu * forces.normal
 
 
-def _met_by_travel(
+def _find_travel(
     newton: Newton, start: EquilibriumState, state: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
     """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `state` on.
@@ -223,7 +225,7 @@ def _met_by_travel(
 
     def at(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
-        near = _iterated(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
+        near = _iterate(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
         return float(near.force[0]) - wanted, near
 
     there = find_root(at, state.load.travel, UNMET * state.load.mu * forces.normal)
@@ -250,7 +252,7 @@ class SlipControl:
 SLIP_CONTROL = SlipControl()
 
 
-def settled(
+def solve_full_slip(
     newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = 1e-10
 ) -> EquilibriumState:
     """Return the sliding state under `load` (sense +1 or -1), from undeformed or from `start`, in one step.
@@ -258,7 +260,7 @@ def settled(
     A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
     Cancelled, ValueError for a load state that is none.
     """
-    load = load.checked()
+    load = load.validate()
     if newton.condensed.constant:
         return _at_once(newton, load, start)
     state = EquilibriumState.undeformed(newton.condensed) if start is None else start
@@ -291,7 +293,7 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
     if load.sense == 0:
         raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
     if start is not None:
-        return slide_beside(newton, load, start.state)
+        return slide_from_guess(newton, load, start.state)
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     if newton.condensed.motions.shape[1]:  # how deep it lies, or a part of it, is found
         return _first_of(newton, load, float(np.ptp(height)), None)
@@ -301,12 +303,12 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
         guesses.append((above < 0.0, SHEAR_LIMITED, None))
     for low, slips, rounds in guesses[:-1]:
         with suppress(ContactLost):
-            return slide_beside(newton, load, np.where(low, slips, OPEN), rounds=rounds)
+            return slide_from_guess(newton, load, np.where(low, slips, OPEN), rounds=rounds)
     low, slips, _ = guesses[-1]
-    return slide_beside(newton, load, np.where(low, slips, OPEN))
+    return slide_from_guess(newton, load, np.where(low, slips, OPEN))
 
 
-def slide_beside(
+def slide_from_guess(
     newton: Newton, load: LoadState, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
 ) -> EquilibriumState:
     """Return the slide of a body of constant stiffness whose contact states are sought from a `guess` (k,) of them.
@@ -317,7 +319,7 @@ def slide_beside(
     states = guess.astype(np.int32)
     begin = replace(rest, state=states, sense=np.full(len(states), load.sense, np.int32))
     forces = None if force is None else ForceLoad(force, None)
-    return newton.solved(begin, load, newton.skin_x, forces, rounds)
+    return newton.solve_linear(begin, load, newton.skin_x, forces, rounds)
 
 
 def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:
@@ -338,7 +340,7 @@ def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None
     guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.parts]
     for guess in guesses[:-1]:
         with suppress(ContactLost):
-            state = slide_beside(newton, load, guess, force)
+            state = slide_from_guess(newton, load, guess, force)
             if force is None or state.load.depth > 0.0:
                 return state
-    return slide_beside(newton, load, guesses[-1], force)
+    return slide_from_guess(newton, load, guesses[-1], force)

@@ -26,7 +26,7 @@ from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import CondensedFinite, FiniteBody, FinitePatches
 from solver.body.linear import Elastic, LinearBody
 from solver.body.validation import check_body, check_driven, check_held, check_moduli, check_terms
-from solver.constitutive import Moduli, Past, Prony, kept, overstress
+from solver.constitutive import Moduli, Past, Prony, mean_decay, overstress
 from solver.equilibrium import EquilibriumState, Newton
 from solver.mesh import Mesh
 
@@ -40,7 +40,7 @@ class Tissue(Protocol):
         """Prepare a step in time [s] and return the iterations on the body that take it."""
         ...
 
-    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
+    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
         """Take the step that was made ready, to `state`; return the energy stored in each watched place [MPa]."""
         ...
 
@@ -101,7 +101,7 @@ class RelaxingBody:
         grown = (after - self.displacement)[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         self._left *= np.exp(-ages)[:, None, :]
-        self._left += kept(ages)[:, None, :] * grown[:, :, None]
+        self._left += mean_decay(ages)[:, None, :] * grown[:, :, None]
         self.displacement = after
 
     def energy(self, probes: Probes) -> Array:
@@ -109,7 +109,7 @@ class RelaxingBody:
         element = probes.element
         local = self.displacement[self.mesh.elements[element]].reshape(len(element), 18)
         shear, long_term = self.elastic.elements.shear[element], 1.0 - self._g[element].sum(axis=1)
-        rows = self.elastic.combined(probes)[:, None] @ self.elastic.divergence[element]
+        rows = self.elastic.modes_at(probes)[:, None] @ self.elastic.divergence[element]
         deviator, theta = self._strain(probes, rows, local)
         out = shear * long_term * deviator + self._bulk[element] / 2.0 * theta**2
         for term in range(self._left.shape[2]):
@@ -136,7 +136,7 @@ class RelaxingBody:
         local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
-        return left - local * np.sum(self._g * kept(ages), axis=1)[:, None]
+        return left - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]
 
     def _form(self, step: float) -> LinearBody:
         """Return the body as a length of step sees it [s]."""
@@ -167,7 +167,7 @@ class CondensedRelaxing(CondensedFinite):
         self.tensor = self.past.over(step).reshape(self.tensor.shape)
         self.equilibrium = None
 
-    def took(self, u: Array, step: float) -> None:
+    def commit(self, u: Array, step: float) -> None:
         """Remember the step that was made ready and led to displacements `u` (nodes, 2)."""
         self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
 
@@ -194,9 +194,9 @@ class CondensedRelaxing(CondensedFinite):
             len(body.elements.nodes), 18
         )
 
-    def stored(self, u: Array, reaction: Array) -> float:
+    def stored_energy(self, u: Array, reaction: Array) -> float:
         """Return the energy stored at `u`, with what the terms hold at the last instant remembered."""
-        return super().stored(u, reaction) + float(self.past.energy() @ self.body.elements.weight.ravel())
+        return super().stored_energy(u, reaction) + float(self.past.energy() @ self.body.elements.weight.ravel())
 
 
 def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
@@ -226,7 +226,7 @@ class LinearTissue:
         """Do as `Tissue` says."""
         return Newton(self._body.ready(step))
 
-    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - it was made ready
+    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - it was made ready
         """Do as `Tissue` says."""
         self._body.advance(state.u)
         return tuple(float(self._body.average(place)[0]) for place in self._watched)
@@ -248,9 +248,9 @@ class FiniteTissue:
         self._relaxing.ready(step)
         return self._newton
 
-    def took(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
+    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
         """Do as `Tissue` says."""
-        self._relaxing.took(state.u, step)
+        self._relaxing.commit(state.u, step)
         self._pasts = [
             past.after(at.deformation(state.u), step) for past, at in zip(self._pasts, self._watched, strict=True)
         ]

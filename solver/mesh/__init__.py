@@ -228,18 +228,18 @@ class Lines:
         """Number of elements across the tissue."""
         return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
 
-    def divided(self, columns: Indices, rows: Indices) -> "Lines":
+    def divide(self, columns: Indices, rows: Indices) -> "Lines":
         """Return the lines with each gap between two in so many equal parts: `columns` (a,) and `rows` (b,) of them."""
         bone, fat = max(len(self.bone) - 1, 0), len(self.fat) - 1
         return Lines(
-            _divided(self.arcs, columns),
-            _divided(self.bone, rows[:bone]),
-            _divided(self.fat, rows[bone : bone + fat]),
-            _divided(self.skin, rows[bone + fat :]),
+            _divide(self.arcs, columns),
+            _divide(self.bone, rows[:bone]),
+            _divide(self.fat, rows[bone : bone + fat]),
+            _divide(self.skin, rows[bone + fat :]),
         )
 
 
-def _divided(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
+def _divide(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
     gaps = zip(pairwise(lines), parts.tolist(), strict=True)
     return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])
 
@@ -286,14 +286,14 @@ class HalvedMesh:
             nodes,
             grid[:, _QUARTERS].reshape(-1, 9),
             np.repeat(mesh.region, 4),
-            _chained(mesh.skin, pairs, count),
+            _refine_chain(mesh.skin, pairs, count),
             *_by_axis(driven),
         )
         return HalvedMesh(halved, mesh, pairs, new, of)
 
     def chain(self, nodes: Indices) -> Indices:
         """Return a chain of edges (2 k + 1,) of the coarse mesh, end, middle, ... end, with its new nodes."""
-        return _chained(nodes, self._pairs, len(self._coarse.nodes))
+        return _refine_chain(nodes, self._pairs, len(self._coarse.nodes))
 
     def between(self, values: Array) -> Array:
         """Return nodal values (n, ...) of the coarse mesh with those of new nodes, interpolated in their elements."""
@@ -305,7 +305,7 @@ def _pair(end: Indices, middle: Indices, count: int) -> Indices:
     return end * count + middle
 
 
-def _chained(nodes: Indices, pairs: Indices, count: int) -> Indices:
+def _refine_chain(nodes: Indices, pairs: Indices, count: int) -> Indices:
     """Return a chain of nodes (2 k + 1,) with the new one between each two of them."""
     ends, middles = nodes[:-1].copy(), nodes[1:].copy()
     ends[1::2], middles[1::2] = nodes[2::2], nodes[1::2]

@@ -77,7 +77,7 @@ class Outline:
                [ 0.7071, -0.7071]])
         """
         angle = self.angle(arc)
-        return self._turned(-np.sin(angle), np.cos(angle))
+        return self._rotate(-np.sin(angle), np.cos(angle))
 
     def bone(self, arc: Array, part: Array | float = 1.0) -> Array:
         """Return the points (..., 2) of the bone's outline that the mesh pairs with `arc` on the skin.
@@ -91,9 +91,9 @@ class Outline:
 
     def world(self, x: Array, y: Array) -> Array:
         """Return the points (..., 2) of the world for finger coordinates `x`, `y`."""
-        return self._turned(x, y) + np.array([0.0, self.finger.tip_radius])
+        return self._rotate(x, y) + np.array([0.0, self.finger.tip_radius])
 
-    def _turned(self, x: Array, y: Array) -> Array:
+    def _rotate(self, x: Array, y: Array) -> Array:
         """Return vectors (..., 2) of the finger frame in the world."""
         angle = radians(self.finger.contact_angle)
         return np.stack([x * cos(angle) + y * sin(angle), y * cos(angle) - x * sin(angle)], axis=-1)
@@ -191,7 +191,7 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
     base = sizing.fineness if isinstance(sizing.fineness, Lines) else _lines(outline, receptor, sizing, sizing.fineness)
     lines = base
     if sizing.halved:
-        lines = base.divided(np.full(len(base.arcs) - 1, 2), np.full(base.rows, 2))
+        lines = base.divide(np.full(len(base.arcs) - 1, 2), np.full(base.rows, 2))
     arcs, depths, fat = np.array(lines.arcs), np.array(lines.skin), np.array(lines.fat)
     every_arc = with_middles(arcs)
     core = outline.tissue(every_arc, depths[0])[:, None]
@@ -278,7 +278,7 @@ def _middles(lines: Array) -> Array:
     return (lines[1:] + lines[:-1]) / 2.0
 
 
-def _counted(place: Array, size: Array) -> Array:
+def _cumulative_count(place: Array, size: Array) -> Array:
     """Return how many elements of `size` at `place` (n,) lie before each of these places (n,)."""
     return np.concatenate([[0.0], np.cumsum((1.0 / size[1:] + 1.0 / size[:-1]) / 2.0 * np.diff(place))])
 
@@ -324,7 +324,7 @@ class _Row:
             ends.append(outline.nail_end)
         ends = _distinct(*ends)
         least = tuple(2 if end in (outline.palmar_cut, outline.dorsal) else 1 for end in ends[:-1])
-        return _Row(arc, _counted(arc, sizes), ends, least, 0.2)
+        return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
     def sizes(self) -> Array:
         """Return how many elements, and which part of one, are asked for between each two of the ends."""
@@ -372,7 +372,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
     # one element between epidermis and ending would be too stiff in shear whatever its size
     least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
-    row = _Row(depth, _counted(depth, sizes), ends, (*least, 2), 0.1)
+    row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
     gaps = row.gaps()
     every = row.lines(gaps)
     lines, fat = every[: -gaps[-1]], every[-gaps[-1] - 1 :]

@@ -18,8 +18,8 @@ from solver.accuracy.refinement import with_shares
 from solver.arrays import Array
 from solver.body import Patches
 from solver.continuation.existence import doubts
-from solver.continuation.finite_states import settled
-from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, refined, within_reach
+from solver.continuation.finite_states import settled_state
+from solver.continuation.small_states import WIDE, direct, gives_way, in_tissue, nearest, remove_round_off, within_reach
 from solver.equilibrium import EQUILIBRIUM, EquilibriumState, Newton
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
 from solver.equilibrium.load_path import Instant, end, march
@@ -97,9 +97,9 @@ class SmallMeshing(Meshing):
 
     def _finger(self, scene: Scene, sizing: Sizing) -> tuple[LinearFinger, float]:
         if sizing not in self._fingers:
-            begun = perf_counter()
+            start = perf_counter()
             finger = LinearFinger.of(scene, sizing)
-            self._fingers[sizing] = finger, perf_counter() - begun
+            self._fingers[sizing] = finger, perf_counter() - start
         return self._fingers[sizing]
 
     def answers(self, scenes: list[Scene], fineness: float | Lines, watch: Watch | None = None) -> list[Answer]:
@@ -177,17 +177,17 @@ class SmallMeshing(Meshing):
             way = march(scene, finger, times, relaxing=relaxing, report=report)
             state = way.last
             if relaxing:
-                state = replace(state, u=finger.body.condensed.held_by(state.reaction))
+                state = replace(state, u=finger.body.condensed.displacement_under(state.reaction))
         displacement = finger.displacement(state)
         in_tissue(scene, finger, state.load.depth)
         if finger.reaches_out(state, displacement, state.load.depth):
             return None
         directly_refinable = way is None and scene.normal_force is None and not state.load.path_dependent
         if directly_refinable:  # other states lose their round-off only where audits show it
-            state, displacement = refined(scene, finger, state, displacement)
+            state, displacement = remove_round_off(scene, finger, state, displacement)
         checks = audit.audits(finger, state, displacement)
         if not relaxing and audit.imbalance(checks) > SMALL_IMBALANCE:
-            state, displacement = refined(scene, finger, state, displacement)
+            state, displacement = remove_round_off(scene, finger, state, displacement)
             checks = audit.audits(finger, state, displacement)
         solved = SceneSolution(scene, state, displacement, checks, steps, way)
         _audit(scene, finger, solved, finger.newton, lambda: finger.sed_ending(finger.displacement(steady)))
@@ -276,7 +276,7 @@ def _predict(scene: Scene, nested: NestedSolution, meshes: Meshes, start: float)
     if scene.solve.course == "history":
         times = steps_of_press(scene, nested.coarse.finger) if steps is None else steps.times
         for leg in scene.earlier_slides():  # one that never settles is refused with its limits
-            settled(finger, leg)
+            settled_state(finger, leg)
         way = march(scene, finger, times, relaxing=scene.materials.relax)
         state = way.last
     if not state.touching.any():
@@ -313,7 +313,7 @@ def _balance(
         x = state.place(newton.condensed)[:, 0]
         if not newton.linearise(state, state.load, x):
             break
-        corrected, _, _ = newton.moved(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
+        corrected, _, _ = newton.apply_step(state, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)
         corrected = replace(
             corrected, state=state.state, sense=state.sense
         )  # a step of nanometres changes no contact state

@@ -23,7 +23,7 @@ from solver.continuation import jumped_branch
 from solver.continuation.existence import sound
 from solver.equilibrium import BY_DEPTH, BY_FRICTION, EquilibriumState, ForceLoad, LoadState, Newton, load_arguments
 from solver.equilibrium.finger import KINDS, Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_stepping import balanced, settled, slide_beside, sliding_load
+from solver.equilibrium.load_stepping import slide_from_guess, sliding_load, solve_full_slip, solve_under_forces
 from solver.failures import NotConverged
 from solver.prediction import Prediction, Skin
 from solver.quantities import NAMES, SED
@@ -179,8 +179,8 @@ class Nearby:
         newton, here = self.finger.newton, self.here
         load = here.load._replace(mu=float(scene.friction.mu), tau=scene.friction.cap)
         if scene.normal_force is None:
-            return settled(newton, load._replace(depth=scene.loading.depth), here, GOOD)
-        return balanced(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
+            return solve_full_slip(newton, load._replace(depth=scene.loading.depth), here, GOOD)
+        return solve_under_forces(newton, replace(here, load=load), ForceLoad(scene.normal_force, None), GOOD)
 
     def _on_branch(self, there: EquilibriumState) -> bool:
         """Return whether a state at finite strain lies on the branch of this one, as far as this mesh resolves."""
@@ -235,7 +235,7 @@ def states(skin: Skin) -> NDArray[np.int64]:
 
 def _small_slide(finger: LinearFinger, scene: Scene, guess: NDArray[np.integer]) -> EquilibriumState:
     """Return the settled slide of a scene from a guess of its contact states. Raises ContactLost."""
-    return slide_beside(finger.newton, sliding_load(scene), guess, scene.normal_force)
+    return slide_from_guess(finger.newton, sliding_load(scene), guess, scene.normal_force)
 
 
 def _recover_slide(finger: FiniteFinger, prediction: Prediction) -> EquilibriumState:

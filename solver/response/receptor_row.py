@@ -69,7 +69,7 @@ def _row_errors(prediction: Prediction, values: Array, arcs: Array, receptor: Re
 
     def row_numbers(finger: Finger[Any]) -> Callable[[Sequence[EquilibriumState]], Array]:
         row = finger.patches(endings(finger.geometry, finger.body.centre, receptor, arcs))
-        return lambda states: np.moveaxis(row.responses(finger.recovered(states, row)), -1, 0).reshape(len(states), -1)
+        return lambda states: np.moveaxis(row.responses(finger.recover(states, row)), -1, 0).reshape(len(states), -1)
 
     nested, state, coarse = _solve_nested(prediction, sizing)
     in_steps = state.load.path_dependent

@@ -16,9 +16,9 @@ from solver._kernels.compiling import OPEN, SLIP, STICK
 from solver.arrays import Array
 from solver.body import Endings, Patches, Probes
 from solver.continuation.small_states import expected_depth
-from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lowered
+from solver.equilibrium import BY_DEPTH, EquilibriumState, ForceLoad, LoadState, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger
-from solver.equilibrium.load_stepping import corrected
+from solver.equilibrium.load_stepping import correct
 from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -113,11 +113,11 @@ class SmallStepper(Stepper):
         slides = abs(tangential) >= SLIDING * self._most(normal)
         start = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not start.state.any():
-            start = lowered(self.newton.condensed, start)
+            start = lower_onto_surface(self.newton.condensed, start)
         forces = ForceLoad(normal, None, start.load.travel) if slides else ForceLoad(normal, tangential)
         x = start.u[:, 0] + self.newton.skin_x
         try:
-            state = self.newton.solved(start, start.load, x, forces, CHANGES)
+            state = self.newton.solve_linear(start, start.load, x, forces, CHANGES)
         except ContactLost:
             self.forget()
             return float("nan")
@@ -218,7 +218,7 @@ class FiniteStepper(Stepper):
         far, turns = (CONTROL.near, CONTROL.arriving) if self._behind else (CONTROL.far, CONTROL.hurried)
         for number in range(1, max(iterations, turns) + 1):
             kept = hurried and number == 1
-            done = corrected(newton, state, forces, origin, before, kept=kept)
+            done = correct(newton, state, forces, origin, before, kept=kept)
             if kept and (done is None or done[1] > CONTROL.furthest):
                 continue
             if done is None or done[1] > CONTROL.furthest or done[0].reaches_end:

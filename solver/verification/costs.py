@@ -66,9 +66,9 @@ def _cost(kinematics: Kinematics, tolerance: float) -> Cost:
     """Return the parts of one solve."""
     scene = replace(cases(kinematics)[-1], solve=Solve(kinematics, tolerance=tolerance))
     solve(scene)
-    begun, before = clock(), perf_counter()
+    start, before = clock(), perf_counter()
     answer = solve(scene)
-    own = (clock() - begun) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
+    own = (clock() - start) / (perf_counter() - before)  # of the time that passed, by which answers tell theirs
     span = median_time(partial(solve, scene), 5, 1.5)
     profile = cProfile.Profile()
     profile.enable()

@@ -90,9 +90,9 @@ def _estimate_published(
         return iter([LeftOut(f"No truth is known at {kinematics} strain.")])
 
     def rows_at(tolerance: float) -> Iterator[Estimate | GuaranteedCost]:
-        begun = clock()
+        start = clock()
         found_all = solve_many([replace(s, solve=Solve(kinematics, tolerance=tolerance)) for s in chosen])
-        took = clock() - begun
+        elapsed_s = clock() - start
         rows: list[Estimate] = []
         good = [a for a in found_all if isinstance(a, Prediction)]
         for answer in good:
@@ -101,7 +101,7 @@ def _estimate_published(
         yield from rows
         if good:
             yield GuaranteedCost(
-                kinematics, tolerance, len(chosen), max(a.dofs for a in good), took, sum(a.wall_s for a in good),
+                kinematics, tolerance, len(chosen), max(a.dofs for a in good), elapsed_s, sum(a.wall_s for a in good),
                 good[0].setup_s, sum(a.estimate_s for a in good), max(a.error_estimate for a in good),
                 max((r.error for r in rows if r.number == NUMBERS[0]), default=None),
             )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from solver.accuracy.adaptivity import COARSE, WIDER, Meshes, coarse_solution, solution_on
 from solver.arrays import Array
-from solver.continuation.small_states import WIDE, expected_depth, settled
+from solver.continuation.small_states import WIDE, expected_depth, settled_state
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import end
 from solver.failures import NotConverged, SolveFailure
@@ -70,7 +70,7 @@ def _small(scenes: Sequence[Scene], fineness: float, shift: bool, times: int) ->
     finger = LinearFinger.of(scenes[0], Sizing(fineness, depth, shift, WIDE))
     for scene in scenes:
         marched = scene.viscoelastic and depends_on_way(scene)
-        state = (end if marched else settled)(scene, finger, times)
+        state = (end if marched else settled_state)(scene, finger, times)
         if finger.reaches_out(state, finger.displacement(state), state.load.depth):
             raise NotConverged("Contact reaches out of the skin that is looked at.")
         yield np.abs(finger.numbers([state])[0])

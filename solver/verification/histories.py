@@ -58,9 +58,9 @@ def _march(scene: Scene) -> March:
         press=PRESS, slides=SLIDES, distance=DISTANCE,
     )  # fmt: skip
     span = median_time(lambda: mesh.numbers(mesh.solve(scene)), 5)
-    begun = clock()
+    start = clock()
     *_, last = march(mesh.finger.newton, course)
     sed = float(mesh.numbers(last)[0])
-    took = mesh.prepared_s + clock() - begun
+    elapsed_s = mesh.prepared_s + clock() - start
     off = sed / float(mesh.numbers(mesh.solve(scene))[0]) - 1
-    return March(kind, scene.title, mesh.dofs, mesh.prepared_s + span, took, off)
+    return March(kind, scene.title, mesh.dofs, mesh.prepared_s + span, elapsed_s, off)

@@ -13,7 +13,7 @@ from solver.arrays import Array
 from solver.body.linear import LinearBody
 from solver.continuation.existence import steady
 from solver.continuation.finite_states import roughly
-from solver.continuation.small_states import settled
+from solver.continuation.small_states import settled_state
 from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, settled_moduli
 from solver.equilibrium.load_stepping import sliding_load
@@ -63,23 +63,23 @@ class SmallMethod(MeshMethod[LinearFinger]):
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh and reduce the finger of `scene`."""
-        begun, passing = clock(), perf_counter()
+        start, passing = clock(), perf_counter()
         self.finger = LinearFinger.of(scene, Sizing(fineness, scene.loading.depth, shift, margin=4.0))
-        took, passed = clock() - begun, perf_counter() - passing
-        self.prepared_s = took * self.finger.solve_s / passed  # which it tells by the time that passes
-        self.setup_s = took - self.prepared_s
+        elapsed_s, passed = clock() - start, perf_counter() - passing
+        self.prepared_s = elapsed_s * self.finger.solve_s / passed  # which it tells by the time that passes
+        self.setup_s = elapsed_s - self.prepared_s
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
         """Do as `MeshMethod` says; every surface begins at the same guess, so `before` is not used."""
         del before
-        return settled(scene, self.finger)
+        return settled_state(scene, self.finger)
 
     def floor(self) -> float:
         """Do as `MeshMethod` says."""
         skin, moduli = np.ones(self.finger.body.condensed.rest.shape), settled_moduli(self.finger.scene.materials)
-        begun = clock()
+        start = clock()
         LinearBody.of(self.finger.geometry.mesh, moduli).displacement(skin)
-        return clock() - begun
+        return clock() - start
 
 
 class FiniteMethod(MeshMethod[FiniteFinger]):
@@ -87,10 +87,10 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
 
     def __init__(self, scene: Scene, fineness: float, shift: bool) -> None:
         """Mesh the finger of `scene`."""
-        begun, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=MARGIN)
+        start, sizing = clock(), Sizing(fineness, scene.loading.depth, shift, margin=MARGIN)
         self.finger = FiniteFinger.of(scene, sizing)
         self._coarse = FiniteFinger.of(scene, Sizing(min(COARSE, fineness), scene.loading.depth, margin=MARGIN))
-        self.setup_s = clock() - begun
+        self.setup_s = clock() - start
 
     def solve(self, scene: Scene, before: EquilibriumState | None = None) -> EquilibriumState:
         """Do as `MeshMethod` says."""
@@ -103,9 +103,9 @@ class FiniteMethod(MeshMethod[FiniteFinger]):
         """Do as `MeshMethod` says."""
         newton = self.finger.newton
         shape = EquilibriumState.undeformed(newton.condensed)
-        begun = clock()
+        start = clock()
         newton.linearise(shape, LoadState(0.1, 0.0), newton.skin_x)
-        return clock() - begun
+        return clock() - start
 
 
 MESHED: Mapping[Kinematics, type[SmallMethod | FiniteMethod]] = {"small": SmallMethod, "finite": FiniteMethod}

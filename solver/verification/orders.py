@@ -7,8 +7,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from solver.continuation.finite_states import settled as finite_settled
-from solver.continuation.small_states import settled
+from solver.continuation.finite_states import settled_state as finite_settled
+from solver.continuation.small_states import settled_state
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
@@ -97,7 +97,7 @@ def small_finger(quick: bool) -> Iterator[Order]:
 
     def sed(case: Scene, fineness: float, shift: bool) -> float:
         finger = LinearFinger.of(case, Sizing(fineness, 2.0, shift))
-        return float(finger.numbers([settled(case, finger)])[0, 0])
+        return float(finger.numbers([settled_state(case, finger)])[0, 0])
 
     overkill, finenesses = (14.0, (3.0, 4.0, 5.0, 7.0)) if quick else (20.0, (3.0, 4.0, 5.0, 7.0, 10.0))
     for surface in (STICKINESS[0], STICKINESS[4]):
@@ -134,9 +134,9 @@ def _each(meshes: Sequence[Size], error: Callable[[Size], Value]) -> tuple[list[
     """Return what `error` finds on each mesh, and how long it took [s]."""
     errors, took = list[Value](), list[float]()
     for mesh in meshes:
-        begun = clock()
+        start = clock()
         errors.append(error(mesh))
-        took.append(clock() - begun)
+        took.append(clock() - start)
     return errors, took
 
 

@@ -100,9 +100,9 @@ def _commands(folder: Path, python: tuple[str, ...]) -> list[tuple[str, list[str
 
 def _run(command: list[str]) -> tuple[float, float]:
     """Return the processor time of a process and the time that passed, the second twice where there is no first."""
-    begun, before = perf_counter(), _of_children()
+    start, before = perf_counter(), _of_children()
     subprocess.run(command, check=True, capture_output=True, timeout=LONGEST)
-    passed, spent = perf_counter() - begun, _of_children() - before
+    passed, spent = perf_counter() - start, _of_children() - before
     return (spent if spent > 0.0 else passed), passed
 
 

@@ -67,12 +67,12 @@ class Measurements:
 def median_time(work: Callable[[], object], repeats: int = 5, most_s: float = 1.0) -> float:
     """Return the median time of `work()` [s] over up to `repeats` runs; slow work is run less often, at least once."""
     spans: list[float] = []
-    begun = clock()
+    start_s = clock()
     for _ in range(repeats):
         start = clock()
         work()
         spans.append(clock() - start)
-        if clock() - begun > most_s:
+        if clock() - start_s > most_s:
             break
     return median(spans)
 

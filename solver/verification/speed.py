@@ -125,11 +125,11 @@ def _onward(mesh: SmallMethod | FiniteMethod, scenes: list[Scene], most_s: float
         before, way = None, None
         for scene in scenes:
             near = way == (scene.loading.depth, scene.loading.slide)
-            begun = clock()
+            start = clock()
             before = mesh.solve(scene, before if near else None)
             mesh.numbers(before)
             if turn and near:
-                spans.setdefault(scene.title, []).append(clock() - begun)
+                spans.setdefault(scene.title, []).append(clock() - start)
             if turn:
                 floors.append(mesh.floor())
             way = scene.loading.depth, scene.loading.slide

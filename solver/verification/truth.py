@@ -69,10 +69,10 @@ def mean_and_doubt(solves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> Iterator[Truth | LeftOut]:
     refused, todo = _split_refusals(kinematics, chosen)
     yield from refused
-    begun = clock()
+    start = clock()
     deepest = max(chosen, key=lambda scene: scene.loading.depth)
     meshes = [MESHED[kinematics](deepest, *m) for m in (SHIFTED_QUICK if request.quick else SHIFTED)[kinematics]]
-    shared = (clock() - begun) / max(len(todo), 1)
+    shared = (clock() - start) / max(len(todo), 1)
     for number, scene in enumerate(sorted(todo, key=lambda scene: scene.title not in JUDGED)):
         if request.seconds_left <= 0.0 and scene.title not in JUDGED:  # without those, nothing else can be judged
             yield LeftOut(
@@ -83,14 +83,14 @@ def _truths(request: Request, kinematics: Kinematics, chosen: list[Scene]) -> It
 
 
 def _truth(scene: Scene, meshes: Sequence[SmallMethod | FiniteMethod], shared: float) -> Truth:
-    begun, kinematics = clock(), scene.solve.kinematics
+    start, kinematics = clock(), scene.solve.kinematics
     try:
         solves = np.array([mesh.numbers(mesh.solve(scene)) for mesh in meshes])
     except SolveFailure as failure:
-        return Truth(kinematics, scene.title, (), (), (), clock() - begun, f"On an overkill mesh: {failure}")
+        return Truth(kinematics, scene.title, (), (), (), clock() - start, f"On an overkill mesh: {failure}")
     mean, doubt = mean_and_doubt(solves)
-    took, dofs = clock() - begun + shared, tuple(mesh.dofs for mesh in meshes)
-    return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, took, "")
+    elapsed_s, dofs = clock() - start + shared, tuple(mesh.dofs for mesh in meshes)
+    return Truth(kinematics, scene.title, tuple(mean.tolist()), tuple(doubt.tolist()), dofs, elapsed_s, "")
 
 
 def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[Truth], list[Scene]]:
@@ -101,10 +101,10 @@ def _split_refusals(kinematics: Kinematics, chosen: list[Scene]) -> tuple[list[T
         if scene.title in JUDGED:  # known to have an answer; were it refused, the overkill meshes would tell
             todo.append(scene)
             continue
-        begun = clock()
+        start = clock()
         (answer,) = solve_many([replace(scene, solve=Solve(kinematics, tolerance=0.02))])
         if isinstance(answer, SolveFailure):
-            refused.append(Truth(kinematics, scene.title, (), (), (), clock() - begun, str(answer)))
+            refused.append(Truth(kinematics, scene.title, (), (), (), clock() - start, str(answer)))
         else:
             todo.append(scene)
     return refused, todo

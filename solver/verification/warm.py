@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.load_stepping import march, settled
+from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.response.stepper import Stepper, stepper
 from solver.scene import Scene
 from solver.scene.tables import Friction
@@ -56,9 +56,9 @@ def measure(request: Request, measurements: Measurements) -> Iterator[Warm | Lef
 def _row(scene: Scene, passes: int) -> Warm:
     kinematics = scene.solve.kinematics
     readings = list(_readings(scene))
-    begun = clock()
+    start = clock()
     follows = stepper(scene)
-    setup = clock() - begun
+    setup = clock() - start
     spans, seds = timed_passes(follows, readings, passes)
     truth = np.array([sed for _, _, sed in readings])
     each = np.median(spans, axis=0)
@@ -75,9 +75,9 @@ def timed_passes(follows: Stepper, readings: list[Reading], passes: int = PASSES
     for number in range(passes):
         follows.forget()
         for n, (normal, tangential, _) in enumerate(readings):
-            begun = clock()
+            start = clock()
             seds[n] = follows.step(normal, tangential)
-            spans[number, n] = clock() - begun
+            spans[number, n] = clock() - start
     return spans, seds
 
 
@@ -92,7 +92,7 @@ def _readings(scene: Scene) -> Iterator[Reading]:
     lifted: EquilibriumState | None = None
     for n in range(1, LIFTS):
         load = LoadState(loading.depth * (1.0 - n / LIFTS), mu, np.inf, -loading.direction)
-        lifted = settled(finger.newton, load, lifted)
+        lifted = solve_full_slip(finger.newton, load, lifted)
         states.append(lifted)
     for sed, push, drag in finger.numbers(states).tolist():
         yield push, drag, sed

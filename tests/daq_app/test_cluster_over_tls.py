@@ -35,9 +35,9 @@ def address(tmp_path, certificate):
     command += ["--tls-ca-file", cert, "--tls-cert", cert, "--tls-key", key, "--scheduler-file", str(told)]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ) as scheduler:
         try:
-            begun = time.monotonic()
+            start = time.monotonic()
             while not told.is_file() or not told.read_text().endswith("}"):
-                assert time.monotonic() - begun < 60.0
+                assert time.monotonic() - start < 60.0
                 time.sleep(0.05)
             yield json.loads(told.read_text())["address"]
         finally:

@@ -42,8 +42,8 @@ def malicious(tmp_path, monkeypatch):
 
 
 def wait_for(said):
-    begun = time.monotonic()
-    while time.monotonic() - begun < DEADLINE:
+    start = time.monotonic()
+    while time.monotonic() - start < DEADLINE:
         if (found := said()) is not None:
             return found
         time.sleep(0.02)

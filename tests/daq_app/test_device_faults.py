@@ -109,10 +109,10 @@ def test_a_signal_ends_a_run_within_a_second_while_its_transducer_sends_no_readi
         began = time.monotonic()
         ran.send_signal(number)
         ran.communicate(timeout=20)
-        took = time.monotonic() - began
+        elapsed_s = time.monotonic() - began
     finally:
         ran.kill()
         ran.communicate()
         device.close()
-    assert took < 1.0
+    assert elapsed_s < 1.0
     assert ran.returncode == 130

@@ -205,16 +205,20 @@ def undisturbed_run(name, folder):
         course = Undisturbed(device.uri, device.bench)
         course.found = identified(name, device.uri)
         with connected(device.uri, clock) as opened:
-            transducer, bench, now = opened.transducer, opened.bench or device.bench, opened.bench_now or device.now
+            transducer, bench, now = (
+                opened.transducer,
+                opened.bench or device.bench,
+                opened.bench_now if opened.bench else device.now,
+            )
             course.info, course.bench = transducer.info, bench
             bench.mount(paper_surfaces()["stickiness", 80])
-            begun = now()
+            start = now()
             transducer.start()
             stroke = Stroke(7.81, 17.5, approach=0.2, stick=0.2, slide=0.8)
             course.planted = bench.begin_stroke(stroke, now() + 0.2 * clock.factor)
             course.found_in_use = identified(name, device.uri)
             blocks, newest = [], 0.0
-            far = 0.5 if name == "replay" else course.planted.end - begun  # readings count from the first of them
+            far = 0.5 if name == "replay" else course.planted.end - start  # readings count from the first of them
             try:
                 while newest < far:
                     blocks.append(transducer.read(0.1))
@@ -261,7 +265,7 @@ def disturbed_course(name, folder):
         before = handles(device)
         told, blocks, sentence = {}, [], ""
         with connected(device.uri, clock) as opened:
-            transducer, now = opened.transducer, opened.bench_now or device.now
+            transducer, now = opened.transducer, opened.bench_now if opened.bench else device.now
             transducer.start()
             blocks.append(transducer.read(10.0))
             for kind in ONE_AFTER_THE_OTHER:
@@ -299,7 +303,7 @@ def planted_statuses_course(name, folder):
         device = started(name, faults, clock, folder, monkeypatch)
         try:
             with connected(device.uri, clock) as opened:
-                transducer, now = opened.transducer, opened.bench_now or device.now
+                transducer, now = opened.transducer, opened.bench_now if opened.bench else device.now
                 transducer.start()
                 for status in simulator(name).statuses:
                     if simulator(name).at_start:

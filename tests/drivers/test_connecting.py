@@ -78,12 +78,12 @@ def attempts(tmp_path_factory):
         try:
             began = time.monotonic()
             sentence = connect(device.uri, opened)
-            took = time.monotonic() - began
+            elapsed_s = time.monotonic() - began
         finally:
             for transducer in opened:
                 transducer.close()
             device.close()
-        return device.uri, sentence, took
+        return device.uri, sentence, elapsed_s
 
     return at_once(attempt, HOSTILE), set(threading.enumerate()) - threads
 
@@ -119,11 +119,11 @@ def stops(tmp_path_factory):
             began = time.monotonic()
             for transducer in opened:
                 transducer.stop()
-            took = time.monotonic() - began
+            elapsed_s = time.monotonic() - began
             connecting.join(CONNECTS_WITHIN)
         finally:
             device.close()
-        return took, not connecting.is_alive()
+        return elapsed_s, not connecting.is_alive()
 
     return at_once(stop, PATIENT)
 
@@ -140,10 +140,10 @@ def test_setting_a_bias_ends_on_a_command_port_that_drips():
     try:
         began = time.monotonic()
         sentence = connect(f"{device.uri}&bias=set", [])
-        took = time.monotonic() - began
+        elapsed_s = time.monotonic() - began
     finally:
         device.close()
-    assert took < CONNECTS_WITHIN
+    assert elapsed_s < CONNECTS_WITHIN
     assert "TCP port" in sentence
 
 

@@ -128,7 +128,7 @@ def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted
     faults = lambda _: Faults([Fault("unplug", *AWAY)], seed=1, repeat=CYCLE)  # noqa: E731
     together(RealClock(), faults, tmp_path, 3 * CYCLE)
     threads, files, memory = held()
-    begun = time.monotonic()
+    start = time.monotonic()
     runs = together(RealClock(), faults, tmp_path, CYCLES * CYCLE)
     after = held()
     for name, run in runs.items():
@@ -138,7 +138,7 @@ def test_hundreds_of_pulled_plugs_leave_nothing_behind_and_every_reading_counted
         print(f"\n{name}: {CYCLES} unplugs, {run.readings} readings, {run.lost} lost, {run.restarted} restarts")
     assert after[:2] == (threads, files)
     assert after[2] - memory < 30.0
-    print(f"{time.monotonic() - begun:.0f} s; threads and files as before, memory {after[2] - memory:+.1f} MB")
+    print(f"{time.monotonic() - start:.0f} s; threads and files as before, memory {after[2] - memory:+.1f} MB")
 
 
 def test_ten_told_minutes_of_random_faults_leave_every_reading_received_or_lost(tmp_path):

@@ -126,8 +126,8 @@ def outcome(scene):
 
 
 def _timed(name):
-    begun = time.perf_counter()
-    return name, outcome(scenes()[name]), time.perf_counter() - begun
+    start = time.perf_counter()
+    return name, outcome(scenes()[name]), time.perf_counter() - start
 
 
 def solve_all(names=None, workers=2):

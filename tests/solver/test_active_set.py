@@ -10,9 +10,9 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.contact import FrictionLaw
-from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lowered
+from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
 from solver.equilibrium.load_path import Aim, Way
-from solver.equilibrium.load_stepping import balanced, settled, slide_beside
+from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.oracle.active_set import Course, forced, touchable, untouched
 from tests.solver.oracle.active_set import lowered as lowered_plain
@@ -51,9 +51,12 @@ def agree(found, plain):
 @pytest.mark.parametrize("direction", [1, -1])
 def test_settled_slides_are_the_plain_ones(newton, plain, law, direction):
     load = LoadState(1.5, law.mu, law.tau_max, -direction)
-    found = settled(newton, load)
+    found = solve_full_slip(newton, load)
     agree(found, Course(plain, law).sliding(1.5, direction))
-    agree(settled(newton, load._replace(depth=1.4), found), Course(plain, law).sliding(1.4, direction, found.state))
+    agree(
+        solve_full_slip(newton, load._replace(depth=1.4), found),
+        Course(plain, law).sliding(1.4, direction, found.state),
+    )
 
 
 @pytest.mark.parametrize("law", LAWS, ids=str)
@@ -79,7 +82,7 @@ def test_a_body_pressed_and_dragged_by_forces_is_the_plain_one(newton, plain, ta
         normal, drag = 0.002 * n, 0.0006 * max(n - 20, 0) * (1 if n < 35 else -1)
         course = Course(forced(plain, normal, drag), FrictionLaw(mu, tau))
         before = course.step(lowered_plain(course.law, before), 0.0, 0.0)
-        state = balanced(newton, lowered(newton.condensed, state), ForceLoad(normal, drag))
+        state = solve_under_forces(newton, lower_onto_surface(newton.condensed, state), ForceLoad(normal, drag))
         agree(state, before)
         np.testing.assert_allclose([-state.load.depth, -state.load.travel], before.motion, atol=1e-10)
     assert (state.state == SHEAR_LIMITED).any() == (tau < np.inf)
@@ -98,6 +101,6 @@ def test_a_way_under_given_forces_ends_with_them(newton):
 def test_a_search_that_may_not_go_on_says_so(newton):
     nowhere = np.full(len(newton.skin_x), OPEN)
     with pytest.raises(ContactLost, match="after 2 systems"):
-        slide_beside(newton, LoadState(1.5, 0.5, sense=-1), nowhere, rounds=2)
+        slide_from_guess(newton, LoadState(1.5, 0.5, sense=-1), nowhere, rounds=2)
     with pytest.raises(ContactLost, match="no unique forces"):
-        slide_beside(newton, LoadState(0.0, 0.5, sense=-1), nowhere, force=0.1)
+        slide_from_guess(newton, LoadState(0.0, 0.5, sense=-1), nowhere, force=0.1)

@@ -12,7 +12,7 @@ from solver.contact import FrictionLaw
 from solver.equilibrium import EquilibriumState, LoadState
 from solver.equilibrium.finger import LinearFinger
 from solver.equilibrium.load_path import march
-from solver.equilibrium.load_stepping import settled, sliding_load
+from solver.equilibrium.load_stepping import sliding_load, solve_full_slip
 from solver.mesh.mesher import Sizing
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
 
@@ -115,7 +115,7 @@ def test_speed_only_rescales_time(finger):
 
 
 def test_without_friction_either_way_is_the_static_answer(finger):
-    there, back = (settled(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
+    there, back = (solve_full_slip(finger.newton, LoadState(1.5, 0.0, sense=way)) for way in (-1, 1))
     assert np.array_equal(there.normal, back.normal)
     static = course(finger, FrictionLaw(0.0, np.inf), Loading(1.5, "none"))[-1].state
     assert np.abs(static.normal - there.normal).max() < 1e-13 * there.normal.max()
@@ -128,7 +128,7 @@ def test_stiffer_everything_scales_forces_and_energy_and_moves_nothing(finger, f
     asked = Scene(friction=Friction(0.0), loading=Loading(1.5), materials=stiff)
     other = LinearFinger.of(asked, Sizing(8, 1.5))
     load = load_of(LAWS["bound"])._replace(depth=1.5, sense=-1)
-    one, two = settled(finger.newton, load), settled(other.newton, load._replace(tau=factor * load.tau))
+    one, two = solve_full_slip(finger.newton, load), solve_full_slip(other.newton, load._replace(tau=factor * load.tau))
     assert np.array_equal(one.state, two.state)
     assert np.abs(two.normal / factor - one.normal).max() < 1e-11 * one.normal.max()
     moved, same = finger.displacement(one), other.displacement(two)
@@ -143,7 +143,7 @@ def test_three_meshes_come_closer_and_closer_to_one_answer(surface):
     seds = []
     for fineness in (6, 12, 24):
         model = LinearFinger.of(asked, Sizing(fineness, asked.loading.indentation))
-        contact = settled(model.newton, sliding_load(asked))
+        contact = solve_full_slip(model.newton, sliding_load(asked))
         seds.append(model.sed_ending(model.displacement(contact)))
     first, last = abs(seds[1] - seds[0]), abs(seds[2] - seds[1])
     assert last < 0.003 * seds[2]

@@ -10,7 +10,7 @@ from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import Q2P1, Mesh, block, quality
 from solver.verification.published.bodies import distort
 from tests.solver.oracle.laws import hooke_energy
@@ -68,7 +68,7 @@ def pressed(nu: float, shear: float, seed: int):
 def test_a_uniform_pressure_comes_through_a_distorted_block_unchanged(seed, nu, round_off):
     mesh, loads = pressed(nu, 0.0, seed)
     body = LinearBody.of(mesh, [Hooke(0.08, nu)], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), LoadState(0.0, 0.0, np.inf, -1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(0.0, 0.0, np.inf, -1))
     assert np.abs(found.normal / body.condensed.fixed_length / 1e-3 - 1.0).max() < round_off
 
 
@@ -79,7 +79,7 @@ def test_a_block_sheared_below_mu_p_sticks_at_every_point(part):
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
     still = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
-    found = newton.solved(still, LoadState(0.0, mu), newton.skin_x)
+    found = newton.solve_linear(still, LoadState(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
     assert np.abs(found.tangential / body.condensed.fixed_length + part * mu * 1e-3).max() < 1e-15
 
@@ -91,7 +91,7 @@ def test_a_uniform_patch_drags_by_the_smaller_of_mu_p_and_the_bound_exactly(boun
     shear = min(mu * 1e-3, bound)
     mesh, loads = pressed(0.48, shear, 1)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), LoadState(0.0, mu, bound, -1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(0.0, mu, bound, -1))
     assert (found.state == (SLIP if bound > mu * 1e-3 else SHEAR_LIMITED)).all()
     assert np.abs(found.tangential / body.condensed.fixed_length + shear).max() < 1e-15
     assert -found.tangential.sum() == pytest.approx(min(mu * 2e-3, bound * 2.0), rel=1e-12, abs=1e-18)

@@ -6,7 +6,7 @@ import pytest
 from solver import Finger, Receptor
 from solver.equilibrium import LoadState
 from solver.equilibrium.finger import MeshTransfer, Places
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing, finger_mesh
 from tests.solver.finite_examples import finger
 
@@ -21,8 +21,8 @@ def places(fineness):
 
 def test_a_mesh_carries_a_state_to_itself_unchanged():
     newton, _, _ = finger(5)
-    shape = settled(newton, PULL)
-    same = MeshTransfer.of(places(5), places(5)).carried(shape)
+    shape = solve_full_slip(newton, PULL)
+    same = MeshTransfer.of(places(5), places(5)).transfer_state(shape)
     np.testing.assert_allclose(same.u, shape.u, atol=1e-13)
     np.testing.assert_array_equal(same.touching, shape.touching)
     np.testing.assert_allclose(same.pressure, shape.pressure, atol=1e-7)
@@ -45,7 +45,7 @@ def test_a_linear_pressure_and_a_displacement_of_the_whole_are_the_same_on_anoth
 def test_a_carried_state_is_a_few_iterations_from_the_finer_meshs_own(fineness):
     coarse, _, _ = finger(5)
     fine, _, _ = finger(fineness)
-    start = MeshTransfer.of(places(5), places(fineness)).carried(settled(coarse, PULL))
-    found, direct = settled(fine, PULL, start), settled(fine, PULL)
+    start = MeshTransfer.of(places(5), places(fineness)).transfer_state(solve_full_slip(coarse, PULL))
+    found, direct = solve_full_slip(fine, PULL, start), solve_full_slip(fine, PULL)
     assert found.iterations - start.iterations <= 5
     np.testing.assert_allclose(found.u, direct.u, atol=1e-9)

@@ -10,7 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK
 from solver.body.linear import LinearBody
 from solver.constitutive import Hooke
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.equilibrium.load_stepping import balanced, settled, slide_beside, slide_under
+from solver.equilibrium.load_stepping import slide_from_guess, slide_under, solve_full_slip, solve_under_forces
 from solver.mesh import block
 
 RADIUS = 5.0
@@ -59,7 +59,7 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
     body, frictionless = pressed
     mu = 0.02  # so small that the drag does not move the pressure
     load = LoadState(0.0, mu, k * mu * 0.008135, -1)
-    found = slide_beside(Newton(body.condensed), load, frictionless.state, 0.01)
+    found = slide_from_guess(Newton(body.condensed), load, frictionless.state, 0.01)
     exact = {0.8: 0.895912, 0.6: 0.715243, 0.4: 0.495368}[k]
     assert -found.tangential.sum() / (mu * 0.01) == pytest.approx(exact, rel=0.005)
     x = body.mesh.nodes[body.mesh.skin, 0]
@@ -71,7 +71,7 @@ def test_friction_with_a_bound_on_a_hertz_pressure_carries_the_closed_form(press
 def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do(pressed, tau_max):
     newton, load = Newton(pressed[0].condensed), LoadState(0.01, 0.4, tau_max, -1)
     far = np.where(pressed[0].condensed.rest[:, 1] < 0.02, SLIP, OPEN)
-    short, long = settled(newton, load), slide_beside(newton, load, far)
+    short, long = solve_full_slip(newton, load), slide_from_guess(newton, load, far)
     assert np.array_equal(short.state, long.state)
     assert (short.state == SHEAR_LIMITED).any() == (tau_max < np.inf)
     for name in ("normal", "tangential", "u"):
@@ -82,14 +82,14 @@ def test_the_short_way_to_settled_sliding_ends_where_steps_from_another_guess_do
 @pytest.mark.parametrize("mu", [0.1, 0.4])
 def test_what_slides_without_a_bound_drags_by_mu_times_the_normal_force(mu):
     body = cylinder(4.5, 0.2)
-    found = settled(Newton(body.condensed), LoadState(0.1, mu, sense=-1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(0.1, mu, sense=-1))
     assert -found.tangential.sum() / found.normal.sum() == pytest.approx(mu, rel=1e-13)
 
 
 def test_sliding_the_other_way_mirrors_the_forces_of_a_mirrored_body():
     body = cylinder(4.5, 0.2)
-    one = settled(Newton(body.condensed), LoadState(0.1, 0.3, sense=-1))
-    other = settled(Newton(body.condensed), LoadState(0.1, 0.3, sense=1))
+    one = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=-1))
+    other = solve_full_slip(Newton(body.condensed), LoadState(0.1, 0.3, sense=1))
     assert np.allclose(one.normal, other.normal[::-1], atol=1e-15)
     assert np.allclose(one.tangential, -other.tangential[::-1], atol=1e-15)
 
@@ -106,13 +106,13 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
     p0 = 2 * load / (np.pi * a)
     body = cylinder(4.5, 0.02, nu, zone=0.3)
     newton = Newton(body.condensed)
-    now = slide_beside(newton, LoadState(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
+    now = slide_from_guess(newton, LoadState(0.0, 0.0, sense=-1), start_state(body, 0.2), load)
     # all that touches sticks where it is; then the drive moves along until the drag is the part asked for
     now = replace(now, state=np.where(now.touching, STICK, OPEN).astype(np.int32), load=LoadState(now.load.depth, mu))
     travel = 0.0
     while -now.force[0] < part * mu * load:
         travel -= 2e-6
-        now = balanced(newton, now, ForceLoad(load, None, travel))
+        now = solve_under_forces(newton, now, ForceLoad(load, None, travel))
     reached = -now.tangential.sum() / (mu * load)
     x = body.mesh.nodes[body.mesh.skin, 0]
     assert np.ptp(x[now.state == STICK]) / 2 == pytest.approx(a * np.sqrt(1 - reached), abs=0.02)
@@ -123,7 +123,7 @@ def test_partial_slip_sticks_inside_as_cattaneo_and_mindlin_say(part):
 def test_a_tyre_that_cannot_slide_is_reported_lost():
     body = cylinder(4.5, 0.4)
     with pytest.raises(ContactLost):
-        settled(Newton(body.condensed), LoadState(0.2, 50.0, sense=-1))
+        solve_full_slip(Newton(body.condensed), LoadState(0.2, 50.0, sense=-1))
 
 
 def test_before_first_touch_nothing_is_felt():

@@ -9,7 +9,7 @@ from solver._kernels.compiling import SLIP
 from solver.body.finite import FiniteBody
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke, NeoHooke, stress
-from solver.continuation.finite_states import loaded
+from solver.continuation.finite_states import solve_dead_load
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from tests.solver.finite_examples import block
 
@@ -36,7 +36,7 @@ def test_a_block_pressed_on_the_flat_by_a_dead_traction_takes_the_closed_forms_s
     top = np.flatnonzero(np.isclose(mesh.nodes[:, 1], 1.0))
     top = top[np.argsort(mesh.nodes[top, 0])]
     pressed = edge_load(mesh, top, np.ones((len(top), 1)) @ [[0.0, nominal]])
-    found = loaded(newton.condensed.body, pressed, load=LoadState(0.0, 0.0, sense=1), start=start)
+    found = solve_dead_load(newton.condensed.body, pressed, load=LoadState(0.0, 0.0, sense=1), start=start)
     exact = (mesh.nodes - [1.0, 0.0]) * [across - 1.0, stretch - 1.0]
     np.testing.assert_allclose(found.u, exact, atol=3e-5)  # the traction is given to five figures
     # the held corner of two of the four edges takes a sixth of each
@@ -49,7 +49,7 @@ def test_a_prescribed_affine_boundary_is_affine_inside():
     boundary = np.flatnonzero(np.any((mesh.nodes < low + 1e-9) | (mesh.nodes > high - 1e-9), axis=1))
     newton = Newton(FiniteBody.of(replace(mesh, held=boundary), [DERMIS]).condensed)
     gradient = np.array([[0.2, 0.3], [-0.1, -0.1]])
-    found = loaded(
+    found = solve_dead_load(
         newton.condensed.body,
         prescribed=mesh.nodes @ gradient.T * newton.condensed.body.mesh.driven,
         load=LoadState(-1e3, 0.0),
@@ -61,7 +61,7 @@ def test_a_hanging_bar_carries_its_dead_traction_far_from_the_clamp():
     mesh = block(columns=2, rows=6, width=0.5, height=3.0)
     newton = Newton(FiniteBody.of(mesh, [DERMIS]).condensed)
     pulled = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[0.0, -0.01]])
-    place = mesh.nodes + loaded(newton.condensed.body, pulled, load=LoadState(-1e3, 0.0)).u
+    place = mesh.nodes + solve_dead_load(newton.condensed.body, pulled, load=LoadState(-1e3, 0.0)).u
     low, next_up = (np.isclose(mesh.nodes[:, 1], height) for height in (0.0, 0.5))
     stretches = np.ptp(place[low, 0]) / 0.5, (place[next_up, 1].mean() - place[low, 1].mean()) / 0.5
     P = stress(DERMIS, np.diag(stretches))  # noqa: N806
@@ -72,9 +72,9 @@ def test_small_loads_give_the_small_strain_answer():
     mesh = block(columns=4, rows=3, distortion=0.1, seed=2)
     right = edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)) @ [[1e-5, -2e-5]])
     newton = Newton(FiniteBody.of(mesh, [NeoHooke(1.0, 0.3)]).condensed)
-    finite = loaded(newton.condensed.body, right, load=LoadState(-1e3, 0.0), steps=1)
+    finite = solve_dead_load(newton.condensed.body, right, load=LoadState(-1e3, 0.0), steps=1)
     body = LinearBody.of(mesh, [Hooke(1.0, 0.3)], right)
-    small = body.displacement(body.condensed.untouched())
+    small = body.displacement(body.condensed.free_displacement())
     np.testing.assert_allclose(finite.u, small, rtol=1e-3, atol=1e-4 * np.abs(small).max())
 
 
@@ -83,4 +83,4 @@ def test_a_load_on_an_elements_centre_is_refused():
     loads = np.zeros(mesh.nodes.shape)
     loads[mesh.elements[0, 8]] = 1.0
     with pytest.raises(ValueError, match="centre of an element"):
-        loaded(FiniteBody.of(mesh, [DERMIS]), loads)
+        solve_dead_load(FiniteBody.of(mesh, [DERMIS]), loads)

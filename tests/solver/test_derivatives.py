@@ -12,7 +12,7 @@ from solver.body import CondensedLinear, Endings, Probes
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.constitutive import NeoHooke, Ogden
 from solver.constitutive import shape as grown
-from solver.continuation.small_states import settled
+from solver.continuation.small_states import settled_state
 from solver.equilibrium import LoadState, Newton, load_stepping
 from solver.equilibrium import load_stepping as sliding
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
@@ -68,7 +68,7 @@ def small():
 
 def small_numbers(finger, scene, states):
     """Return SED, normal force, drag, depth and each quantity of a settled slide, which must have these states."""
-    contact = settled(scene, finger)
+    contact = settled_state(scene, finger)
     assert (contact.state == states).all()
     depth = contact.load.depth
     sed, normal, tangential, *rest = finger.all_numbers([contact])[0]
@@ -87,7 +87,7 @@ SMALL = {
 @pytest.mark.parametrize("name", SMALL)
 def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_states(small, name):
     here = SMALL[name]
-    contact = settled(here, small)
+    contact = settled_state(here, small)
     assert ("at the bound" in name) == (contact.state == SHEAR_LIMITED).any()
 
     def numbers(one):
@@ -100,7 +100,7 @@ def test_at_small_strain_they_are_the_differences_of_solves_within_one_set_of_st
 def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a_parabola(small):
     # Closed form: a slope of a straight line and of a parabola are those of their chords, however long.
     here = SMALL["beside its limit"]
-    contact = settled(here, small)
+    contact = settled_state(here, small)
     found = of_slide(small, here, contact)
     wide = [small_numbers(small, moved(here, "press", by), contact.state) for by in (-5e-3, 5e-3)]
     assert (wide[1] - wide[0])[:3] / 1e-2 == pytest.approx(told(found)[:3, 2], rel=1e-9)
@@ -108,7 +108,7 @@ def test_between_changes_of_state_forces_are_straight_in_the_depth_and_the_sed_a
 
 def test_a_given_force_drags_with_mu_times_it(small):
     here = SMALL["under a force"]
-    found = of_slide(small, here, settled(here, small))
+    found = of_slide(small, here, settled_state(here, small))
     assert found.tangential.mu == pytest.approx(0.12, rel=1e-12)
     assert found.tangential.normal_force == pytest.approx(0.4, rel=1e-12)
     assert found.normal == (0.0, 0.0, None, 1.0)
@@ -125,11 +125,11 @@ def test_one_point_on_springs_answers_as_its_formula_says():
     """N = d / (3 + s mu b), and at the bound N = (d - s b tau L) / 3, with s = -1 for a slide along +x."""
     d, b, mu, tau, length = 0.6, 0.8, 0.5, 0.04, 0.7
     newton, load = springs(b), LoadState(d, mu, sense=-1)
-    along, up = newton.follows(of_skin(newton, sliding.settled(newton, load)))
+    along, up = newton.follows(of_skin(newton, sliding.solve_full_slip(newton, load)))
     soft = 3.0 - mu * b
     assert up == pytest.approx([b * d / soft**2, 0.0, 1.0 / soft], rel=1e-13)
     assert along == pytest.approx([-d / soft - mu * b * d / soft**2, 0.0, -mu / soft], rel=1e-13)
-    capped = sliding.settled(newton, load._replace(tau=tau))
+    capped = sliding.solve_full_slip(newton, load._replace(tau=tau))
     assert capped.state.tolist() == [SHEAR_LIMITED, OPEN]
     along, up = newton.follows(of_skin(newton, capped))
     assert up == pytest.approx([0.0, b * length / 3.0, 1.0 / 3.0], rel=1e-13)
@@ -141,7 +141,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
     here = SMALL["without a bound"]
 
     def at(depth):
-        return settled(moved(here, "press", depth - 1.2), small)
+        return settled_state(moved(here, "press", depth - 1.2), small)
 
     low, high = 1.2, 1.3
     assert at(low).touching.sum() < at(high).touching.sum()
@@ -162,7 +162,7 @@ def test_at_a_kink_each_side_has_the_slope_of_its_own_states(small):
 
 
 def test_a_state_that_sticks_has_no_derivatives_of_its_own(small):
-    contact = settled(SMALL["without a bound"], small)
+    contact = settled_state(SMALL["without a bound"], small)
     stuck = replace(contact, state=np.where(contact.state == SLIP, STICK, contact.state).astype(np.int32))
     with pytest.raises(ValueError, match="depends on the way"):
         of_slide(small, SMALL["without a bound"], stuck)
@@ -182,10 +182,12 @@ def load_of(scene, depth):
 
 def slip(finger, scene, start=None):
     depth = scene.loading.indentation or 0.6
-    shape = sliding.settled(finger.newton, load_of(scene, depth), start, 1e-12)
+    shape = sliding.solve_full_slip(finger.newton, load_of(scene, depth), start, 1e-12)
     if scene.normal_force is None:
         return shape
-    return load_stepping.balanced(finger.newton, shape, load_stepping.ForceLoad(scene.normal_force, None), 1e-12)
+    return load_stepping.solve_under_forces(
+        finger.newton, shape, load_stepping.ForceLoad(scene.normal_force, None), 1e-12
+    )
 
 
 def finite_numbers(finger, scene, here):

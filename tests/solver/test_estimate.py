@@ -7,7 +7,7 @@ import pytest
 
 from solver import Finger, Friction, Loading, Material, Materials, Receptor, Scene, Solve, solve
 from solver.accuracy.error_estimate import errors
-from solver.continuation.small_states import expected_depth, nearest, settled
+from solver.continuation.small_states import expected_depth, nearest, settled_state
 from solver.equilibrium import EQUILIBRIUM
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
@@ -113,7 +113,7 @@ def test_the_sed_follows_an_edge_of_contact_by_a_parabola_about_a_place_within_h
             contact[taken], sense[taken] = contact[of], sense[of]
             begin = replace(state, state=contact, sense=sense)
             assert newton.solve_contact(begin, state.load, x, 0, None) >= 0
-            after = newton.moved(begin, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
+            after = newton.apply_step(begin, state.load, newton.steps[:, EQUILIBRIUM].copy(), x)[0]
             return finger.numbers([after])[0, 0] - finger.numbers([state])[0, 0]
 
         for edge in np.flatnonzero(np.diff(state.touching.astype(int))).tolist():
@@ -129,7 +129,7 @@ def test_estimates_of_the_row_lie_above_its_errors_beneath_the_edges_of_contact_
     asked = Scene(friction=Friction(0.35), loading=Loading(1.3, "+x"), finger=Finger(contact_angle=52.0))
     found = solve(replace(asked, solve=Solve(tolerance=0.02, evidence="quick")))
     fine = LinearFinger.of(asked, Sizing(24.0, 1.3, margin=4.0))
-    true = fine.row.average(fine.displacement(settled(asked, fine)))
+    true = fine.row.average(fine.displacement(settled_state(asked, fine)))
     known = np.isfinite(true)
     assert known.sum() >= 40
     errors_of_row = np.abs(found.row.sed - true)[known]

@@ -7,7 +7,7 @@ from solver import Finger, Friction, Loading, Material, Materials, NoSteadyState
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.continuation.existence import steady
 from solver.equilibrium import LoadState
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from tests.solver.finite_examples import published
 
 TOWARDS_TIP = -1
@@ -44,7 +44,7 @@ def test_a_sound_state_is_the_direct_one():
     finger = published(5)
     load = LoadState(1.5, 0.44, 0.03009, 1)
     shape = steady(finger, load)
-    np.testing.assert_array_equal(shape.u, settled(finger.newton, load).u)
+    np.testing.assert_array_equal(shape.u, solve_full_slip(finger.newton, load).u)
 
 
 def test_friction_without_measure_is_the_bound_alone():

@@ -141,7 +141,7 @@ def _whole(t):
 def test_at_once_the_tissue_has_its_own_moduli_and_in_the_end_the_relaxed_ones():
     law = Prony(0.08, 0.48, ((0.2, 0.07), (0.4, 1.4)))
     past = Past.at_rest(np.array([[g * law.shear for g, _ in law.terms]]), np.array([[tau for _, tau in law.terms]]))
-    end = NeoHooke(*law.relaxed.engineering)
+    end = NeoHooke(*law.long_term_moduli.engineering)
     A = relaxed_tangent(end, np.eye(2)) + overstress_tangent(past.over(1e-9)[0], np.eye(2))
     hooke = Hooke(0.08, 0.48)
     np.testing.assert_allclose([A[0, 0, 0, 0], A[0, 0, 1, 1], A[0, 1, 0, 1]],
@@ -164,14 +164,14 @@ def test_after_a_sudden_strain_the_stress_of_the_shape_falls_as_the_exponential(
 
 def relaxing_block(distortion=0.06):
     law = Prony(0.08, 0.48, ((0.3, 0.5),))
-    body = FiniteBody.of(block(distortion=distortion, seed=1), [NeoHooke(*law.relaxed.engineering)])
+    body = FiniteBody.of(block(distortion=distortion, seed=1), [NeoHooke(*law.long_term_moduli.engineering)])
     relaxing = CondensedRelaxing(body, [law])
     rng = np.random.default_rng(3)
     u = rng.uniform(-0.015, 0.015, body.mesh.nodes.shape)
     u[body.mesh.held] = 0.0
     start = replace(EquilibriumState.undeformed(body.condensed), u=u)
     relaxing.ready(0.2)
-    relaxing.took(start.u, 0.2)
+    relaxing.commit(start.u, 0.2)
     relaxing.ready(0.3)
     return Newton(relaxing), start, rng
 
@@ -232,7 +232,7 @@ def test_a_pressed_block_is_in_equilibrium_with_what_it_holds_of_the_past():
         total[body.mesh.skin] -= shape.reaction
         total[body.mesh.held] = 0.0
         assert np.abs(total).max() < 1e-9 * shape.force[1]
-        newton.condensed.took(shape.u, step)
+        newton.condensed.commit(shape.u, step)
         pushes.append(shape.force[1])
     assert pushes[1] > pushes[2] > pushes[3]
 
@@ -246,7 +246,7 @@ def test_what_a_pressed_block_keeps_and_friction_does_not_take_is_what_its_tissu
     for number in range(1, steps + 1):
         newton.condensed.ready(time / steps)
         shape = newton.settle(shape, LoadState(0.2 * number / steps, 0.3), 1e-9)
-        newton.condensed.took(shape.u, time / steps)
+        newton.condensed.commit(shape.u, time / steps)
         way.append(shape)
         whole_of = [
             np.array([_whole(t) for t in tensors])

@@ -10,7 +10,7 @@ from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve,
 from solver.accuracy.adaptivity import Meshes, coarse_solution, refine
 from solver.accuracy.audits import audits, refuse_unsound, rounding
 from solver.equilibrium import LoadState
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.response import answers
 from solver.response.solution import ERROR_UNKNOWN
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene
@@ -58,7 +58,7 @@ def test_forces_balance_and_nothing_is_exceeded(four, name):
 def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wrong, left):
     asked = finite(STICKINESS[0])
     finger = published(4)
-    shape = settled(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    shape = solve_full_slip(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
     told = audits(finger, shape, shape.u)["work_balance"]
     planted = audits(finger, replace(shape, reaction=np.array(wrong) * shape.reaction), shape.u)
     assert told < 1e-9
@@ -68,7 +68,7 @@ def test_a_force_told_one_percent_wrong_does_other_work_than_the_body_stores(wro
 def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     asked = finite(STICKINESS[0])
     finger = published(4)
-    shape = settled(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
+    shape = solve_full_slip(finger.newton, LoadState(2.0, float(asked.friction.mu), asked.friction.cap, -1))
     told = audits(finger, shape, shape.u)
     reaction, middle = shape.reaction.copy(), int(np.argmax(shape.reaction[:, 1]))
     moved = 0.2 * reaction[middle]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver._kernels import active_set
-from solver._kernels.compiling import compiled
+from solver._kernels.compiling import compile_loop
 from solver.arrays import ContactStates, LoadArguments, StateChanges
 from solver.body import CondensedLinear
 from solver.body.finite import FiniteBody
@@ -22,7 +22,7 @@ from solver.equilibrium import (
     LoadState,
     Newton,
 )
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import block
 from solver.response.stepper import SmallStepper
 from tests.solver.oracle import finite as oracle
@@ -94,7 +94,7 @@ def slid_at_once(law):
     """Settled slides either way, which know no way there: what slips does so against its force."""
     body, rubbed = springs(), []
     for direction in (1, -1):
-        found = settled(Newton(body), LoadState(0.3, law.mu, law.tau_max, -direction))
+        found = solve_full_slip(Newton(body), LoadState(0.3, law.mu, law.tau_max, -direction))
         rubbed.append(replace(told(body, found, found), slip=np.full(5, 100.0 * direction)))
     return rubbed
 
@@ -224,7 +224,7 @@ def test_compiled_loops_find_the_states_and_forces_that_plain_numpy_finds(law):
             np.testing.assert_allclose(getattr(found, name), getattr(plain, name), atol=1e-13)
 
 
-@compiled
+@compile_loop
 def contradictions(states, above, slip, length, load, changes):
     return active_set.contradictions(states, above, slip, length, load, changes)
 

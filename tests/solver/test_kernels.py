@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from solver._kernels import contact_system
 from solver._kernels import elements as element_loops
 from solver._kernels import skin as skin_loops
-from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compiled
+from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP, STICK, compile_loop
 from solver.body.finite import CondensedFinite, FiniteBody
 from solver.constitutive import LAWS, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
@@ -122,7 +122,7 @@ def test_a_tangent_without_stiffness_cannot_be_eliminated():
     assert not condensed.inside.factorise(np.zeros_like(condensed.system.tangent))
 
 
-@compiled
+@compile_loop
 def solved(matrix, right, size):
     return contact_system.solve(matrix, right, size)
 
@@ -180,7 +180,7 @@ def test_contact_rows_are_the_derivatives_of_their_conditions():
     assert newton.linearise(shape, load, anchor)
     found = []
     for part in (1e-4, -1e-4):
-        moved, largest, _ = newton.moved(shape, load, newton.steps[:, 0], anchor, part)
+        moved, largest, _ = newton.apply_step(shape, load, newton.steps[:, 0], anchor, part)
         assert largest == pytest.approx(np.abs(moved.u - u).max() / abs(part), rel=1e-6)
         found.append(conditions(equilibrated(body, moved.u))[0])
     ahead, behind = found
@@ -222,7 +222,7 @@ def test_the_compiled_outline_is_squeezed_and_crosses_itself_where_the_plain_one
         before, after = nodes[outline], (nodes + u)[outline]
         first, state = 5, touching[5:18].astype(np.int32)
         touching[:5] = touching[18:] = False  # skin that may not touch
-        assert skin_loops.pinched(nodes, u, outline, loose, state, first) == pytest.approx(
+        assert skin_loops.measure_compression(nodes, u, outline, loose, state, first) == pytest.approx(
             pinched(before, after, loose, touching), rel=1e-12
         )
         assert skin_loops.crosses(nodes, u, outline) == crosses_itself(after)

@@ -12,7 +12,7 @@ from solver.continuation import existence, finite_states, folds_at, follow
 from solver.continuation import existence as reach
 from solver.equilibrium import BY_FRICTION, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, finite_laws
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import grid_mesh, mesher
 from tests.solver.finite_examples import published
 
@@ -78,13 +78,13 @@ def test_where_skin_folds_at_one_place_both_limits_are_those_of_a_mesh_of_half_t
 def test_a_branch_that_reaches_what_was_asked_for_is_the_direct_answer():
     finger = published(5)
     load = LoadState(1.0, 0.5, 0.03, TOWARDS_TIP)
-    start = settled(finger.newton, load._replace(mu=0.0))
+    start = solve_full_slip(finger.newton, load._replace(mu=0.0))
     branch = follow(finger, start, BY_FRICTION, load.mu, 0.54)
     again = follow(finger, branch.last, BY_FRICTION, load.mu, 0.54)  # nothing is left to follow
     assert again.states == (branch.last,)
     assert not again.limited
     assert not branch.limited
-    np.testing.assert_allclose(branch.last.u, settled(finger.newton, load).u, atol=1e-6)
+    np.testing.assert_allclose(branch.last.u, solve_full_slip(finger.newton, load).u, atol=1e-6)
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
@@ -111,7 +111,7 @@ def test_a_finger_handed_in_as_arrays_is_refused_beyond_the_friction_that_anothe
         finite_states.steady_body(newton.condensed.body, load, laws[mesher.EPIDERMIS])
     assert refused.value.limit_mu == pytest.approx(0.373, rel=0.03)
     below = finite_states.steady_body(newton.condensed.body, load._replace(mu=0.3), laws[mesher.EPIDERMIS])
-    np.testing.assert_allclose(below.u, settled(newton, load._replace(mu=0.3)).u, atol=1e-6)
+    np.testing.assert_allclose(below.u, solve_full_slip(newton, load._replace(mu=0.3)).u, atol=1e-6)
 
 
 @SLOW
@@ -136,7 +136,7 @@ def test_no_limit_of_friction_is_told_where_growing_depth_arrives_beyond_it(monk
     def by_depth(_scene, asked):
         return replace(ends, value=1.5, limited=asked.mu == load.mu)  # with a little less friction 2 mm are reached
 
-    monkeypatch.setattr(existence, "_tried", lambda *_: iter(()))
+    monkeypatch.setattr(existence, "_direct_states", lambda *_: iter(()))
     monkeypatch.setattr(reach, "of_friction", lambda *_: ends)
     monkeypatch.setattr(reach, "of_depth", by_depth)
     with pytest.raises(NotConverged, match=r"followed up to mu = 0\.373 and lost there"):

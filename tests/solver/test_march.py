@@ -8,7 +8,7 @@ import pytest
 from solver._kernels.compiling import SLIP, STICK
 from solver.accuracy.audits import course_audits
 from solver.equilibrium import EquilibriumState, LoadState
-from solver.equilibrium.load_stepping import march, settled
+from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.verification.histories import press_and_slide
 from tests.solver.finite_examples import finger
 from tests.solver.oracle import finite as oracle
@@ -20,7 +20,7 @@ from tests.solver.oracle import finite as oracle
 def test_sliding_far_ends_in_the_state_that_is_solved_directly(depth, mu, tau, direction):
     newton, probes, _ = finger(5)
     *_, last = march(newton, press_and_slide(depth, mu, tau, direction, press=5, slides=15, distance=8.0))
-    direct = settled(newton, LoadState(depth, mu, tau, -direction))
+    direct = solve_full_slip(newton, LoadState(depth, mu, tau, -direction))
     assert probes.average(last.u)[0] == pytest.approx(probes.average(direct.u)[0], rel=1e-10)
 
 
@@ -73,7 +73,7 @@ def test_points_stick_before_they_slip_and_turn_round_with_the_bone():
     assert (settled_one.state[settled_one.touching] >= SLIP).all()
     assert (settled_one.sense[settled_one.touching] == 1).all()
     assert (last.sense[last.touching] == -1).all()
-    opposite = settled(newton, LoadState(1.5, 0.44, 0.03009, -1))
+    opposite = solve_full_slip(newton, LoadState(1.5, 0.44, 0.03009, -1))
     assert probes.average(last.u)[0] == pytest.approx(probes.average(opposite.u)[0], rel=1e-9)
 
 

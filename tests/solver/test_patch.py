@@ -11,7 +11,7 @@ from solver.body import Probes
 from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh import Mesh, block
 from tests.solver.oracle.laws import hooke_energy
 
@@ -67,7 +67,7 @@ def pressed_block(shear: float = 0.0, *, confined: bool = False):
 def test_a_uniform_pressure_reaches_a_frictionless_surface_unchanged():
     mesh, loads = pressed_block()
     body = LinearBody.of(mesh, [DERMIS], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), LoadState(0.0, 0.0, np.inf, -1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(0.0, 0.0, np.inf, -1))
     assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
     # strains of the page: eps_yy = -p (1 - nu^2)/E, eps_xx = p nu (1 + nu)/E
     moved = body.displacement(found.u)
@@ -84,7 +84,7 @@ def test_below_the_friction_limit_every_point_sticks_and_carries_the_same_tracti
     body = LinearBody.of(mesh, [DERMIS], loads, free=("x", "y", "turn"))
     newton = Newton(body.condensed)
     start = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
-    found = newton.solved(start, LoadState(0.0, mu), newton.skin_x)
+    found = newton.solve_linear(start, LoadState(0.0, mu), newton.skin_x)
     assert (found.state == STICK).all()
     assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
     assert np.allclose(found.tangential, -part * mu * PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
@@ -97,7 +97,7 @@ def test_no_point_sticks_alone_when_the_shear_exceeds_the_limit():
     newton = Newton(body.condensed)
     start = replace(EquilibriumState.undeformed(body.condensed), state=np.full(len(mesh.skin), STICK, np.int32))
     with pytest.raises(ContactLost):  # the block accelerates: nothing can balance its load
-        newton.solved(start, LoadState(0.0, mu), newton.skin_x)
+        newton.solve_linear(start, LoadState(0.0, mu), newton.skin_x)
 
 
 @pytest.mark.parametrize("bound", [np.inf, 0.3 * PRESSURE])
@@ -106,7 +106,7 @@ def test_in_full_slip_every_point_carries_the_same_traction(bound):
     shear = min(mu * PRESSURE, bound)
     mesh, loads = pressed_block(shear, confined=True)
     body = LinearBody.of(mesh, [DERMIS], loads, free=("y", "turn"))
-    found = settled(Newton(body.condensed), LoadState(0.0, mu, bound, -1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(0.0, mu, bound, -1))
     assert (found.state == (SLIP if bound == np.inf else SHEAR_LIMITED)).all()
     assert np.allclose(found.normal, PRESSURE * body.condensed.fixed_length, rtol=0, atol=1e-15)
     assert np.allclose(found.tangential, -shear * body.condensed.fixed_length, rtol=0, atol=1e-15)
@@ -115,6 +115,6 @@ def test_in_full_slip_every_point_carries_the_same_traction(bound):
 def test_a_block_that_is_lifted_touches_nowhere():
     mesh = block(np.linspace(-1, 1, 4), np.linspace(0, 1, 3))
     body = LinearBody.of(mesh, [DERMIS])
-    found = settled(Newton(body.condensed), LoadState(-0.1, 0.3, np.inf, -1))
+    found = solve_full_slip(Newton(body.condensed), LoadState(-0.1, 0.3, np.inf, -1))
     assert (found.state == OPEN).all()
     assert not found.normal.any()

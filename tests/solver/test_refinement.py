@@ -8,8 +8,7 @@ import pytest
 from solver import Friction, Loading, NoSteadyState, NotConverged, Scene, Solve, solve, solve_many
 from solver.accuracy import adaptivity, refinement
 from solver.accuracy.refinement import MOST_UNKNOWNS, NestedGrid, adjoint, refine_lines
-from solver.continuation.small_states import WIDE
-from solver.continuation.small_states import settled as settled_state
+from solver.continuation.small_states import WIDE, settled_state
 from solver.equilibrium import Newton
 from solver.equilibrium.finger import LinearFinger
 from solver.mesh.mesher import Sizing
@@ -77,7 +76,7 @@ def test_dividing_what_has_the_largest_part_changes_the_sed_most():
     def change(gap):
         halves = np.ones(len(parts), np.int64)
         halves[gap] = 2
-        divided = lines.divided(*np.split(halves, [len(lines.arcs) - 1]))
+        divided = lines.divide(*np.split(halves, [len(lines.arcs) - 1]))
         return abs(sed(LinearFinger.of(scene, replace(sizing, fineness=divided)), scene) - before)
 
     changes = np.array([change(gap) for gap in range(len(parts))])
@@ -132,7 +131,7 @@ def test_a_surface_that_has_no_answer_does_not_keep_the_others_from_an_end(monke
 
 def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
     scene = Scene(friction=Friction(3.0, 0.004), loading=Loading(1.0, "+x"), solve=Solve("finite", evidence="quick"))
-    settled, tried = adaptivity.settled, []
+    settled, tried = adaptivity.settled_state, []
 
     def none_on_the_first(finger, *more):
         tried.append(finger)
@@ -140,7 +139,7 @@ def test_a_refined_mesh_without_a_state_has_its_columns_in_two(monkeypatch):
             raise NotConverged("the last node is neither open nor touching")
         return settled(finger, *more)
 
-    monkeypatch.setattr(adaptivity, "settled", none_on_the_first)
+    monkeypatch.setattr(adaptivity, "settled_state", none_on_the_first)
     meshes = adaptivity.Meshes()
     low = adaptivity.coarse_solution(scene, 1.0, 4.0, meshes)
     tried[:] = [low.finger]

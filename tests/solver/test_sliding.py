@@ -10,7 +10,7 @@ from solver._kernels.compiling import OPEN, SHEAR_LIMITED, SLIP
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.equilibrium import LoadState, Newton
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from tests.solver.finite_examples import block, finger
 from tests.solver.oracle import finite as oracle
 
@@ -32,7 +32,7 @@ REFERENCE = {
 def test_the_published_finger_answers_as_two_other_codes_found(name):
     load, sed, normal, tangential = REFERENCE[name]
     newton, probes, _ = finger(24, margin=3.0)
-    shape = settled(newton, load, tolerance=1e-7)
+    shape = solve_full_slip(newton, load, tolerance=1e-7)
     assert probes.average(shape.u)[0] == pytest.approx(sed, rel=0.003)
     assert shape.force[1] == pytest.approx(normal, rel=0.003)
     assert load.sense * shape.force[0] == pytest.approx(tangential, rel=0.003, abs=1e-12)
@@ -41,7 +41,7 @@ def test_the_published_finger_answers_as_two_other_codes_found(name):
 @pytest.fixture(scope="module")
 def capped():
     newton, _, _ = finger(5)
-    return newton, settled(newton, LoadState(1.5, 0.44, 0.03009, 1))
+    return newton, solve_full_slip(newton, LoadState(1.5, 0.44, 0.03009, 1))
 
 
 def test_the_surface_and_the_bone_push_alike(capped):
@@ -76,7 +76,7 @@ def test_incompressible_tissue_takes_as_many_iterations_and_has_its_own_limit(na
     iterations, sed = [], []
     for nu in (0.48, 0.49, 0.4999, 0.4999999):
         newton, probes, _ = finger(8, nu=nu)
-        shape = settled(newton, REFERENCE[name][0])
+        shape = solve_full_slip(newton, REFERENCE[name][0])
         iterations.append(shape.iterations)
         sed.append(probes.average(shape.u)[0])
     assert len(set(iterations)) == 1
@@ -86,15 +86,15 @@ def test_incompressible_tissue_takes_as_many_iterations_and_has_its_own_limit(na
 def test_without_friction_both_directions_are_the_same_and_a_bound_of_nothing_is_no_friction():
     newton, probes, _ = finger(5)
     pulls = (LoadState(1.0, 0.0, np.inf, 1), LoadState(1.0, 0.0, np.inf, -1), LoadState(1.0, 0.5, 0.0, 1))
-    sed = [probes.average(settled(newton, load).u)[0] for load in pulls]
+    sed = [probes.average(solve_full_slip(newton, load).u)[0] for load in pulls]
     np.testing.assert_allclose(sed, sed[0], rtol=1e-10)
 
 
 def test_the_next_surface_follows_from_the_last_one():
     newton, _, _ = finger(5)
-    first = settled(newton, LoadState(1.5, 0.24, 0.00877, 1))
+    first = solve_full_slip(newton, LoadState(1.5, 0.24, 0.00877, 1))
     load = LoadState(1.5, 0.44, 0.03009, 1)
-    onward, afresh = settled(newton, load, first), settled(newton, load)
+    onward, afresh = solve_full_slip(newton, load, first), solve_full_slip(newton, load)
     assert onward.iterations - first.iterations <= 7
     np.testing.assert_allclose(onward.u, afresh.u, atol=1e-9)
 
@@ -103,8 +103,8 @@ def test_scaling_all_stiffness_scales_the_answer():
     newton, probes, _ = finger(5)
     body = newton.condensed.body
     stiffer = FiniteBody.of(body.mesh, [NeoHooke(10 * E, 0.48) for E in (0.136, 0.08, 0.034)])
-    one = settled(newton, LoadState(1.0, 0.44, 0.02, 1))
-    ten = settled(Newton(stiffer.condensed), LoadState(1.0, 0.44, 0.2, 1))
+    one = solve_full_slip(newton, LoadState(1.0, 0.44, 0.02, 1))
+    ten = solve_full_slip(Newton(stiffer.condensed), LoadState(1.0, 0.44, 0.2, 1))
     np.testing.assert_allclose(ten.u, one.u, atol=1e-9)
     assert replace(probes, elements=stiffer).average(ten.u)[0] == pytest.approx(10 * probes.average(one.u)[0], rel=1e-9)
 
@@ -146,15 +146,15 @@ def test_displacements_are_as_good_as_was_asked_for_whichever_state_they_start_f
     start = None
     for name in ("slip 100", "slip 0", "slip 55", "stick 0 at d1.0", "press d2.0"):
         load = REFERENCE[name][0]
-        alone = settled(newton, load, None, tolerance)
-        after = settled(newton, load, start, tolerance)
-        true = settled(newton, load, alone, 1e-13)
+        alone = solve_full_slip(newton, load, None, tolerance)
+        after = solve_full_slip(newton, load, start, tolerance)
+        true = solve_full_slip(newton, load, alone, 1e-13)
         assert np.abs(alone.u - true.u).max() < tolerance
         assert np.abs(after.u - true.u).max() < tolerance
-        start = settled(newton, load, after, tolerance)  # leaves its tangent behind for the next surface
+        start = solve_full_slip(newton, load, after, tolerance)  # leaves its tangent behind for the next surface
 
 
 def test_contact_settled_within_a_linear_system_takes_the_whole_depth_in_one_step_of_few_iterations():
     newton, _, _ = finger(8, margin=3.0)
     for name in ("slip 0", "slip 55", "slip 100", "stick 0"):
-        assert settled(newton, REFERENCE[name][0], tolerance=1e-5).iterations <= 6
+        assert solve_full_slip(newton, REFERENCE[name][0], tolerance=1e-5).iterations <= 6

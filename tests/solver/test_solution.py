@@ -27,7 +27,7 @@ from solver.accuracy.audits import audits
 from solver.body.linear import skin_lengths
 from solver.equilibrium import LoadState
 from solver.equilibrium.finger import LinearFinger
-from solver.equilibrium.load_stepping import settled
+from solver.equilibrium.load_stepping import solve_full_slip
 from solver.mesh.mesher import Sizing
 from solver.response.fields import fields_of
 from solver.scene.published import SLIPPERINESS, STICKINESS, scene, scenes
@@ -115,7 +115,7 @@ def test_the_estimate_lies_above_the_error_and_below_one_per_cent(ten):
 def test_a_force_told_of_the_neighbouring_node_is_unbalanced_there():
     asked = Scene(friction=Friction(0.44, 0.02), loading=Loading(1.0, "-x"))
     finger = LinearFinger.of(asked, Sizing(5, 1.0, margin=3.0))
-    contact = settled(finger.newton, LoadState(1.0, 0.44, 0.02, 1))
+    contact = solve_full_slip(finger.newton, LoadState(1.0, 0.44, 0.02, 1))
     displacement = finger.displacement(contact)
     reaction, middle = contact.reaction.copy(), int(np.argmax(contact.normal))
     normal = reaction[:, 1]

@@ -81,5 +81,5 @@ def test_a_held_block_that_is_sheared_answers_as_the_closed_form():
     law = Hooke(0.08, 0.48)
     body = LinearBody.of(mesh, [law])
     forces = np.stack([0.001 * body.condensed.fixed_length, np.zeros(len(mesh.skin))], axis=1)
-    moved = body.condensed.loaded(forces.ravel()).untouched()
+    moved = body.condensed.with_load(forces.ravel()).free_displacement()
     assert moved[len(mesh.skin) // 2, 0] == pytest.approx(0.001 * 1.0 / law.shear, rel=1e-6)

@@ -10,7 +10,7 @@ from solver.body.linear import LinearBody
 from solver.constitutive import Hooke, NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
 from solver.equilibrium.finger import FiniteFinger, LinearFinger
-from solver.equilibrium.load_stepping import march, settled
+from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.mesh import Mesh, block
 from solver.mesh.mesher import Sizing
 from solver.prediction import percent
@@ -92,7 +92,7 @@ def _last(newton: Newton, path: Iterable[LoadState]) -> EquilibriumState:
 
 
 def _force(newton: Newton, depth: float, sense: int = -1) -> float:
-    return float(settled(newton, LoadState(depth, 0.3, sense=sense)).force[1])
+    return float(solve_full_slip(newton, LoadState(depth, 0.3, sense=sense)).force[1])
 
 
 def reversal(bodies: Bodies) -> Outcome:
@@ -104,7 +104,7 @@ def reversal(bodies: Bodies) -> Outcome:
     travels = np.cumsum(np.repeat(step * np.array(senses), leg)).tolist()
     states = list(march(finger.newton, down + [load._replace(travel=travel) for travel in travels]))
     seds = [_sed(finger, state) for state in states[press + leg - 1 :: leg]]
-    direct = [_sed(finger, settled(finger.newton, load._replace(sense=sense))) for sense in senses[:2]]
+    direct = [_sed(finger, solve_full_slip(finger.newton, load._replace(sense=sense))) for sense in senses[:2]]
     spread = max(abs(seds[0] / seds[2] - 1), abs(seds[0] / direct[0] - 1), abs(seds[1] / direct[1] - 1))
     flaw = "" if spread < bodies.agreement else f"differs from the direct states by {spread:.1g}"
     summary = f"SED {seds[0]:.4g} forth, {seds[1]:.4g} back; equal to the direct states to {power(spread)}"
@@ -123,7 +123,7 @@ def edge_at_node(bodies: Bodies) -> Outcome:
     finger = bodies.finger(bodies.fineness)
 
     def at(depth: float) -> EquilibriumState:
-        return settled(finger.newton, LoadState(float(depth), 0.3, sense=bodies.sense))
+        return solve_full_slip(finger.newton, LoadState(float(depth), 0.3, sense=bodies.sense))
 
     low, high = 1.4, 1.5
     fewest = int(at(low).touching.sum())
@@ -151,7 +151,7 @@ def distorted_finger(bodies: Bodies) -> Outcome:
 def stiff_part(bodies: Bodies, ratio: float) -> Outcome:
     """Press a soft block by a plate in it that is `ratio` times stiffer, and by one held as a whole in its place."""
     whole, alone = two_parts()
-    slide = settled(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
+    slide = solve_full_slip(bodies.newton(whole, [(0.034, 0.48), (0.034 * ratio, 0.3)]), LoadState(0.3, 0.3, sense=-1))
     force, rigid = float(slide.force[1]), _force(bodies.newton(alone, [(0.034, 0.48)]), 0.3)
     drag, off = -float(slide.force[0]) / force, abs(force / rigid - 1)
     good = off < 2.0 / ratio + bodies.rigid_agreement and abs(drag - 0.3) < 1e-12
@@ -163,7 +163,7 @@ def one_node(bodies: Bodies) -> Outcome:
     """Press so lightly that one node touches: its force is its depth by its compliance at small strain."""
     mesh, layers = block(np.linspace(-4, 4, 17), np.linspace(0, 3, 7), radius=8.0), [(0.08, 0.48)]
     depth, mu = 1e-5, 0.3
-    slide = settled(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
+    slide = solve_full_slip(bodies.newton(mesh, layers), LoadState(depth, mu, sense=-1))
     compliance = np.linalg.inv(LinearBody.of(mesh, [Hooke(*layers[0])]).condensed.stiffness)
     up = 2 * (len(mesh.skin) // 2) + 1  # the unknown of the node in the middle
     force, exact = float(slide.force[1]), depth / float(compliance[up, up] - mu * compliance[up, up - 1])

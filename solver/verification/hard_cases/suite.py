@@ -55,7 +55,7 @@ def judge(case: Case, neighbour: Outcome | None = None) -> HardCase:
 
 
 def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
-    begun, outcome = clock(), case.run()
+    start, outcome = clock(), case.run()
     flaws = [outcome.flaw] if outcome.flaw else []
     if not outcome.answered and case.must == ANSWER:
         flaws.append("no answer")
@@ -66,7 +66,7 @@ def _judge(case: Case, neighbour: Outcome | None) -> tuple[HardCase, Outcome]:
         if off > case.within:
             flaws.append(f"{off:.1g} from {case.same_as}, not {case.within:g}")
     whole = "; ".join(flaws)
-    row = HardCase(case.kinematics, case.name, case.must, outcome.answered, whole, outcome.summary, clock() - begun)
+    row = HardCase(case.kinematics, case.name, case.must, outcome.answered, whole, outcome.summary, clock() - start)
     return row, outcome
 
 

@@ -14,7 +14,7 @@ from solver.body.linear import LinearBody, edge_load
 from solver.constitutive import Hooke
 from solver.contact import OPEN, STICK, FrictionLaw
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton
-from solver.equilibrium.load_stepping import balanced, settled, slide_beside
+from solver.equilibrium.load_stepping import slide_from_guess, solve_full_slip, solve_under_forces
 from solver.verification.published.bodies import chain, disc, grade, mirror, mound, stress, touching_within
 from solver.verification.published.zones import half_above, half_width
 
@@ -32,14 +32,14 @@ def half_plane(half_width: float, radius: float, law: Hooke, wide: float = 100.0
 
 def press_under_load(newton: Newton, load: float, half_width: float) -> EquilibriumState:
     """Return the contact of a body pressed by `load` [N/mm]."""
-    return slide_beside(newton, NONE, touching_within(newton, 1.05 * half_width), load)
+    return slide_from_guess(newton, NONE, touching_within(newton, 1.05 * half_width), load)
 
 
 def press(finest: float, nu: float) -> float:
     """Return the force [N/mm] of a light half-plane on elements of that size, pressed by 1e-3 half-widths."""
     x, y = mirror(grade(finest, 0.3, 1.2, 20.0)), grade(finest, 0.3, 0.0, 20.0)
     body = LinearBody.of(mound(x, y, RADIUS, 3.0), [Hooke(0.08, nu)])
-    return float(settled(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
+    return float(solve_full_slip(Newton(body.condensed), NONE._replace(depth=1e-3)).force[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def whole_cylinder(load: float, half_width: float, peak: float) -> Cylinder:
     loads = edge_load(mesh, top, traction)
     body = LinearBody.of(mesh, [Hooke(0.08, 0.48)], loads * (load / -loads.sum()), free=("y", "turn"))
     newton = Newton(body.condensed)
-    slide = slide_beside(newton, NONE, touching_within(newton, 0.9 * half_width))
+    slide = slide_from_guess(newton, NONE, touching_within(newton, 0.9 * half_width))
     moved = body.displacement(slide.u)
     centre = int(np.argmin(np.hypot(x, y)))
     at = mesh.nodes[mesh.skin, 0]
@@ -119,12 +119,12 @@ class Light:
         """Return the state after a tangential force `part` mu P along -x on the far side of what only pressed."""
         stuck = np.where(self.press.touching, STICK, OPEN).astype(np.int32)
         before = replace(self.press, state=stuck, load=LoadState(self.press.load.depth, law.mu, law.tau_max))
-        return balanced(self.newton, before, ForceLoad(self.load, -part * law.mu * self.load))
+        return solve_under_forces(self.newton, before, ForceLoad(self.load, -part * law.mu * self.load))
 
     def slip(self, law: FrictionLaw, direction: int = 1) -> EquilibriumState:
         """Return the state of full slip; the body moves along `direction` x."""
         load = LoadState(0.0, law.mu, law.tau_max, -direction)
-        return slide_beside(self.newton, load, self.press.state, self.load)
+        return slide_from_guess(self.newton, load, self.press.state, self.load)
 
 
 @cache

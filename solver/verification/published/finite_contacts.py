@@ -11,7 +11,7 @@ from solver.arrays import Array
 from solver.body.finite import FiniteBody
 from solver.constitutive import NeoHooke
 from solver.equilibrium import EquilibriumState, LoadState, Newton
-from solver.equilibrium.load_stepping import march, settled
+from solver.equilibrium.load_stepping import march, solve_full_slip
 from solver.verification.published.bodies import grade, mirror, mound
 from solver.verification.published.zones import half_above, half_width
 
@@ -67,7 +67,7 @@ class LightFinite:
     def slide_at_bound(self, mu: float, k: float) -> tuple[float, float]:
         """Return Q/(mu P) in full slip under the bound k mu p0, and half the width by a in which mu p is above it."""
         load = self.pressed.load._replace(mu=mu, tau=k * mu * self.peak, sense=1)
-        state = settled(self.newton, load)
+        state = solve_full_slip(self.newton, load)
         drag = float(state.force[0]) / (mu * float(state.force[1]))
         width = half_above(self.x, state.reaction[:, 1] / self.length - k * self.peak)
         return drag, width / self.half_width
@@ -96,5 +96,5 @@ def light_finite() -> LightFinite:
     x = mirror(grade(ELEMENT, 0.3, 1.2, WIDE))
     y = grade(ELEMENT, 0.3, 0.0, WIDE)
     newton = Newton(FiniteBody.of(mound(x, y, RADIUS, 3.0), [NeoHooke(YOUNG, NU)]).condensed)
-    pressed = settled(newton, LoadState(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
+    pressed = solve_full_slip(newton, LoadState(DEPTH, 0.0, np.inf, 1), tolerance=1e-12)
     return LightFinite(newton, pressed, float(pressed.force[1]))

@@ -34,7 +34,7 @@ def hole_displacement(nu: float, radial: int, around: int) -> float:
 
 
 def _free(body: LinearBody) -> Array:
-    return body.displacement(body.condensed.untouched())
+    return body.displacement(body.condensed.free_displacement())
 
 
 def cylinder_errors(nu: float, radial: int) -> tuple[float, float, float]:
@@ -79,5 +79,5 @@ def cook(young: float, nu: float, force: float, count: int) -> tuple[float, floa
     """
     mesh = membrane(count, count)
     loads = edge_load(mesh, mesh.skin, np.tile([0.0, force / 16.0], (len(mesh.skin), 1)))
-    risen = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.untouched()[:, 1]
+    risen = LinearBody.of(mesh, [Hooke(young, nu)], loads).condensed.free_displacement()[:, 1]
     return float(risen[len(risen) // 2]), float(risen[-1])

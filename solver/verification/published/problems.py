@@ -85,26 +85,26 @@ def _row(
 def thick_cylinders() -> Iterator[Problem]:
     """Yield the widening of a thick cylinder, five elements across its wall."""
     for nu in (0.3, 0.48, 0.49, 0.499, 0.4999, 0.49999, 0.4999999):
-        begun = clock()
+        start = clock()
         numbers = locking.hole_displacement(nu, 5, 20)
         source = "MacNeal and Harder 1985"
-        yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), numbers, 2e-4, begun)
+        yield _row(f"thick cylinder, nu {nu}", source, "u(a) [mm]", locking.widening(nu), numbers, 2e-4, start)
 
 
 def membranes() -> Iterator[Problem]:
     """Yield the rise of Cook's membrane, 32 elements along each side."""
     for problem, source, young, nu, force, middle, corner in COOK:
-        begun = clock()
+        start = clock()
         numbers = locking.cook(young, nu, force, 32)
-        yield _row(problem, source, "u_y at (48, 52)", middle, numbers[0], 0.002, begun)
+        yield _row(problem, source, "u_y at (48, 52)", middle, numbers[0], 0.002, start)
         if corner is not None:
-            yield _row(problem, source, "u_y at (48, 60)", corner, numbers[1], 0.002, begun)
+            yield _row(problem, source, "u_y at (48, 60)", corner, numbers[1], 0.002, start)
 
 
 def hertz() -> Iterator[Problem]:
     """Yield half-width and peak pressure under the gap of a parabola."""
     for problem, young, nu, radius, load, half_width, peak in HERTZ:
-        begun = clock()
+        start = clock()
         numbers = contacts.hertz(young, nu, radius, load, half_width, peak)
         source = KONTER if radius == 50.0 else JOHNSON
         yield _row(
@@ -114,27 +114,27 @@ def hertz() -> Iterator[Problem]:
             half_width,
             numbers.half_width,
             0.01,
-            begun,
+            start,
         )
-        yield _row(problem, source, "peak p0 [MPa]", peak, numbers.peak, 0.01, begun)
+        yield _row(problem, source, "peak p0 [MPa]", peak, numbers.peak, 0.01, start)
 
 
 def cylinder() -> Iterator[Problem]:
     """Yield what a whole cylinder between plates shows; a/R = 0.16, whose square is what the theory neglects."""
-    begun = clock()
+    start = clock()
     numbers = contacts.whole_cylinder(0.01, 0.782578, 0.008135)
     problem, source = "whole cylinder between plates", "Johnson 1985, eq. 5.57"
-    yield _row(problem, source, "approach [mm]", 0.167860, numbers.approach, 0.005, begun)
+    yield _row(problem, source, "approach [mm]", 0.167860, numbers.approach, 0.005, start)
     yield _row(
-        problem, source, "half-width a, from <x^2> of the pressure [mm]", 0.782578, numbers.half_width, 0.01, begun
+        problem, source, "half-width a, from <x^2> of the pressure [mm]", 0.782578, numbers.half_width, 0.01, start
     )
-    yield _row(problem, source, "peak p0 [MPa]", 0.008135, numbers.peak, 0.01, begun)
+    yield _row(problem, source, "peak p0 [MPa]", 0.008135, numbers.peak, 0.01, start)
 
 
 def below() -> Iterator[Problem]:
     """Yield the largest difference of stresses below a contact, by p0, with and without friction."""
     for mu, table in BELOW.items():
-        begun = clock()
+        start = clock()
         light = contacts.light(wide=300.0)
         rows = np.array(table)
         got = light.stress(light.slip(FrictionLaw(mu, math.inf), -1), rows[:, :2])
@@ -142,7 +142,7 @@ def below() -> Iterator[Problem]:
         worst = float(np.abs(parts - rows[:, 2:]).max())
         yield Problem(
             f"stresses below a contact, mu {mu:g}", "Flamant's kernels, as Smith and Liu 1953",
-            "largest difference by p0", 0.0, worst, worst, 0.005, clock() - begun, "p0",
+            "largest difference by p0", 0.0, worst, worst, 0.005, clock() - start, "p0",
         )  # fmt: skip
 
 
@@ -150,25 +150,25 @@ def partial_slip() -> Iterator[Problem]:
     """Yield half the stick's width and the traction in its middle, the pressure being that of nu = 0.4999."""
     light, law = contacts.light(), FrictionLaw(0.3, math.inf)
     for part in PARTS:
-        begun = clock()
+        start = clock()
         numbers = light.shear(law, part)
         half = math.sqrt(1 - part)
         problem, source = f"partial slip, Q/(mu P) {part:g}", "Cattaneo 1938, Mindlin 1949"
         width = contacts.stick_width(light, numbers, law.mu)
         traction = -float(numbers.tangential[len(light.x) // 2] / light.length[len(light.x) // 2])
-        yield _row(problem, source, "half stick c/a", half, width, 0.02, begun)
-        yield _row(problem, source, "q(0)/(mu p0)", 1 - half, traction / (law.mu * light.peak), 0.02, begun)
+        yield _row(problem, source, "half stick c/a", half, width, 0.02, start)
+        yield _row(problem, source, "q(0)/(mu p0)", 1 - half, traction / (law.mu * light.peak), 0.02, start)
 
 
 def bound_on_hertz() -> Iterator[Problem]:
     """Yield the drag of a bound on a Hertz pressure."""
     light, mu = contacts.light(), 0.3
     for k, force in CAPPED:
-        begun = clock()
+        start = clock()
         law = FrictionLaw(mu, k * mu * light.peak)
         numbers = light.slip(law)
         drag, width = -float(numbers.tangential.sum()) / (mu * light.load), contacts.capped_width(light, numbers, law)
-        yield from _bound_problems(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, begun)
+        yield from _bound_problems(f"bound on a Hertz pressure, k {k:g}", k, (force, drag), width, start)
 
 
 def _bound_problems(
@@ -184,20 +184,20 @@ def _bound_problems(
 
 def at_finite_strain() -> Iterator[Problem]:
     """Yield the same contacts at finite strain, so light that they must be those of the theory."""
-    begun = clock()
+    start = clock()
     light = finite_contacts.light_finite()
     name = "Hertz at finite strain, a/R 0.001"
-    yield _row(name, JOHNSON, "half-width a, by a", 1.0, light.found_width() / light.half_width, 0.01, begun)
-    yield _row(name, JOHNSON, "peak p0, by p0", 1.0, light.found_peak() / light.peak, 0.01, begun)
+    yield _row(name, JOHNSON, "half-width a, by a", 1.0, light.found_width() / light.half_width, 0.01, start)
+    yield _row(name, JOHNSON, "peak p0, by p0", 1.0, light.found_peak() / light.peak, 0.01, start)
     for k, force in CAPPED:
-        begun = clock()
+        start = clock()
         name = f"bound on a Hertz pressure at finite strain, k {k:g}"
         drag, width = light.slide_at_bound(0.3, k)
-        yield from _bound_problems(name, k, (force, drag), width, begun)
+        yield from _bound_problems(name, k, (force, drag), width, start)
     for part in FINITE_PARTS:
-        begun = clock()
+        start = clock()
         drag, width, traction = light.shear(0.3, part)
         half = math.sqrt(1 - drag)
         name, source = f"partial slip at finite strain, Q/(mu P) {drag:.3f}", "Cattaneo 1938, Mindlin 1949"
-        yield _row(name, source, "half stick c/a", half, width, 0.02, begun)
-        yield _row(name, source, "q(0)/(mu p0)", 1 - half, traction, 0.02, begun)
+        yield _row(name, source, "half stick c/a", half, width, 0.02, start)
+        yield _row(name, source, "q(0)/(mu p0)", 1 - half, traction, 0.02, start)

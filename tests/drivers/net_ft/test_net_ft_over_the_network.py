@@ -113,9 +113,9 @@ def test_units_that_somebody_changes_while_it_streams_are_found_within_a_second(
     began = time.monotonic()
     with pytest.raises(LinkLost, match="counts in other units than before: 1 counts a N"):
         read_until(transducer, lambda: False)
-    took = time.monotonic() - began
+    elapsed_s = time.monotonic() - began
     transducer.close()
-    assert took < 1.0
+    assert elapsed_s < 1.0
     assert 0 < transducer.health.off_units < 400, "readings that came since the page was last as before"
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 
 from solver.arrays import Array
-from solver.constitutive import PLAIN, shape, turned
+from solver.constitutive import PLAIN, shape, stress_parts
 from solver.contact import SHEAR_LIMITED, SLIP
 
 
@@ -32,13 +32,13 @@ def energy(law, F):
 
 def overstress_energy(T: Array, F: Array) -> Array:
     """Return 1/2 J^-2/3 T:C (...) [MPa], of which `overstress` is the derivative within a step."""
-    J, _, _, whole = turned(F, T)
+    J, _, _, whole = stress_parts(F, T)
     return 0.5 * J ** (-2.0 / 3.0) * whole
 
 
 def overstress_tangent(T: Array, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa] within a step."""
-    J, inverse, pulled, whole = turned(F, T)
+    J, inverse, pulled, whole = stress_parts(F, T)
     wide = (..., None, None, None, None)
     plane = np.stack([T[..., [0, 2]], T[..., [2, 1]]], axis=-2)
     across = np.einsum("...aA,...bB->...aAbB", pulled, inverse)

@@ -7,7 +7,7 @@ from solver.body.linear import Elastic
 
 def forces(body, laws):
     """Return the forces (nodes, 2) that hold all nodes where they are [N/mm]."""
-    inner = Elastic.of(body.mesh, [law.relaxed for law in laws]).forces(body.displacement[body.mesh.elements])
+    inner = Elastic.of(body.mesh, [law.long_term_moduli for law in laws]).forces(body.displacement[body.mesh.elements])
     inner += body.elastic.forces(np.einsum("ejm,em->ej", body._left, body._g).reshape(-1, 9, 2))
     return body.mesh.assemble(inner)
 
@@ -19,7 +19,7 @@ def stress(body, probes):
     springs = local * (1.0 - body._g[element].sum(axis=1))[:, None]
     springs += np.einsum("pim,pm->pi", body._left[element], body._g[element])
     gradient = np.einsum("pna,pnb->pab", springs.reshape(-1, 9, 2), probes.gradient)
-    rows = np.einsum("pm,pmi->pi", body.elastic.combined(probes), body.elastic.divergence[element])
+    rows = np.einsum("pm,pmi->pi", body.elastic.modes_at(probes), body.elastic.divergence[element])
     theta, volume = np.sum(rows * springs, axis=1), np.sum(rows * local, axis=1)
     shear = body.elastic.elements.shear[element]
     mean = body._bulk[element] * volume - 2.0 / 3.0 * shear * theta
