@@ -6,7 +6,7 @@ from typing import Any, Literal, Protocol
 
 from drivers.clock import Clock
 from drivers.readings import ReadingBlock
-from drivers.transducer import COUNTS, DeviceFault, Health, LinkLost, Transducer, flagged_words
+from drivers.transducer import COUNTS, DeviceFault, Health, LinkLost, SetupError, Transducer, flagged_words
 from sessions.plan.plan import SessionPlan
 from sessions.recording import Acknowledged, RecordingError, SessionWriter
 from sessions.run.event_log import data_of, kind_of, line_of
@@ -144,7 +144,7 @@ class _Run:
                 with interrupted.raised():  # a device that does not answer may take its time
                     self.transducer.start()
             cause, reason = self._go_round(lambda: ("stopped", STOPPED) if interrupted.heard else stop())
-        except (LinkLost, DeviceFault) as error:
+        except (LinkLost, DeviceFault, SetupError) as error:
             cause, reason = "device", str(error)
         except KeyboardInterrupt:
             cause, reason = "stopped", STOPPED

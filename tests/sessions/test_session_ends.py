@@ -6,6 +6,7 @@ import signal
 import pytest
 from told_session import Session, once
 
+from drivers.transducer import SetupError
 from sessions.recording import Recording
 from sessions.run.steps import Abort, AskMount, AskScore, AskStroke, MeasureZero
 
@@ -59,6 +60,18 @@ def test_ctrl_c_while_a_device_does_not_answer_is_heard_at_once(tmp_path):
     session.transducer.start = lambda: os.kill(os.getpid(), signal.SIGINT)
     session.transducer.began_ns = session.clock.ns
     assert_ended(session.run(), "stopped by the user", "stopped")
+
+
+def test_a_device_that_refuses_to_start_ends_the_session_with_what_it_says(tmp_path):
+    session = Session(tmp_path / "s")
+
+    def refuse():
+        raise SetupError("it is streaming already; stop it before starting it again")
+
+    session.transducer.start = refuse
+    session.transducer.began_ns = session.clock.ns
+    assert_ended(session.run(), "it is streaming already; stop it before starting it again", "device")
+    assert session.end.readings == 0
 
 
 def test_a_lost_link_ends_the_session_and_keeps_what_had_come(tmp_path):
