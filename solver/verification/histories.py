@@ -45,8 +45,7 @@ def press_and_slide(
     [(0.5, 0.0), (1.0, 0.0), (1.0, -2.0), (1.0, -4.0)]
     """
     down = [LoadState(depth * (i + 1) / press, mu, tau) for i in range(press)]
-    along = [LoadState(depth, mu, tau, travel=-direction * distance * (i + 1) / slides) for i in range(slides)]
-    return down + along
+    return down + [LoadState(depth, mu, tau, travel=-direction * distance * (i + 1) / slides) for i in range(slides)]
 
 
 def _march(scene: Scene) -> March:

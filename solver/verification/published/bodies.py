@@ -164,8 +164,7 @@ def locate(mesh: Mesh, points: Array) -> tuple[Indices, Array]:
     centres = mesh.nodes[mesh.elements[:, 8]]
     near = np.argsort(np.sum((points[:, None] - centres) ** 2, axis=2), axis=1)[:, :24]
     corners = mesh.nodes[mesh.elements[near.ravel()]]
-    repeated = np.repeat(points, near.shape[1], axis=0)
-    local = local_coordinates(corners, repeated, np.zeros((near.size, 2)))
+    local = local_coordinates(corners, np.repeat(points, near.shape[1], axis=0), np.zeros((near.size, 2)))
     outside = np.abs(local).max(axis=1).reshape(near.shape)
     best = np.argmin(np.where(np.isfinite(outside), outside, np.inf), axis=1)
     rows = np.arange(len(points))
