@@ -44,7 +44,7 @@ class Connected:
 
     transducer: Transducer
     bench: Bench | None = None
-    bench_now: Callable[[], float] = lambda: 0.0  # the bench's time [s]
+    bench_now: Callable[[], float] | None = None  # the bench's time [s]
     recorded_frame: Frame | None = None  # of a recording that is replayed
 
     @property
@@ -145,7 +145,7 @@ class SimulatedHand:
                 bench.mount(self.surface(trial))
             case steps.AskStroke(trial):
                 self.stroked.append(trial)
-                if bench is not None and self.connected is not None:
+                if bench is not None and self.connected is not None and self.connected.bench_now is not None:
                     stroke = self.subject.stroke(self.surface(trial), self.take(trial))
                     bench.begin_stroke(stroke, self.connected.bench_now())
             case _:
@@ -161,9 +161,9 @@ class SimulatedHand:
 
 
 class SimulatedPeople(SimulatedHand):
-    """Experimenter and subject in one, for a session nobody sits at: they do at once what is asked of them.
+    """A simulated experimenter and subject, who answer every command of an unattended session at once.
 
-    With a bench the subject strokes it, and judges when the finger has left; without one it strokes and judges unseen.
+    With a bench the subject strokes it and judges after the lift. Without one there are no readings.
     """
 
     def __init__(

@@ -208,7 +208,7 @@ def undisturbed_run(name, folder):
             transducer, bench, now = (
                 opened.transducer,
                 opened.bench or device.bench,
-                opened.bench_now if opened.bench else device.now,
+                opened.bench_now or device.now,
             )
             course.info, course.bench = transducer.info, bench
             bench.mount(paper_surfaces()["stickiness", 80])
@@ -265,7 +265,7 @@ def disturbed_course(name, folder):
         before = handles(device)
         told, blocks, sentence = {}, [], ""
         with connected(device.uri, clock) as opened:
-            transducer, now = opened.transducer, opened.bench_now if opened.bench else device.now
+            transducer, now = opened.transducer, opened.bench_now or device.now
             transducer.start()
             blocks.append(transducer.read(10.0))
             for kind in ONE_AFTER_THE_OTHER:
@@ -303,7 +303,7 @@ def planted_statuses_course(name, folder):
         device = started(name, faults, clock, folder, monkeypatch)
         try:
             with connected(device.uri, clock) as opened:
-                transducer, now = opened.transducer, opened.bench_now if opened.bench else device.now
+                transducer, now = opened.transducer, opened.bench_now or device.now
                 transducer.start()
                 for status in simulator(name).statuses:
                     if simulator(name).at_start:
