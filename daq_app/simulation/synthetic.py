@@ -296,8 +296,8 @@ _FINGERS = np.linspace(-4.0, 4.0, 9)  # solved: friction of the finger, in its s
 class PlantedRelation:
     """How single scores go with SEDs within people at large."""
 
-    r: float  # the noise of judgement in it
-    slope: float  # drift and carry-over beside it [points per kPa]
+    r: float  # with the noise of judgement [-]
+    slope: float  # drift and carry-over accounted for [points per kPa]
 
 
 def planted_relations(

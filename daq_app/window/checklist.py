@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from daq_app.window.new_session import Bench, SessionForm, enrolment, is_code, place_of, refusals
+from daq_app.window.new_session import Bench, SessionForm, enrolment, place_of, refusals
 from daq_app.wording import tr, tr_noop
+from sessions.plan.protocols import is_code
 from sessions.plan.study import is_study
 
 FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -58,7 +59,7 @@ def headline(cards: tuple[Card, ...], subject: str) -> str:
             return tr("Press Enter to start the session of {subject}.", subject=subject.strip())
         case Card(field="forces"):
             return tr("Connect a transducer, or choose scores only.")
-        case Card(field="subject") if not is_code(subject):
+        case Card(field="subject") if not is_code(subject.strip()):
             return tr("Give the subject's code, then press Enter to start.")
         case _:
             return tr("Complete the card “{name}”.", name=tr(first.name))

@@ -11,7 +11,7 @@ from daq_app.recorder.messages import Kind, People, StartSession
 from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr
 from sessions.plan.plan import Frame, Hand, Phase
-from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
+from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
 from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
 from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
@@ -168,15 +168,6 @@ def refusals(form: SessionForm, bench: Bench) -> Mapping[str, str]:
     return {}
 
 
-def is_code(subject: str) -> bool:
-    """Say whether a text may stand for a subject.
-
-    >>> is_code("P07"), is_code("Ada Lovelace"), is_code("")
-    (True, False, False)
-    """
-    return re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}", subject.strip()) is not None
-
-
 def offered(form: SessionForm) -> tuple[Phase, ...]:
     """Return what may come before the trials that count, as the study's protocol or the form's has it."""
     try:
@@ -205,7 +196,7 @@ def enrolment(form: SessionForm) -> Enrolment | None:
     if study is None:
         return None
     subject, name = form.subject.strip(), study.protocol.name
-    if not is_code(subject):
+    if not is_code(subject.strip()):
         return Enrolment(name, tr("A study of protocol {name}: give the code of one of its subjects.", name=name))
     if subject not in study.members:
         words = tr("{subject} is not enrolled in this study ({name}) yet.", subject=subject, name=name)
@@ -282,7 +273,7 @@ def unfinished(folder: Path) -> tuple[Unfinished, ...]:
 
 def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
     wrong: dict[str, str] = {}
-    if not is_code(form.subject):
+    if not is_code(form.subject.strip()):
         wrong["subject"] = tr("Give a code of letters, digits, - and _ (at most 32), never a name.")
     if re.search(r"[/\\]|^\.", form.study.strip()):
         wrong["study"] = tr("A study's name has no slash in it and does not begin with a dot.")

@@ -121,14 +121,13 @@ class CondensedLinear:
     """A body at small strain, whose states are those of its skin: u (k, 2) [mm] are the displacements of that alone."""
 
     def __init__(self, rest: Array, stiffness: Array, load: Array, length: Array, held: Narrow) -> None:
-        """Take skin that lies at `rest` (k, 2), of a `length` (k,) at each node, `held` as CondensedBody has it.
+        """Take skin at `rest` (k, 2) [mm] with `length` (k,) [mm] and `held` (k,) as in CondensedBody.
 
-        `stiffness` (2 k, 2 k) and dead `load` (2 k,) are those of x, y of one node, x, y of the next.
+        `stiffness` (2 k, 2 k) and dead `load` (2 k,) have x, y of each node in turn.
         """
         self.constant, self.bulk = True, 0.0
         self.rest, self.stiffness, self.load = rest, stiffness, load
-        self.fixed_length, self.held = length, held
-        self.middle = np.zeros(len(rest), np.int32)
+        self.fixed_length, self.held, self.middle = length, held, np.zeros(len(rest), np.int32)
         self.motions = np.zeros((2 * len(rest), 0))  # of the body as a whole that the surface alone balances
         self.springs = self.motions  # all that nothing holds, orthonormal
         self.force = -load
