@@ -1,4 +1,4 @@
-"""Checks that a result carries with it: what must balance, and what must not be exceeded. Perfect is 0."""
+"""Audits of a state and of a load path: residuals and violated constraints, 0 where perfect."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,28 +14,27 @@ from solver.equilibrium.finger import Finger
 from solver.failures import MIXED, NoSteadyState, NotConverged
 from solver.scene import Scene
 
-MISSED = 1e-5  # of forces that are given, by which a state may miss them
-UNSOUND = 1e-4  # unbalanced part of the forces from which round-off has spoilt the answer [-]
-DOUBTED = 1e-8  # and from which a warning says so
-PIERCED = 1e-7  # part of the indentation by which skin may lie too low without a warning [-]
+MISSED = 1e-5  # largest relative difference from given forces
+UNSOUND = 1e-4  # relative residual from which a state is refused
+DOUBTED = 1e-8  # relative residual from which a warning is given
+PIERCED = 1e-7  # penetration by the indentation from which a warning is given
 
 
 def audits(
     finger: Finger[Patches], state: EquilibriumState, displacement: Array, overstress: Array | None = None
 ) -> dict[str, float]:
-    """Return the checks of one state. Perfect is 0, save for `smallest_det_F`.
+    """Return the audits of one state, 0 where perfect, except for `smallest_det_F`.
 
-    `displacement` (nodes, 2) is relative to the bone [mm]; `overstress` (nodes, 2) are the forces of terms that relax,
-    where there are any [N/mm].
+    `displacement` (nodes, 2) is relative to the bone [mm]; `overstress` (nodes, 2) are the nodal forces of relaxing
+    terms [N/mm].
 
     `equilibrium_x`, `equilibrium_y`: bone reaction plus contact force, by the contact force.
-    `inner_forces`: largest unbalanced force on a node that is not held, the surface's own on skin that touches
-    included, by the contact force.
-    `work_balance`: were the displacement to grow by a part of itself, by how much the stored energy would grow against
-    the work of the contact forces, relative. At small strain that is Clapeyron's theorem. It balances the state, not a
-    way there: a state found directly has none.
-    `penetration`: of any skin node, by the indentation. `tension`: largest pull on a touching point, by the largest
-    push. `cone_violation`: |t| beyond min(mu p, tau_max), the bound on the deformed length, by the largest push.
+    `inner_forces`: largest residual at a free node, with the surface's force on nodes in contact, by the contact force.
+    `work_balance`: derivative of the stored energy by a factor of the displacement, against that of the work of the
+    contact forces, relative. At small strain that is Clapeyron's theorem. It concerns the state and not a load path.
+    `penetration`: of any node of the skin, by the indentation. `tension`: largest tension at a node in contact, by the
+    largest normal force. `cone_violation`: |t| beyond min(mu p, tau_max) on the deformed length, by the largest normal
+    force.
     """
     mesh, condensed = finger.geometry.mesh, finger.newton.condensed
     inner, grown = finger.body.forces(displacement), finger.body.energy_growth(displacement)
@@ -54,7 +53,7 @@ def audits(
     length = np.empty(len(state.state))
     x = np.ascontiguousarray(state.place(condensed)[:, 0])
     bounded_length(x, finger.newton.skin, state.state, state.load.mu, length)
-    # Open skin may hang over, its length along the surface negative: no limit of it is meant.
+    # Open skin may overhang, with a negative length along the surface, which has no friction limit.
     limit = FrictionLaw(float(state.load.mu), state.load.tau).limit(state.normal, np.maximum(length, 0.0))
     return {
         "equilibrium_x": abs(float(bone[0])) / total,
@@ -86,12 +85,12 @@ def force_residuals(scene: Scene, normal: float, tangential: float) -> dict[str,
 
 
 def imbalance(checks: Mapping[str, float]) -> float:
-    """Return what `audits` leave unbalanced at most, of forces and of work."""
+    """Return the largest residual of forces and work among `checks`."""
     return max(checks[name] for name in ("equilibrium_x", "equilibrium_y", "inner_forces", "work_balance"))
 
 
 def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
-    """Raise NotConverged where round-off has spoilt the answer at `depth` [mm]."""
+    """Raise NotConverged where residuals at `depth` [mm] are too large, because of round-off."""
     if (left := imbalance(checks)) > UNSOUND:
         raise NotConverged(
             f"Forces balance to {left:.1g} only at {depth:g} mm indentation: round-off has swallowed the answer; "
@@ -100,9 +99,9 @@ def refuse_unsound(checks: Mapping[str, float], depth: float) -> None:
 
 
 def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displacement: Array) -> None:
-    """Raise NoSteadyState where a bound on traction alone holds skin displaced farther than the finger is long.
+    """Raise NoSteadyState where skin is displaced farther than the length of the finger, and only a bound holds it.
 
-    At small strain a slide that wedges itself in has a state under any bound, however high.
+    At small strain a wedging slide has a state under any bound, however high.
     """
     farthest, length = float(np.abs(displacement).max()), float(np.ptp(finger.geometry.mesh.nodes, axis=0).max())
     if farthest > length and (state.state == SHEAR_LIMITED).any():
@@ -113,7 +112,7 @@ def refuse_beyond_finger(finger: Finger[Patches], state: EquilibriumState, displ
 
 
 def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
-    """Return a sentence for each of `audits` that shows more round-off than answers usually have."""
+    """Return a warning for each of `checks` with unusual round-off."""
     warnings: list[str] = []
     if (left := imbalance(checks)) > DOUBTED:
         warnings.append(f"Forces balance to {left:.1g} only: {MIXED} magnify round-off.")
@@ -123,9 +122,9 @@ def rounding(checks: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def inside_out(checks: Mapping[str, float]) -> str:
-    """Return a sentence where `audits` say that tissue is turned inside out, else "".
+    """Return a warning where tissue is turned inside out, else "".
 
-    Small strain goes on there as if nothing were, with a stiffness and an energy that no tissue has.
+    Small strain has finite stiffness and energy there, which no tissue has.
     """
     if checks["smallest_det_F"] > 0.0:
         return ""
@@ -136,18 +135,18 @@ def inside_out(checks: Mapping[str, float]) -> str:
 
 
 def course_audits(newton: Newton, states: Sequence[EquilibriumState], *, relaxing: bool = False) -> dict[str, float]:
-    """Return the checks of a whole march, from rest on, relative to the bone's work.
+    """Return the audits of a load path from the undeformed state, relative to the work of the bone.
 
-    The bone's work and friction's take the mean of the forces at both ends of a step.
+    The work of the bone and of friction uses the mean of the forces at both ends of a step.
     `course_work_balance`: work of the forces on the skin less the stored energy. At small strain the mean is exact; at
-    finite strain the curve of the elements' forces within a step is taken by Simpson's rule.
-    `course_step_work`: bone work less stored energy less what friction took. It vanishes as the square of the step, or
-    in proportion to it where points come down on the surface within a step.
-    `course_least_dissipation`: the least work that friction took in a step (never negative).
+    finite strain the internal forces within a step are integrated by Simpson's rule.
+    `course_step_work`: bone work less stored energy less dissipation. It vanishes with the square of the step, or in
+    proportion to it where points come into contact within a step.
+    `course_least_dissipation`: smallest dissipation by friction in a step, never negative.
 
-    Where tissues relax they take work too, and no force within a step is known without its past. There is
-    `course_viscous_work` in place of the first two, bone work less friction less what is stored at the end. It is
-    positive but for the error of the steps.
+    Relaxing tissues dissipate too, and forces within a step depend on the past. There `course_viscous_work` takes the
+    place of the first two: bone work less friction less the energy stored at the end. It is positive but for the error
+    of the steps.
     """
     reaction = np.array([state.reaction for state in states])  # (m, k, 2)
     skin = np.array([state.place(newton.condensed) for state in states])

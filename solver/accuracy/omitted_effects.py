@@ -1,8 +1,8 @@
-"""What a result leaves out, each with a number computed for its scene: how much that could have changed.
+"""Effects that the model omits, each with an estimate of its size for the scene.
 
-With `[solve] evidence = "measured"` the scene is solved again on a coarse mesh, with what was left out and without it.
-The numbers are differences on one coarse mesh, and so better than that mesh's error. With a meshed bone the mesh of the
-soft tissues stays the same. Finite strain has meshes of its own: there a difference must exceed the errors.
+With `[solve] evidence = "measured"` the scene is solved again on a coarse mesh, with an effect and without it. Most of
+the mesh error cancels in the difference. A meshed bone leaves the mesh of the soft tissues as it is. Finite strain has
+other meshes, so that such a difference must exceed the errors.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,15 +23,15 @@ from solver.scene import Scene
 from solver.scene.tables import Material, Materials, Solve
 
 DENSITY = 1.1e-9  # of soft tissue [t/mm3 = N s2/mm4]
-# Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178); their weights are
-# not in the abstract, so a fifth of the instantaneous stiffness is assumed for each, and two fifths stay.
+# Relaxation of the fingerpad under load: times from Pawluk and Howe 1999 (J. Biomech. Eng. 121, 178). Their weights are
+# not in the abstract; a fifth of the instantaneous stiffness is assumed for each, so that two fifths remain.
 RELAXATION = ((0.004, 0.2), (0.07, 0.2), (1.4, 0.2))
-WARNING_CHANGE = 0.02  # part of the SED from which something left out is worth a warning [-]
-STRAIN_LIMIT = 0.1  # a strain from which finite strain ought to be considered [-]
+WARNING_CHANGE = 0.02  # relative change of the SED by an omitted effect from which there is a warning
+STRAIN_LIMIT = 0.1  # strain from which there is a warning at small strain [-]
 
 
 def _describe_laws(scene: Scene) -> str:
-    """Say which law every tissue follows."""
+    """Return the law of every tissue as text."""
     usual = "Hooke" if scene.solve.kinematics == "small" else "compressible neo-Hookean"
     said: list[str] = []
     for name in ("epidermis", "dermis", "fat"):
@@ -48,7 +48,7 @@ def _ogden(tissue: Material) -> str:
 
 
 def _describe_support(scene: Scene) -> str:
-    """Say what moves with the bone, and how the bone itself is modelled."""
+    """Return the model of the bone, the cut and the nail as text."""
     finger = scene.finger
     said = "driven as a whole" if finger.bone == "rigid" else "meshed, driven at its core of a third of its radius"
     said += "; the cut is free" if finger.cut == "free" else "; the cut is driven with it"
@@ -58,10 +58,10 @@ def _describe_support(scene: Scene) -> str:
 def model(
     scene: Scene, finger: Finger[Patches], state: EquilibriumState, displacement: Array, width: float
 ) -> dict[str, Any]:
-    """Return what was modelled and what was left out, as plain data; `width` is that of the contact [mm].
+    """Return the model and its omitted effects as plain data; `width` is that of the contact [mm].
 
-    Every entry of `left_out` has `estimate`, the relative change of the SED (or a lower bound of it) that leaving it
-    out may have caused, `from`, the numbers of this scene that it rests on, and `how` they make the estimate.
+    Every entry of `left_out` has `estimate`, the relative change of the SED by the effect or a lower bound of it,
+    `from`, the numbers of this scene behind it, and `how`, the method.
     """
     slide = sideways(displacement, finger.geometry.mesh.skin[state.touching])
     small = {"finite strain": _finite_strain(finger, displacement)} if isinstance(finger, LinearFinger) else {}
@@ -87,12 +87,12 @@ def model(
 
 
 def sideways(displacement: Array, touching: Indices) -> float:
-    """Return how far skin follows the surface sideways [mm]: at most, of the nodes that touch."""
+    """Return the largest displacement along the surface [mm] of the nodes `touching`."""
     return float(np.abs(displacement[touching, 0]).max(initial=0.0))
 
 
 def warnings(scene: Scene, left_out: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return a sentence for everything left out that this scene would have needed."""
+    """Return a warning for every omitted effect that matters in this scene."""
     sentences: list[str] = []
     if "finite strain" in left_out:
         sentences += _of_strain(left_out["finite strain"])
@@ -210,7 +210,7 @@ def _viscosity(scene: Scene, slide: float) -> dict[str, Any]:
 
 
 def _overstress_after(lasting: float, terms: Sequence[tuple[float, float]]) -> float:
-    """Return the stress above its relaxed value, relative, after a press of 1 s and a slide `lasting` so long [s]."""
+    """Return the relative overstress after a press of 1 s and a slide of duration `lasting` [s]."""
     after = sum(g * tau * (np.exp(-lasting / tau) - np.exp(-(lasting + 1.0) / tau)) for tau, g in terms)
     return float(after) / (1.0 - sum(g for _, g in terms))
 
@@ -238,14 +238,14 @@ def _width(scene: Scene, width: float) -> dict[str, Any]:
     }
 
 
-COARSE = 0.5  # tolerance that asks for the coarsest mesh
+COARSE = 0.5  # tolerance that the coarsest mesh meets
 Answer = Prediction | SolveFailure
 Answers = Callable[[Sequence[Scene]], tuple[Answer, ...]]
 MEASURED = "measured on a coarse mesh: change of the ending's SED "
 
 
 def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
-    """Return `prediction` with measured differences in place of estimates where they can be had."""
+    """Return `prediction` with measured differences in place of estimates where a solve gives them."""
     start = perf_counter()
     scene = replace(prediction.scene, solve=replace(prediction.scene.solve, evidence="estimated", tolerance=COARSE))
     left_out = {name: dict(entry) for name, entry in prediction.model["left_out"].items()}
@@ -259,20 +259,20 @@ def measure_differences(prediction: Prediction, answers: Answers) -> Prediction:
     return with_left_out(prediction, left_out, start)
 
 
-def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], begun: float) -> Prediction:
-    """Return `prediction` with other entries of what it leaves out, made since `begun`, and their warnings."""
+def with_left_out(prediction: Prediction, left_out: Mapping[str, Any], start: float) -> Prediction:
+    """Return `prediction` with new entries `left_out` and their warnings; `start` is when the work on them began."""
     usual = warnings(prediction.scene, prediction.model["left_out"])
     kept = tuple(one for one in prediction.warnings if one not in usual)
     return replace(
         prediction,
         model={**prediction.model, "left_out": left_out},
         warnings=(*kept, *warnings(prediction.scene, left_out)),
-        evidence_s=perf_counter() - begun + (prediction.evidence_s or 0.0),
+        evidence_s=perf_counter() - start + (prediction.evidence_s or 0.0),
     )
 
 
 def _differences(scene: Scene, base: Prediction, answers: Answers) -> dict[str, dict[str, Any]]:
-    """Return the entries that could be measured: new values of `estimate`, `from` and `how`."""
+    """Return the entries that were measured, with new `estimate`, `from` and `how`."""
     out: dict[str, dict[str, Any]] = {}
     if scene.finger.bone == "rigid":
         yielding = replace(scene, finger=replace(scene.finger, bone="meshed"))
@@ -300,7 +300,7 @@ def _difference(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
 
 
 def _beyond_errors(base: Prediction, other: Answer, how: str) -> dict[str, Any]:
-    """Return the same of a solve on another mesh, the estimate left as it was where both meshes explain the change."""
+    """Return the entry of a solve on another mesh, without `estimate` where the mesh errors explain the change."""
     entry = _difference(base, other, how)
     if not isinstance(other, Prediction) or base.sed_ending == 0.0:
         return entry

@@ -1,4 +1,4 @@
-"""A body at finite strain: its elements, its tangent condensed to the skin, and probes of its energy."""
+"""A body at finite strain: energy and forces of its elements, its condensed tangent, and its receptor endings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,25 +18,25 @@ from solver.linalg import Elimination, Some, symbolic_factorization
 from solver.mesh import Mesh
 from solver.quantities import QUANTITIES
 
-IMAGINARY = 1e-30  # step of a complex derivative: its square is nothing [-]
+IMAGINARY = 1e-30  # step of a complex derivative, whose square underflows [-]
 
 
-@dataclass(frozen=True, eq=False)  # without slots: memory for its tangent is set aside when first asked for
+@dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class FiniteBody(MeshElements):
-    """Elements at finite strain, their unknowns and the skin that may touch; e elements, n unknowns, k nodes of skin.
+    """A body at finite strain with e elements, n unknowns and k nodes of skin.
 
     Unknowns are numbered in the order of their elimination, the skin's last.
     """
 
     plan: SymbolicFactorization  # of the elimination
-    held: Narrow  # (k,) whether a node of the skin is held: along x HELD_X, along y HELD_Y, both their sum
+    held: Narrow  # (k,) directions in which a node of the skin is held: 0, HELD_X, HELD_Y or their sum
     middle: Narrow  # (k,) 1 at the middle of an edge of the skin, 0 at its ends
 
     @classmethod
     def of(cls, mesh: Mesh, materials: Sequence[Elasticity], *, checked: bool = False) -> Self:
-        """Prepare `mesh`, of `materials` by region. The centre of an element is never held.
+        """Return the body of a `mesh` with `materials` by region. The centre of an element is never held.
 
-        Raises BodyError and MeshError, unless it was `checked` before.
+        Raises BodyError and MeshError, unless its input was `checked` before.
         """
         if not checked:
             check_body(mesh, materials)
@@ -48,7 +48,7 @@ class FiniteBody(MeshElements):
 
     @property
     def condensed(self) -> "CondensedFinite":
-        """Its tangent condensed to the skin."""
+        """The body's tangent, condensed to the skin."""
         return self._condensed
 
     @cached_property
@@ -70,7 +70,7 @@ class FiniteBody(MeshElements):
         return u
 
     def following(self, skin: Array) -> Array:
-        """Do as `Body` says, by the last tangent, the centres of elements with their other nodes."""
+        """Do as `Body` says, with the last tangent."""
         out = np.zeros((*self.mesh.nodes.shape, skin.shape[1]))
         inside, recovery = self.condensed.inside, self.condensed.system.recovery_matrix[:, :, :16].copy()
         every = np.ones(len(self.plan.start), bool)
@@ -83,7 +83,7 @@ class FiniteBody(MeshElements):
         return np.eye(2) + self.gradient(u)
 
     def smallest_det(self, displacement: Array) -> float:
-        """Do as `Body` says, of the quadrature points."""
+        """Do as `Body` says, at the quadrature points."""
         return float(np.linalg.det(self.deformation(displacement)).min())
 
     def pressure(self, u: Array) -> Array:
@@ -95,16 +95,16 @@ class FiniteBody(MeshElements):
         return self._energy(self.gradient(u)).real
 
     def energy_slope(self, u: Array, way: Array) -> float:
-        """Return by how much the stored energy grows at `u` along `way` (nodes, 2) [N mm per mm].
+        """Return the derivative of the stored energy at `u` along `way` (nodes, 2) [N mm per mm].
 
-        From the energy alone, by a step in imaginary direction (Squire and Trapp 1998, SIAM Rev. 40, 110), no stress
-        asked.
+        It is a complex-step derivative of the energy, independent of the stresses (Squire and Trapp 1998, SIAM Rev. 40,
+        110).
         """
         H = self.gradient(cast("Array", u + 1j * IMAGINARY * way))
         return self._energy(H).imag / IMAGINARY
 
     def energy_growth(self, displacement: Array) -> float:
-        """Do as `Body` says, from the energy alone."""
+        """Do as `Body` says, independently of the stresses."""
         return self.energy_slope(displacement, displacement)
 
     def forces(self, displacement: Array) -> Array:
@@ -121,7 +121,7 @@ class FiniteBody(MeshElements):
         return self.mesh.assemble((gradient @ np.swapaxes(stress, -1, -2)).sum(axis=1))
 
     def gradient(self, u: Array) -> Array:
-        """Return F - 1 (e, 9, 2, 2) to its own digits, which stiff tissue multiplies."""
+        """Return F - 1 (e, 9, 2, 2), which keeps the digits that F would lose."""
         local = u[self.mesh.elements]  # (e, 9, 2)
         return np.stack([self.elements.grad_x @ local, self.elements.grad_y @ local], axis=-1)
 
@@ -142,7 +142,7 @@ class FiniteBody(MeshElements):
 
 
 def _inverse_and_excess(H: Array) -> tuple[Array, Array]:
-    """Return the transposed inverse of F = 1 + H and what F exceeds it by (e, 9, 2, 2), that to its own digits."""
+    """Return F^-T and F - F^-T (e, 9, 2, 2) for F = 1 + H, the difference without cancellation."""
     grown = (H[..., 0, 0] + H[..., 1, 1] + np.linalg.det(H))[..., None, None]
     across = np.stack([H[..., 1, 1], -H[..., 1, 0], -H[..., 0, 1], H[..., 0, 0]], axis=-1).reshape(H.shape)
     F = np.eye(2) + H
@@ -154,16 +154,16 @@ def _excess(H: Array, log: Array) -> Array:
 
 
 class CondensedFinite:
-    """A body at finite strain with the memory for its tangent."""
+    """The tangent of a body at finite strain, condensed to its skin."""
 
     equilibrium: Array | None  # displacements of the equilibrium that the tangent led to
 
     def __init__(self, body: FiniteBody, *, relaxes: bool = False) -> None:
-        """Set memory aside for `body`, and for what its tissues hold of the past where it `relaxes`."""
+        """Allocate memory for `body`, and for the overstress of tissues where it `relaxes`."""
         count = len(body.elements.nodes)
         self.body, self.constant = body, False
-        self.load = np.zeros(body.size)  # dead loads on the body, of `finite_states.loaded`
-        self.all_forces = np.zeros(body.size)  # of all unknowns, less the dead loads
+        self.load = np.zeros(body.size)  # dead loads by unknowns
+        self.all_forces = np.zeros(body.size)  # internal forces of all unknowns, less the dead loads
         self.inside = Elimination(body.plan)
         self.system = ElementSystem(
             np.zeros((count, 16, 16)), self.all_forces, np.zeros((count, 2, 17)), np.zeros((count, 3)),
@@ -181,16 +181,16 @@ class CondensedFinite:
         self.equilibrium = None
 
     def undeformed(self) -> tuple[Array, Array]:
-        """Return displacements (nodes, 2) and pressures (e, 3) of the body at rest."""
+        """Return zero displacements (nodes, 2) and pressures (e, 3)."""
         return np.zeros(self.body.mesh.nodes.shape), np.zeros((len(self.body.elements.nodes), 3))
 
     def place(self, u: Array) -> Array:
-        """Return where the skin's nodes are (k, 2) for displacements `u` (nodes, 2) [mm]."""
+        """Return the positions of the skin's nodes (k, 2) at displacements `u` (nodes, 2) [mm]."""
         skin = self.body.mesh.skin
         return self.body.mesh.nodes[skin] + u[skin]
 
     def linearise(self, u: Array, pressure: Array) -> bool:
-        """Assemble and eliminate the tangent at a state; False where it is turned inside out or has no factors."""
+        """Assemble and factorise the tangent at a state; return False where that is inside out or singular."""
         self.equilibrium = None
         if not self.assemble(u, pressure) > 0.0 or not self.inside.factorise(self.system.tangent):
             return False
@@ -198,7 +198,7 @@ class CondensedFinite:
         return True
 
     def relinearise(self, u: Array) -> bool:
-        """Condense the forces at a state with the factors that are there; False where it is turned inside out."""
+        """Condense the forces at a state with the last factors; return False where it is inside out."""
         if not self.resist(u) > 0.0:
             return False
         self._condense()
@@ -209,11 +209,11 @@ class CondensedFinite:
         self.inside.condense(self.all_forces)
 
     def assemble(self, u: Array, pressure: Array) -> float:
-        """Fill tangents and forces at a state and return the least det F."""
+        """Fill tangents and forces at a state and return the smallest det F."""
         return self._assemble(u, pressure, True)
 
     def resist(self, u: Array) -> float:
-        """Fill the forces at a state for the tangent that is there and return the least det F."""
+        """Fill the forces at a state, keep the tangent, and return the smallest det F."""
         return self._assemble(u, self._no_pressure, False)
 
     def recover(self, u: Array, pressure: Array, step: Array, scale: float) -> tuple[Array, Array, float]:
@@ -228,16 +228,13 @@ class CondensedFinite:
         return self.body.energy(u)
 
     def work(self, way: Sequence[Array], trapezoid: float) -> float:
-        """Do as `CondensedBody` says, by Simpson's rule.
-
-        The forces halfway are those of the elements at the mean displacement.
-        """
+        """Do as `CondensedBody` says, by Simpson's rule, with the internal forces at the mean displacements."""
         halfway = (self.body.energy_slope((one + other) / 2.0, other - one) for one, other in pairwise(way))
         return (trapezoid + 2.0 * sum(halfway)) / 3.0
 
 
 class FinitePatches(Patches):
-    """Endings of a body at finite strain; ln J is each element's best fit of it."""
+    """Averages over the endings of a body at finite strain, with the volume modes of ln J."""
 
     quantities = tuple(quantity.finite for quantity in QUANTITIES)
 

@@ -1,4 +1,4 @@
-"""A body at small strain reduced to its skin: assembled and eliminated by the compiled loops."""
+"""A body at small strain, assembled and condensed to its skin by the compiled loops, and its receptor endings."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from solver.quantities import QUANTITIES, SED
 _ALONE = Lock()  # held while the memory of `_memory` is in use
 
 
-Carried = tuple[Array, Array]  # a load condensed on the unknowns (n,), and the moves (e, 2) of centres under it alone
+Carried = tuple[Array, Array]  # a load after forward elimination (n,), and the displacements (e, 2) of centres by it
 
 
 class Elastic(MeshElements):
@@ -31,9 +31,9 @@ class Elastic(MeshElements):
 
     @cached_property
     def stiffness(self) -> Array:
-        """The integral (e, 18, 18) of 2 G eps:eps + lambda theta^2 [N/mm per mm], theta the volume strain's best fit.
+        """Element stiffnesses (e, 18, 18) of 2 G eps:eps + lambda theta^2 [N/mm per mm], theta of three volume modes.
 
-        That is the mixed form with pressure lambda theta, its three pressure modes eliminated (exact for Hooke).
+        This is the mixed form with its three pressure modes lambda theta eliminated, which is exact for Hooke's law.
         """
         of = self.elements
         weight = of.weight[:, :, None] * of.shear[:, None, None]
@@ -48,9 +48,9 @@ class Elastic(MeshElements):
         return out
 
     def forces(self, local: Array) -> Array:
-        """Return the forces (e, 9, 2) [N/mm] that hold the elements' nodes at displacements `local` (e, 9, 2).
+        """Return the internal forces (e, 9, 2) [N/mm] of the elements at displacements `local` (e, 9, 2).
 
-        What moves an element as a whole strains nothing, but would drown small strains in round-off.
+        The translation of an element is taken out, since it would drown small strains in round-off.
         """
         return (self.stiffness @ (local - local[:, 8:]).reshape(-1, 18, 1)).reshape(local.shape)
 
@@ -60,12 +60,12 @@ class Elastic(MeshElements):
 
 
 class LinearElimination:
-    """A body at small strain reduced to the displacements of its k nodes of skin: x, y of one, x, y of the next."""
+    """The factors of a body at small strain: its static condensation to x, y of its k nodes of skin."""
 
     def __init__(self, mesh: Mesh, materials: Sequence[Elasticity]) -> None:
-        """Assemble `mesh` of `materials` by region, and eliminate all but its skin.
+        """Assemble `mesh` with `materials` by region, and eliminate all unknowns but the skin's.
 
-        Raises LinAlgError where an element is folded, or the inner stiffness is not positive definite.
+        Raises LinAlgError where an element is folded, or the stiffness inside is not positive definite.
         """
         plan = symbolic_factorization(mesh)
         self.elastic = Elastic(*integrate_elements(mesh, materials, plan.unknown))
@@ -92,7 +92,7 @@ class LinearElimination:
         self._some: dict[bytes | None, tuple[Indices, Some]] = {}
 
     def condense(self, loads: Array) -> Carried:
-        """Return dead `loads` (nodes, 2) as the factors carry them."""
+        """Return dead `loads` (nodes, 2) after forward elimination."""
         mesh, plan = self.elastic.mesh, self._inside.plan
         centre = loads[mesh.elements[:, 8], :, None]
         own = (self._inverse[:, [[0, 1], [1, 2]]] @ centre)[:, :, 0]
@@ -105,12 +105,12 @@ class LinearElimination:
         return force, own
 
     def skin_load(self, carried: Carried) -> Array:
-        """Return what the skin feels (2 k,) of a load; nothing where it is held."""
+        """Return a load condensed to the skin (2 k,), 0 where that is held."""
         mesh = self.elastic.mesh
         return np.where(mesh.driven[mesh.skin].ravel(), 0.0, -carried[0][len(carried[0]) - len(self.stiffness) :])
 
     def displacement(self, skin: Array, carried: Carried, only: Indices | None = None) -> Array:
-        """Return the displacements (nodes, 2, c) that go with those of the skin (2 k, c) under a load.
+        """Return the displacements (nodes, 2, c) by back substitution of the skin's (2 k, c) under a load.
 
         With `only` (node numbers), other nodes may be left at 0.
         """
@@ -121,7 +121,7 @@ class LinearElimination:
         return out
 
     def _elements_of(self, only: Indices | None) -> tuple[Indices, Some]:
-        """Return the elements of the nodes `only`, or of all."""
+        """Return the elements that hold the nodes `only`, or all elements."""
         key = None if only is None else only.tobytes()
         if key not in self._some:
             of = self.elastic.elements
@@ -135,7 +135,7 @@ class LinearElimination:
 
 @lru_cache(maxsize=1)
 def _memory(size: int) -> Array:
-    """Return memory for what is forgotten at once, always the same: to be given new takes as long as the work."""
+    """Return scratch memory, always the same: new pages would take as long as the assembly."""
     return np.empty(size)
 
 
@@ -144,16 +144,16 @@ _POINTS, _WEIGHTS = GAUSS_4
 _VALUES, _SLOPES = line(_POINTS)  # (q, 3)
 
 
-@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
+@dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class LinearBody:
-    """An elastic body whose skin may touch a flat rigid surface that lies below it along y = 0."""
+    """An elastic body whose skin may touch a flat rigid surface below it, along y = 0."""
 
     mesh: Mesh
     elastic: Elastic
     elimination: LinearElimination
-    carried: Carried  # its dead loads
+    carried: Carried  # its dead loads after forward elimination
     condensed: CondensedLinear
-    prescribed: Array  # (nodes, 2) displacement of what is held relative to the drive, 0 elsewhere [mm]
+    prescribed: Array  # (nodes, 2) displacement of held nodes relative to the drive, 0 elsewhere [mm]
 
     @staticmethod
     def of(
@@ -165,11 +165,11 @@ class LinearBody:
         *,
         checked: bool = False,
     ) -> "LinearBody":
-        """Reduce a body of `materials` by region under dead `loads` (nodes, 2) [N/mm].
+        """Return the body of a `mesh` with `materials` by region under dead `loads` (nodes, 2) [N/mm].
 
-        What is held moves with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. A body that nothing holds
-        names in `free` the motions along which the surface alone balances the loads. Raises BodyError and MeshError,
-        unless `checked` before, and LinAlgError where what is held or free leaves it a motion.
+        Held nodes move with the drive, and by `prescribed` (nodes, 2) [mm] relative to it. `free` names the rigid
+        motions along which the surface alone balances the loads. Raises BodyError and MeshError, unless its input was
+        `checked` before, and LinAlgError where a rigid motion is neither held nor free.
         """
         if not checked:
             check_body(mesh, materials)
@@ -183,7 +183,7 @@ class LinearBody:
         carried = whole.condense(force) if force.any() else whole.unloaded
         condensed = _condense_skin(mesh, whole.stiffness, whole.skin_load(carried), free)
         if not checked and len(mesh.skin):
-            _ = condensed.compliance  # which is none where the body can move
+            _ = condensed.compliance  # raises where the body can move
         return LinearBody(mesh, whole.elastic, whole, carried, condensed, moved)
 
     @property
@@ -192,7 +192,7 @@ class LinearBody:
         return 2 * len(self.mesh.nodes) - len(self.mesh.fixed)
 
     def displacement(self, u: Array, only: Indices | None = None) -> Array:
-        """Return the displacement (nodes, 2, ...) of all nodes for that of the skin `u` (k, 2, ...), one or several.
+        """Return the displacements (nodes, 2, ...) of all nodes for those of the skin `u` (k, 2, ...).
 
         With `only` (node numbers), other nodes may be left at 0.
         """
@@ -206,15 +206,15 @@ class LinearBody:
         return self.elastic.centre
 
     def every_step(self) -> Array:
-        """Return the displacements (nodes, 2, 2 k) that one of the skin's unknowns after the other makes."""
+        """Return the displacements (nodes, 2, 2 k) for a unit displacement of each of the skin's unknowns."""
         k = len(self.mesh.skin)
         return self.displacement(np.eye(2 * k).reshape(k, 2, 2 * k)) - self.displacement(np.zeros((k, 2, 1)))
 
     def linearise_about(self, displacement: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
-        """Return the body about a `displacement` (nodes, 2), and what makes displacements of its skin's steps (k, 2).
+        """Return the body about a `displacement` (nodes, 2), and a function from skin steps (k, 2) to displacements.
 
-        The forces it leaves over are those of the elements, so that a step from it takes round-off out of a state: one
-        step of iterative refinement (Wilkinson 1963). For held bodies without dead loads.
+        Its residual comes from the elements, so that a step from it removes the round-off of a state: one step of
+        iterative refinement (Wilkinson 1963). For held bodies without dead loads.
         """
         inner = self.forces(displacement)
         inner[self.mesh.driven] = 0.0
@@ -223,9 +223,9 @@ class LinearBody:
         return about, lambda step: displacement + recover(step)
 
     def under(self, loads: Array) -> tuple[CondensedLinear, Callable[[Array], Array]]:
-        """Return the body under dead `loads` (nodes, 2) in place of its own, and what recovers displacements there.
+        """Return the body under other dead `loads` (nodes, 2), and a function that recovers displacements.
 
-        That makes those of all nodes (nodes, 2) of the skin's (k, 2) [mm], what is held staying where it is.
+        It maps those of the skin (k, 2) to those of all nodes (nodes, 2) [mm]; held nodes stay.
         """
         carried = self.elimination.condense(loads)
 
@@ -248,13 +248,13 @@ class LinearBody:
         return float(np.sum((local - local[:, 8:]) * self.elastic.forces(local)))
 
     def smallest_det(self, displacement: Array) -> float:
-        """Do as `Body` says, of the corners of elements, where strains are largest."""
+        """Do as `Body` says, at the corners of elements, where strains are largest."""
         return float(determinant(self._at_corners(displacement)).min())
 
     def stretches(self, displacement: Array) -> Array:
         """Return the smallest and largest in-plane stretch (2, p) at every corner of every element.
 
-        They are the singular values of F = 1 + du/dX; a folded place has a negative smallest one.
+        They are the singular values of F = 1 + du/dX; the smallest is negative where det F is.
         """
         f = self._at_corners(displacement)
         det = determinant(f)
@@ -276,7 +276,7 @@ class LinearBody:
 
 
 class LinearPatches(Patches):
-    """Endings of an elastic body at small strain."""
+    """Averages over the endings of a body at small strain."""
 
     quantities = tuple(quantity.small for quantity in QUANTITIES)
 
@@ -284,7 +284,7 @@ class LinearPatches(Patches):
         """Do as `Patches` says."""
         element, patch, form = self._energy_forms
         local = displacement[self.elements.mesh.elements[element]]
-        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # moved as a whole, strains would drown in round-off
+        local = (local - local[:, 8:]).reshape(len(local), 18, -1)  # translations would add round-off
         energy = np.einsum("mic,mic->mc", local, form @ local)
         total, first = np.zeros((self.endings.count, energy.shape[1])), np.flatnonzero(np.diff(patch, prepend=-1))
         total[patch[first]] = np.add.reduceat(energy, first)
@@ -302,9 +302,9 @@ class LinearPatches(Patches):
 
     @cached_property
     def _energy_forms(self) -> tuple[Indices, Indices, Array]:
-        """The parts of patches within one element (m,): element, patch, and the energy as a quadratic form (m, 18, 18).
+        """The pieces of endings within one element (m,): element, ending, and energy as a quadratic form (m, 18, 18).
 
-        Each form is of the displacements of the element's nodes [N/mm per mm2].
+        Each form takes the displacements of the element's nodes [N/mm per mm2].
         """
         probes, patch = self.endings.probes, self.endings.patch
         order = np.lexsort((probes.element, patch))
@@ -331,7 +331,7 @@ class LinearPatches(Patches):
 
 
 def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Motion]) -> CondensedLinear:
-    """Return the skin of a body by its `stiffness` (2 k, 2 k) and dead `load` (2 k,)."""
+    """Return the condensed body with a `stiffness` (2 k, 2 k) and dead `load` (2 k,) of its skin."""
     place = mesh.nodes[mesh.skin]
     (x, y), one, zero = place.T, np.ones(len(place)), np.zeros(len(place))
     shapes = {"x": np.c_[one, zero].ravel(), "y": np.c_[zero, one].ravel(), "turn": np.c_[-y, x].ravel()}
@@ -343,7 +343,7 @@ def _condense_skin(mesh: Mesh, stiffness: Array, load: Array, free: Sequence[Mot
 
 
 def skin_lengths(mesh: Mesh) -> Array:
-    """Return the length of skin (k,) [mm] that each point of it stands for: 1/6, 4/6, 1/6 of a straight edge."""
+    """Return the tributary length (k,) [mm] of the skin's nodes: 1/6, 4/6, 1/6 of a straight edge."""
     return edge_load(mesh, mesh.skin, np.ones((len(mesh.skin), 1)))[mesh.skin, 0]
 
 

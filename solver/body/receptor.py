@@ -1,4 +1,4 @@
-"""Where the endings lie in a mesh: probes of their patches of tissue, and the weights of averages over them."""
+"""Quadrature over the receptor endings in a mesh: probes and weights."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from solver.mesh.mesher import FingerMesh
 from solver.scene.tables import Receptor
 
 _POINTS, _WEIGHTS = GAUSS_3
-_ASIDE = 1e-7  # [mm]: a point on a line between elements is probed on both sides
+_ASIDE = 1e-7  # distance of probes on both sides of a line between elements [mm]
 
 
 def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) -> Endings:
-    """Return the patches of `receptor` at positions `arcs` (r,) [mm], integrated exactly over the pieces of elements.
+    """Return endings of `receptor` at positions `arcs` (r,) [mm], with Gauss points in each piece of an element.
 
-    A patch reaches half the ending's length to both sides, measured along its own middle line.
+    An ending extends by half its length to both sides, measured along its own middle line.
     """
     across, along = receptor.ending
     outline = finger.outline
@@ -31,14 +31,14 @@ def endings(finger: FingerMesh, centre: Array, receptor: Receptor, arcs: Array) 
     area = (arc_weight[:, None] * depth_weight).ravel()
     patch = np.repeat(patch, len(_POINTS) * len(depth))
     arc, depth = np.repeat(arc, len(depth)), np.tile(depth, len(arc))
-    # a length on the tip's arc shrinks with the depth
+    # lengths shrink with depth under the tip's arc
     curved = (arc > outline.palmar) & (arc < outline.dorsal)
     area = area * np.where(curved, 1.0 - depth / outline.finger.tip_radius, 1.0)
     return Endings(_probes(finger, centre, arc, depth), area, patch, len(arcs), outline.tangent(arc))
 
 
 def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
-    """Return the point in the middle of the reference ending: the mean of its limits from the elements around it."""
+    """Return the midpoint of the reference ending, as the mean of the limits from the elements around it."""
     arc = _ASIDE * np.array([-1.0, 1.0, -1.0, 1.0])
     depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
     probes, tangent = _probes(finger, centre, arc, depth), finger.outline.tangent(arc)
@@ -52,7 +52,7 @@ def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:
 
 
 def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Probes:
-    """Find the elements that hold the places at `arc` and `depth` (p,) and the local coordinates in them."""
+    """Return probes at `arc` and `depth` (p,): their elements and local coordinates."""
     station = np.clip(np.searchsorted(finger.arcs, arc) - 1, 0, len(finger.arcs) - 2)
     layer = np.clip(np.searchsorted(-finger.depths, -depth) - 1, 0, len(finger.depths) - 2)
     element = station * (finger.fat + len(finger.depths) - 1) + finger.fat + layer
@@ -62,11 +62,11 @@ def _probes(finger: FingerMesh, centre: Array, arc: Array, depth: Array) -> Prob
 
 
 def _along_side(finger: FingerMesh, arc: Array, depth: Array, station: Indices) -> tuple[Array, Array]:
-    """Return the local coordinates (p,) along the skin of places, and the depths (p,) that elements know them by.
+    """Return the local coordinates (p,) of places along the skin, and their depths (p,) in the isoparametric map.
 
-    The sides of an element run along normals of the skin, and its nodes lie at `depth` on them. Between these normals
-    it follows the skin's arc by a parabola, which lies a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m +
-    s sin a e_t at unit radius, with half its angle a, and e_m, e_t radial and tangential in its middle.
+    The sides of an element lie along normals of the skin. Between them the isoparametric map replaces the skin's arc by
+    a parabola a little deeper than the arc: E(s) = (1 - s^2 (1 - cos a)) e_m + s sin a e_t at unit radius, with half
+    its angle a, and e_m, e_t radial and tangential in its middle.
     """
     start, stop = finger.arcs[station], finger.arcs[station + 1]
     here, first, last = (finger.outline.angle(place) for place in (arc, start, stop))

@@ -1,4 +1,4 @@
-"""The door for bodies handed in as arrays: what cannot be solved is refused there with one sentence."""
+"""Validation of a user's own body; an error is one sentence."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -10,18 +10,18 @@ from solver.constitutive import Elasticity, Prony
 from solver.mesh import Q2P1, Mesh, jacobians
 from solver.scene.tables import STIFFENING
 
-MOTIONS = ("x", "y", "turn")  # of a body as a whole
-CUT = 1e-9  # part of a motion of the body as a whole below which what is held does not move with it [-]
+MOTIONS = ("x", "y", "turn")  # rigid motions
+CUT = 1e-9  # relative size of a rigid motion at the held nodes below which these do not prevent it [-]
 
 
 class BodyError(ValueError):
-    """A body that cannot be solved as it was handed in: what is wrong, where, and what to do."""
+    """A body that cannot be solved; the message says what is wrong, where, and what to do."""
 
 
 def check_body(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
-    """Raise BodyError where arrays of `mesh` or its `materials` by region make no body.
+    """Raise BodyError where arrays of `mesh` or its `materials` by region are not valid.
 
-    Raises MeshError where an element is folded at a point of its quadrature, which is all that is asked of it.
+    Raises MeshError where an element is folded at a quadrature point.
     """
     _check_arrays(mesh)
     check_moduli(mesh, materials)
@@ -30,7 +30,7 @@ def check_body(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
 
 
 def _check_arrays(mesh: Mesh) -> None:
-    """Raise BodyError where an array has another shape or other numbers than it must have."""
+    """Raise BodyError where an array has a wrong shape, type or range."""
     count = len(mesh.nodes)
     if mesh.nodes.shape != (count, 2) or mesh.nodes.dtype != np.float64:
         raise BodyError(
@@ -56,7 +56,7 @@ def _check_arrays(mesh: Mesh) -> None:
 
 
 def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
-    """Raise BodyError where a region of `mesh` has no material, or one of them is no tissue."""
+    """Raise BodyError where a region of `mesh` has no material, or moduli are not allowed."""
     if not (mesh.region.min() >= 0 and mesh.region.max() < len(materials)):
         worst = int(mesh.region.max() if mesh.region.min() >= 0 else mesh.region.min())
         raise BodyError(
@@ -75,7 +75,7 @@ def check_moduli(mesh: Mesh, materials: Sequence[Elasticity]) -> None:
 
 
 def check_laws(laws: Sequence[Elasticity]) -> None:
-    """Raise BodyError unless `laws` are those of finite strain, their exponents within what the scene file allows."""
+    """Raise BodyError unless `laws` are for finite strain, with exponents that the scene file allows."""
     for number, law in enumerate(laws):
         exponent = getattr(law, "stiffening", None)
         if exponent is None:
@@ -89,7 +89,7 @@ def check_laws(laws: Sequence[Elasticity]) -> None:
 
 
 def check_terms(laws: Sequence[Prony]) -> None:
-    """Raise BodyError where the terms of a series are none that relax."""
+    """Raise BodyError where terms of a Prony series are not allowed."""
     for number, law in enumerate(laws):
         if not (all(g >= 0.0 and 0.0 < tau < np.inf for g, tau in law.terms) and law.long_term > 0.0):
             raise BodyError(
@@ -151,7 +151,7 @@ def finite(name: str, value: float) -> float:
 
 
 def loose(mesh: Mesh) -> Array:
-    """Return the motions (3, r) of the body as a whole that nothing holds, as parts of those in MOTIONS."""
+    """Return a basis (3, r) of the rigid motions that no held node prevents, as combinations of MOTIONS."""
     if len(mesh.held) > 1:
         return np.zeros((3, 0))
     x, y = (mesh.nodes / np.ptp(mesh.nodes)).T
@@ -163,7 +163,7 @@ def loose(mesh: Mesh) -> Array:
 
 
 def check_driven(mesh: Mesh) -> None:
-    """Raise BodyError where nothing holds a body at all, which its motions at finite strain ask for."""
+    """Raise BodyError where no node of a body is held along x and y, as finite strain needs."""
     if not mesh.driven.any():
         raise BodyError(
             "nothing holds the body; name the nodes that are driven in mesh.held, or along one direction alone in "

@@ -1,14 +1,14 @@
-"""A branch of settled sliding states, followed by its arc length to where it ends.
+"""Arc-length continuation of a branch of settled slides to its limit point or to the folding of the skin.
 
-Pressed hard and dragged against its tip, the skin behind the contact folds: the friction coefficient (or the depth)
-passes a maximum along the branch, or the skin is squeezed at one place until its surface loses stability; beyond, there
-is no settled state. Riks 1979, Int. J. Solids Struct. 15, 529; Crisfield 1981, Comput. Struct. 13, 55, with the plane
-of Riks.
+Under a deep press and a drag towards the tip, the skin behind the contact folds. Then the friction coefficient or the
+depth passes a maximum along the branch, or the surface of the skin loses stability at one place. Beyond, there is no
+settled state. The constraint is the plane of Riks (1979, Int. J. Solids Struct. 15, 529; Crisfield 1981, Comput.
+Struct. 13, 55).
 
-A squeezed half-space wrinkles at once at all wavelengths (Biot 1963, Appl. Sci. Res. A 12, 168): of wrinkles
-exp(i k X) the impedance of the surface, tractions by displacements, has a determinant of zero. There the equations of a
-free surface lose their meaning, and finer meshes end ever nearer to it. The theory of small motions on a large strain
-is that of Dowaikh and Ogden (1990, IMA J. Appl. Math. 44, 261), here with any law and plane strain.
+A compressed half-space loses stability at all wavelengths at once (Biot 1963, Appl. Sci. Res. A 12, 168). There the
+surface impedance, which maps displacements exp(i k X) to tractions, is singular. The equations of a free surface are
+ill-posed at that stretch, and finer meshes come ever nearer to it. The theory is that of small motions on a large
+strain (Dowaikh and Ogden 1990, IMA J. Appl. Math. 44, 261), here for any law in plane strain.
 """
 
 from dataclasses import dataclass
@@ -25,39 +25,39 @@ from solver.equilibrium import BY_FRICTION, EQUILIBRIUM, EquilibriumState, LoadS
 from solver.failures import NotConverged
 from solver.progress import check_stop, report_progress
 
-LARGEST_MU = 2.0  # beyond this a coefficient of friction is not looked for
+LARGEST_MU = 2.0  # largest coefficient of friction to which a branch is followed
 
 
 @dataclass(frozen=True, slots=True)
 class BranchControl:
-    """How a branch is followed, and what counts as its end; steps by what is looked through."""
+    """Control of the continuation and of its end; steps are fractions of the range that is followed."""
 
     tolerance: float = 1e-6  # of a point on the branch [mm]
-    first: float = 0.1  # step along the branch
-    shortest: float = 1e-3
-    growth: float = 1.5  # of the step after a point that was easily found
-    easy: int = 5  # iterations of such a point, at most
-    corrections: int = 12  # of a point
-    most: int = 400  # points
+    first: float = 0.1  # first step along the branch
+    shortest: float = 1e-3  # shortest step
+    growth: float = 1.5  # ratio of the next step to one with few iterations
+    easy: int = 5  # iterations that count as few
+    corrections: int = 12  # iterations for a point, at most
+    most: int = 400  # points, at most
     turn: float = 0.7  # least cosine between the directions of the branch and of a step along it
-    squeeze: float = 0.85  # least ratio of the skin's least stretches at neighbouring points: a leap to a fold has less
-    crease: float = 0.6  # kink from which skin has a crease: coarse meshes of smooth skin have 0.3, creases 1 and more
-    steep: float = 0.1  # part of the value in the branch's direction, from which a limit point is far
-    hops: int = 3  # tries to go on where a branch ends
-    hop: tuple[float, ...] = (0.01, 0.03)  # by how much of its value
-    force_change: float = 0.05  # of forces then, at most
-    apart: float = 0.04  # of the skin's least stretches at two points between which the stretch that folds is met
+    squeeze: float = 0.85  # smallest ratio of least stretches at consecutive points: a jump to a fold has less
+    crease: float = 0.6  # kink from which skin has a crease: smooth skin on coarse meshes has 0.3, creases 1 and more
+    steep: float = 0.1  # share of the parameter in the tangent from which a limit point is far
+    hops: int = 3  # attempts to continue beyond the end of a branch
+    hop: tuple[float, ...] = (0.01, 0.03)  # relative steps of the parameter for that
+    force_change: float = 0.05  # largest relative change of the forces in such a step
+    apart: float = 0.04  # largest difference of least stretches at consecutive points
 
 
 BRANCH = BranchControl()
 
 
 class BranchBody(Protocol):
-    """What a branch is followed on: the finger, or a body handed in."""
+    """A body with skin on which a branch can be followed."""
 
     @property
     def newton(self) -> Newton:
-        """The iterations on its body."""
+        """Newton's method on the body."""
         ...
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
@@ -71,14 +71,12 @@ class BranchBody(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Branch:
-    """A branch of settled sliding states."""
+    """A branch of settled slides; its last state is at the target or the last before the limit."""
 
-    states: tuple[
-        EquilibriumState, ...
-    ]  # on the way, that at the value asked for or the last one before the limit being last
-    value: float  # of the coefficient or the depth [mm] at its end: the largest one met
-    limited: bool  # whether the branch ends there, short of what was asked for
-    lost: bool = False  # whether it ends there for want of a next point only, far from a limit point and from a fold
+    states: tuple[EquilibriumState, ...]
+    value: float  # largest friction coefficient or depth [mm] on it
+    limited: bool  # whether the branch ends before its target
+    lost: bool = False  # whether only the corrector failed there, far from a limit point and from a fold
 
     @property
     def last(self) -> EquilibriumState:
@@ -87,7 +85,7 @@ class Branch:
 
 
 def continue_branch(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
-    """Do as `follow`, and go on where the branch only turns back for a moment."""
+    """Follow a branch as `follow` does, and continue where it turns back only over a short stretch."""
     branch = follow(finger, start, by, target, folds)
     for _ in range(BRANCH.hops):
         beyond = _beyond(finger, branch, by, target, folds) if branch.limited else None
@@ -99,9 +97,9 @@ def continue_branch(finger: BranchBody, start: EquilibriumState, by: int, target
 
 
 def _beyond(finger: BranchBody, branch: Branch, by: int, target: float, folds: float) -> EquilibriumState | None:
-    """Return a state of the branch a little beyond its end, None where it ends there indeed.
+    """Return a state a little beyond the end of a branch; None where it really ends.
 
-    Where a node of the contact comes to the bound, the branch may turn back for a moment, as no skin does.
+    Where a node of the contact reaches the shear limit, a discrete branch may turn back over a short stretch.
     """
     last = branch.last
     compression = finger.skin_compression(last)
@@ -126,12 +124,12 @@ def _beyond(finger: BranchBody, branch: Branch, by: int, target: float, folds: f
 def follow(finger: BranchBody, start: EquilibriumState, by: int, target: float, folds: float) -> Branch:
     """Follow the branch from `start` until the friction coefficient (BY_FRICTION) or depth (BY_DEPTH) reaches `target`.
 
-    It ends where its value passes a maximum, or where the skin is squeezed to `folds` of its length (`folds_at`).
+    It ends where that parameter passes a maximum, or where the least stretch of the skin reaches `folds`.
     """
     way = [_Point(start, finger.skin_compression(start), value_of(start.load, by))]
     if way[0].value >= target * (1.0 - 1e-12):
         return Branch((start,), way[0].value, limited=False)
-    best = 0  # of them, by value
+    best = 0  # the point with the largest parameter
     reach = min(abs(target - way[0].value), LARGEST_MU)
     length = BRANCH.first * reach
     direction, rate = _tangent(finger.newton, start, by)
@@ -184,7 +182,7 @@ def _further(
     target: float,
     shortest: float,
 ) -> tuple[_Point, float] | None:
-    """Return the next point of the branch and how long the step was that led to it; None where no step does."""
+    """Return the next point of the branch and the length of the step to it; None where every step fails."""
     while length >= shortest:
         state = _next(finger.newton, last.state, by, direction, rate, length, target)
         if state is not None:
@@ -208,13 +206,13 @@ def with_value(load: LoadState, by: int, value: float) -> LoadState:
 
 
 def jumped_branch(finger: BranchBody, before: EquilibriumState, after: EquilibriumState) -> bool:
-    """Return whether a step went to another branch, where the skin is folded."""
+    """Return whether a step led to another branch, on which the skin is folded."""
     one, other = finger.skin_compression(before), finger.skin_compression(after)
     return other.least < BRANCH.squeeze * one.least or other.kink > BRANCH.crease or finger.crosses(after)
 
 
 def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, float]:
-    """Return the direction of the branch, of unit length: per unknown over root n [mm], and of the value."""
+    """Return the unit tangent of the branch: unknowns over root n [mm], and the parameter."""
     newton.linearise(state, state.load, newton.skin_x)
     direction = newton.steps[:, by] / np.sqrt(len(newton.steps))
     size = np.sqrt(direction @ direction + 1.0)
@@ -224,7 +222,7 @@ def _tangent(newton: Newton, state: EquilibriumState, by: int) -> tuple[Array, f
 def _next(
     newton: Newton, start: EquilibriumState, by: int, direction: Array, rate: float, length: float, target: float
 ) -> EquilibriumState | None:
-    """Return the state `length` further along the branch, or at `target` where that is nearer; None where not found."""
+    """Return the state a step of `length` along the branch, at most at `target`; None where the corrector fails."""
     root = np.sqrt(len(newton.steps))
     value = value_of(start.load, by)
     to_target = rate * length >= target - value
@@ -256,9 +254,9 @@ def _next(
 
 
 Waves = NDArray[np.complex128]
-STEP = 0.01  # of the stretch, between two looks
-LEAST = 0.05  # stretch down to which they are taken
-HALVINGS = 40
+STEP = 0.01  # step of the stretch in the search for the loss of stability
+LEAST = 0.05  # smallest stretch of that search
+HALVINGS = 40  # of its last step
 
 
 @lru_cache(maxsize=16)
@@ -284,7 +282,7 @@ def folds_at(law: Law) -> float:
 
 
 def _stable(law: Law, stretch: float) -> bool:
-    """Return whether the surface's impedance is positive at this stretch along it, its other side being free."""
+    """Return whether the surface impedance is positive definite at a stretch along a traction-free surface."""
     across = 1.0 / stretch
     for _ in range(50):
         F = np.diag([stretch, across])

@@ -1,8 +1,8 @@
-"""The settled sliding state at finite strain where there is one, and where there is none, how far there would be.
+"""Existence of the settled slide at finite strain: a proof for a state, or the limits of friction and depth.
 
-How far sliding goes is found on meshes made for it. A rough mesh is followed along the branch to near its end, and
-tells where the skin is squeezed most. Skin folds within some tenths of a millimetre: on a mesh with small elements
-there the branch is followed on. What that mesh is good to is measured.
+Limits are found on meshes made for them. The branch is followed on a coarse mesh to near its end, which shows where the
+skin is compressed most. Skin folds within some tenths of a millimetre, so the branch is continued on a mesh with small
+elements there. `daq-app accuracy` measures the accuracy of these limits.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,22 +24,22 @@ from solver.mesh.mesher import EPIDERMIS, Sizing
 from solver.scene import Scene
 from solver.scene.tables import SHALLOW
 
-FINENESS = 7.0  # of both meshes, but where the skin folds
-MARGIN = 6.0  # how far above the indentation the undeformed skin may lie and still be looked at for contact
+FINENESS = 7.0  # elements to a tip radius of both meshes, except at a fold
+MARGIN = 6.0  # by the indentation: height of the undeformed skin up to which contact is considered
 
 
 @dataclass(frozen=True, slots=True)
 class ProofControl:
-    """Which states need a proof, and what counts as one; stretches of the skin, parts of friction."""
+    """Which states need a proof, and which proof counts; least stretches of the skin, and fractions."""
 
-    smooth: float = 0.66  # stretch down to which a rough mesh has the states of the fine one
-    sound: float = 0.65  # least stretch of the skin from which others may be sought: neo-Hookean surfaces fold at 0.54
-    plain: float = 0.71  # and that needs no proof: just below limits other meshes have up to 0.70
-    astray: float = 0.5  # between where skin folds and where it was thought to, from which a mesh is made anew [mm]
-    starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # of the depth asked for, at which its branch may begin
-    nearly: float = 0.02  # stretch above the one that folds, from which a limit is near: some 2 % of the friction
-    far: float = 0.9  # of the friction asked for, below which a limit is beyond doubt
-    alike: float = 0.1  # relative difference of SED and forces within which a state is that of another mesh
+    smooth: float = 0.66  # stretch above which states of the coarse mesh agree with those of the fine one
+    sound: float = 0.65  # stretch of a state from which others may start: neo-Hookean surfaces fold at 0.54
+    plain: float = 0.71  # stretch above which a state needs no proof: meshes just below a limit have up to 0.70
+    astray: float = 0.5  # distance of the fold from its expected place for which the mesh is made anew [mm]
+    starts: tuple[float, ...] = (0.3, 0.1, 0.03, 0.01)  # fractions of the depth at which its branch may begin
+    nearly: float = 0.02  # stretch above the folding one that counts as near a limit: some 2 % of the friction
+    far: float = 0.9  # fraction of the given friction below which a limit is certain
+    alike: float = 0.1  # relative difference of SED and forces below which states of two meshes are the same
 
 
 PROOF = ProofControl()
@@ -47,11 +47,11 @@ PROOF = ProofControl()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reach:
-    """How far the branch of settled sliding goes, from no friction or from a small depth."""
+    """The range of a branch of settled slides, from zero friction or from a small depth."""
 
-    value: float  # coefficient of friction, or depth [mm]: the one asked for, or the largest
-    limited: bool  # whether it ends there
-    lost: bool  # whether it was lost there, and may go on
+    value: float  # friction coefficient or depth [mm] at its end: the target, or the largest
+    limited: bool  # whether the branch ends there
+    lost: bool  # whether only the corrector failed there, so that the branch may continue
     least: float  # least stretch of the skin at its last state [-]
     folds: float  # stretch at which it would fold [-]
     numbers: Array  # (3,) SED of the ending, normal and tangential force at its last state
@@ -63,7 +63,7 @@ class Reach:
 
 
 def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
-    """Return how far sliding at the depth and bound of `load` goes from mu = 0 towards `target`.
+    """Return the range of slides at the depth and bound of `load`, from mu = 0 to `target`.
 
     Raises NotConverged where not even the frictionless state is found, Cancelled.
     """
@@ -71,15 +71,15 @@ def of_friction(scene: Scene, load: LoadState, target: float) -> Reach:
 
 
 def of_depth(scene: Scene, load: LoadState) -> Reach:
-    """Return how far sliding at the friction of `load` goes from a small depth towards that of `load`.
+    """Return the range of slides at the friction of `load`, from a small depth to that of `load`.
 
-    Raises NotConverged where there is none even at a hundredth of it, Cancelled.
+    Raises NotConverged where no slide is found even at a hundredth of that depth, Cancelled.
     """
     return _reach(_Search(scene.frictionless_press(SHALLOW), load._replace(travel=0.0), BY_DEPTH, load.depth))
 
 
 def sound(finger: FiniteFinger, state: EquilibriumState, least: float = PROOF.sound) -> bool:
-    """Return whether the skin is nowhere squeezed to `least`, has no crease and does not cross itself."""
+    """Return whether the skin is stretched to more than `least` everywhere, without a crease or self-contact."""
     compression = finger.skin_compression(state)
     return compression.lowest >= least and compression.kink <= BRANCH.crease and not finger.crosses(state)
 
@@ -91,12 +91,12 @@ def folded(finger: FiniteFinger, state: EquilibriumState) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _Search:
-    """A branch of settled sliding, to be followed on meshes made for it."""
+    """A branch of settled slides to be followed on meshes made for it."""
 
     scene: Scene  # unloaded
-    load: LoadState  # of the branch, whose friction is 0 at first where that grows
-    by: int  # BY_FRICTION or BY_DEPTH: what grows
-    target: float  # of it
+    load: LoadState  # at the beginning of the branch by friction, at the end of one by depth
+    by: int  # the parameter: BY_FRICTION or BY_DEPTH
+    target: float  # its last value
 
     @property
     def folds(self) -> float:
@@ -104,11 +104,11 @@ class _Search:
         return folds_at(finite_laws(self.scene.materials)[EPIDERMIS])
 
     def finger(self, fold: float | None = None) -> FiniteFinger:
-        """Return the finger on a rough mesh, or on one that is fine at the arc position of a `fold` [mm]."""
+        """Return the finger on a coarse mesh, or on one that is fine at the arc position of a `fold` [mm]."""
         return FiniteFinger.of(self.scene, Sizing(FINENESS, self.load.depth, margin=MARGIN, fold=fold))
 
     def trace_branch(self, finger: FiniteFinger, start: EquilibriumState) -> Branch:
-        """Return the branch from `start` on. Beyond LARGEST_MU the bound decides, and the target is a step away."""
+        """Return the branch from `start`. Beyond LARGEST_MU the bound governs, and one step reaches the target."""
         target = self.target if self.by == BY_DEPTH else min(self.target, LARGEST_MU)
         branch = continue_branch(finger, start, self.by, target, self.folds)
         if branch.limited or target == self.target:
@@ -120,7 +120,7 @@ class _Search:
     def trace_on_fine_mesh(
         self, finger: FiniteFinger, states: tuple[EquilibriumState, ...]
     ) -> tuple[FiniteFinger, Branch, float]:
-        """Follow the branch on a mesh that is fine where the last of `states` is squeezed most; return that place."""
+        """Return a finger that is fine where the last of `states` is compressed most, its branch, and that place."""
         place = _place_of_least_stretch(finger, states[-1])
         fine = self.finger(place)
         return fine, self.trace_branch(fine, self._start_on_fine_mesh(fine, finger, states)), place
@@ -143,7 +143,7 @@ class _Search:
     def _start_on_fine_mesh(
         self, fine: FiniteFinger, rough: FiniteFinger, states: tuple[EquilibriumState, ...]
     ) -> EquilibriumState:
-        """Return the state on the `fine` mesh of the last of `states` that the rough mesh has as well as that."""
+        """Return the state on the `fine` mesh of the last of `states` that the `rough` mesh resolves."""
         for state in reversed(states):
             if rough.skin_compression(state).lowest < PROOF.smooth:
                 continue
@@ -156,7 +156,7 @@ class _Search:
 
 @lru_cache(maxsize=32)
 def _reach(search: _Search) -> Reach:
-    """Answer, and keep what was answered: all meshes of a scene ask the same."""
+    """Return the range of a branch, cached because all meshes of a scene need the same."""
     finger = search.finger()
     branch = search.trace_branch(finger, search.start(finger))
     if branch.limited or not sound(finger, branch.last, PROOF.plain):
@@ -169,22 +169,22 @@ def _reach(search: _Search) -> Reach:
 
 
 def _place_of_least_stretch(finger: FiniteFinger, state: EquilibriumState) -> float:
-    """Return the arc position where the skin is squeezed most [mm]."""
+    """Return the arc position of the least stretch of the skin [mm]."""
     place = finger.skin_compression(state).place
     return float(finger.geometry.arcs[place : place + 2].mean())
 
 
-APART = 0.06  # of a limit, which a mesh has to 3 %: so much beyond it another path must end before it arrives [-]
+APART = 0.06  # relative distance beyond a limit at which another path is tried: twice the 3 % accuracy of limits
 
 
 def steady(
     finger: FiniteFinger, load: LoadState, tolerance: float = 1e-10, start: EquilibriumState | None = None
 ) -> EquilibriumState:
-    """Return the settled sliding state under `load`, proven to lie on the branch that begins without friction.
+    """Return the settled slide under `load` that lies on the branch from the frictionless state.
 
-    A state, sought from `start` first, whose skin is squeezed so far that it might have folded, or that is not found
-    directly, is proven by following the branch on meshes made for it. Raises NoSteadyState with both
-    limits where the branch ends before, NotConverged where it cannot be begun, Cancelled.
+    The search begins at `start`. A state whose skin might have folded, or that is not found directly, is proven by
+    following the branch on meshes made for it. Raises NoSteadyState with both limits where the branch ends before,
+    NotConverged where it has no first state, Cancelled.
     """
     candidates: list[EquilibriumState] = []
     for state in _direct_states(finger.newton, load, tolerance, start):
@@ -217,7 +217,7 @@ def steady(
 
 
 def stands(finger: FiniteFinger, state: EquilibriumState) -> bool:
-    """Return whether a state lies on the branch that begins without friction: plainly, or since that was followed."""
+    """Return whether a state lies on the branch from the frictionless state, where need be by following that."""
     if sound(finger, state, PROOF.plain):
         return True
     if not sound(finger, state):
@@ -227,16 +227,15 @@ def stands(finger: FiniteFinger, state: EquilibriumState) -> bool:
 
 
 def steep(load: LoadState) -> bool:
-    """Return whether friction is so steep that nearly all of the skin slips at a bound."""
+    """Return whether mu is so large that nearly all skin in contact is shear-limited."""
     return load.mu > STEEP and load.tau < np.inf
 
 
 def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
     """Raise NoSteadyState where the branch ends far below the friction of `load`.
 
-    Asked where a rough mesh finds nothing, or skin that has folded: to see a fine mesh fail takes longer than to follow
-    the branch. Nothing is raised where it goes on, or ends so near that another mesh may have the state, or where
-    friction is so steep that the bound decides.
+    For a coarse mesh without a state, or with folded skin: a failing fine mesh costs more than following the branch.
+    Nothing is raised where the branch ends so near that another mesh may have the state, or where friction is steep.
     """
     if load.mu > STEEP:
         return
@@ -249,9 +248,9 @@ def refuse_far_beyond(scene: Scene, load: LoadState) -> None:
 def _direct_states(
     newton: Newton, load: LoadState, tolerance: float, start: EquilibriumState | None
 ) -> Iterator[EquilibriumState]:
-    """Yield the states found directly: from `start`, from undeformed, and from all skin slipping at the bound.
+    """Yield the states found directly from `start`, from the undeformed state, and from shear-limited skin.
 
-    Where friction is steep, so that nearly all skin slips at the bound, undeformed leads nowhere that this does not.
+    Where friction is `steep`, the undeformed state leads to no further state.
     """
     ways: list[Callable[[], EquilibriumState]] = []
     if not steep(load):
@@ -266,7 +265,7 @@ def _direct_states(
 
 
 def doubts(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
-    """Return the sentence that a settled slide needs whose friction is as large as may be, or none."""
+    """Return a warning for a settled slide near the limit of friction, else nothing."""
     if state.load.sense == 0 or sound(finger, state, PROOF.plain):
         return ()
     proof = of_friction(finger.scene, state.load, state.load.mu)
@@ -280,9 +279,9 @@ def doubts(finger: FiniteFinger, state: EquilibriumState) -> tuple[str, ...]:
 
 
 def _reach_towards(scene: Scene, load: LoadState) -> Reach:
-    """Return how far the branch goes as friction grows, or as depth does where that alone leads to what `load` asks.
+    """Return the range of the branch by friction, or by depth where only that reaches `load`.
 
-    Where nearly all skin slips at a bound the coefficient hardly matters, and how far it may grow is hardly known.
+    Where nearly all skin is shear-limited, states hardly depend on mu, so that its limit is ill-conditioned.
     """
     proof = of_friction(scene, load, load.mu)
     if proof.limited:
@@ -293,7 +292,7 @@ def _reach_towards(scene: Scene, load: LoadState) -> Reach:
 
 
 def _refusal(scene: Scene, load: LoadState, proof: Reach) -> NoSteadyState | NotConverged:
-    """Return why there is no state: with both limits, each only where no state lies a little beyond it."""
+    """Return the failure with both limits, each only where no state lies a little beyond it."""
     largest, depth = proof.value, None
     if not _none_at(scene, load._replace(mu=(1.0 + APART) * largest), load):
         return _undecided(load, largest)
@@ -325,10 +324,10 @@ def _undecided(load: LoadState, largest: float) -> NotConverged:
 
 
 def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
-    """Return whether `further`, a little beyond a limit, has no state by the path that did not find the limit.
+    """Return whether `further`, a little beyond a limit, has no state along the other parameter's branch.
 
-    A limit of depth is looked at along friction, one of friction along depth. Beyond `load` nothing is looked at: it is
-    what has no state.
+    A limit of depth is checked by friction, a limit of friction by depth. Nothing is checked beyond `load`, which has
+    no state.
     """
     if further.depth >= load.depth and further.mu >= load.mu:
         return True
@@ -338,16 +337,16 @@ def _none_at(scene: Scene, further: LoadState, load: LoadState) -> bool:
 
 
 def _proven(finger: FiniteFinger, state: EquilibriumState, proof: Reach) -> bool:
-    """Return whether a state is the one that was reached along the branch on another mesh, and not a folded one."""
+    """Return whether a state agrees with the end of the branch on another mesh, and is not folded."""
     if folded(finger, state):
         return False
     return bool(np.all(np.abs(finger.numbers([state])[0] - proof.numbers) <= PROOF.alike * np.abs(proof.numbers)))
 
 
 def all_at_the_bound(newton: Newton, load: LoadState, tolerance: float) -> EquilibriumState:
-    """Return the settled state begun where nothing rubs, all that touches there slipping at a bound that grows.
+    """Return the settled slide from the frictionless one, with all its contact shear-limited and a growing bound.
 
-    A low bound with a large coefficient of friction acts where hardly anything presses: there slip is a bad guess.
+    Under a low bound and a large mu, skin is shear-limited at small pressures, so that slip is a bad first guess.
     Raises NotConverged.
     """
     bare = solve_full_slip(newton, load._replace(mu=0.0), None, tolerance)

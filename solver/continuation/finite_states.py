@@ -1,4 +1,4 @@
-"""Settled states and courses of a scene at finite strain, on one mesh: driven by depth, or under given forces."""
+"""Settled states at finite strain on one mesh, at a given depth or under given forces, and bodies under dead loads."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -25,15 +25,15 @@ from solver.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class ForceSearch:
-    """How a state nearby, or the depth at which a force is met, is looked for."""
+    """Control of the search for a nearby state, and for the depth at which the normal force is the given one."""
 
-    few: int = 10  # iterations from a state nearby to one that is simple to find: 4 to 7 are usual
-    leading: float = 1e-3  # tolerance of states that only lead to others [mm]
-    beyond: float = 1.5  # times the depth at which a force did not grow any more, up to which the largest is looked for
-    met: float = 1e-9  # relative difference within which a state has the normal force given
-    searches: int = 20  # steps of a search for the depth at which a force is met
-    furthest: float = 0.25  # of the depth, by which it may change in one
-    crushed: float = 0.3  # det F in a corner of what is held, below which the mesh ends the branch and not the body
+    few: int = 10  # iterations for a nearby state, at most: 4 to 7 are usual
+    leading: float = 1e-3  # tolerance of intermediate states [mm]
+    beyond: float = 1.5  # ratio of the largest depth searched to the one from which the force did not grow
+    met: float = 1e-9  # relative tolerance of the normal force
+    searches: int = 20  # steps of the search for the depth, at most
+    furthest: float = 0.25  # largest relative change of the depth in a step
+    crushed: float = 0.3  # det F below which the mesh, and not the body, ends a branch
 
 
 FORCE_SEARCH = ForceSearch()
@@ -42,9 +42,9 @@ FORCE_SEARCH = ForceSearch()
 def settled_state(
     finger: FiniteFinger, scene: Scene, start: EquilibriumState | None = None, times: float = 1.0
 ) -> EquilibriumState:
-    """Return the settled state of a scene, sought first from `start`, a proven state nearby.
+    """Return the settled state of a scene; the search begins at `start`, a proven state nearby.
 
-    Where it depends on its way, that has so many `times` the usual load steps, and a load state without sense. Raises
+    A state that depends on its load path takes `times` the usual load steps, and its load has no sense. Raises
     NoSteadyState, NotConverged, Cancelled.
     """
     if scene.loading.direction == 0 and scene.friction.mu > 0.0:
@@ -55,7 +55,7 @@ def settled_state(
 
 
 def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> EquilibriumState | None:
-    """Return the settled slide that lies a few iterations from `start`, or None where none that stands is so near."""
+    """Return the settled slide within a few iterations from `start`; None where there is none, or it is unproven."""
     newton, force = finger.newton, scene.normal_force
     try:
         if force is None:
@@ -70,9 +70,9 @@ def nearby(finger: FiniteFinger, scene: Scene, start: EquilibriumState) -> Equil
 
 
 def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = None) -> EquilibriumState:
-    """Return a state near the settled one, from which others may start if it is `sound`. Raises as `settled_state`.
+    """Return an approximate settled state, a start for others if it is `sound`. Raises as `settled_state`.
 
-    It is sought first from `near`, the settled state of a surface that slides the same way.
+    The search begins at `near`, the settled state of another surface, where that slides in the same direction.
     """
     if near is not None:
         alike = near.load.sense == -(scene.loading.direction or 1)
@@ -89,12 +89,12 @@ def roughly(finger: FiniteFinger, scene: Scene, near: EquilibriumState | None = 
 def _state_under_force(
     finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None, times: float
 ) -> EquilibriumState:
-    """Return the settled state under the forces of a scene, depth and shift found. Raises as `settled_state`."""
+    """Return the settled state under given forces, with unknown depth and travel. Raises as `settled_state`."""
 
     def hold() -> EquilibriumState:
         return march(scene, finger, times).last
 
-    if start is not None and start.load.sense == 0:  # the end of a course, and no slide to start from
+    if start is not None and start.load.sense == 0:  # the end of a load path, no start for a slide
         start = None
         with suppress(NotConverged):
             return hold()
@@ -105,7 +105,7 @@ def _state_under_force(
 
 
 def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteadyState:
-    """Return why there is no slide under a normal force, found by searching depths: no limit of friction is known."""
+    """Return the failure of a scene under a normal force, from the `failure` at its depths, without a limit of mu."""
     depth, most = failure.limit_indentation, failure.limit_normal_force
     far = [] if most is None else [f"{most:.3g} N/mm"]
     far += [] if depth is None else [f"{depth:.3g} mm of indentation"]
@@ -121,7 +121,7 @@ def _under_force(scene: Scene, force: float, failure: NoSteadyState) -> NoSteady
 def _sliding_under(
     finger: FiniteFinger, scene: Scene, force: float, start: EquilibriumState | None
 ) -> EquilibriumState:
-    """Return settled sliding under the normal force of a scene, from `start` or reached as the force grows."""
+    """Return the settled slide under the normal force of a scene, from `start` or as the force grows."""
     newton = finger.newton
     load = sliding_load(scene)
     capped = steep(load)
@@ -158,7 +158,7 @@ def _increase_force(newton: Newton, load: LoadState, force: float) -> Iterator[E
 
 
 def _at_force(newton: Newton, start: EquilibriumState, force: float) -> EquilibriumState:
-    """Return the slide that presses with `force` [N/mm], its depth sought from `start` on. Raises NotConverged."""
+    """Return the slide with a normal `force` [N/mm], by Newton's method for its depth. Raises NotConverged."""
     state, depth = start, start.load.depth
     for _ in range(FORCE_SEARCH.searches):
         state = load_stepping.solve_full_slip(newton, state.load._replace(depth=depth), state)
@@ -176,10 +176,10 @@ def _at_force(newton: Newton, start: EquilibriumState, force: float) -> Equilibr
 
 
 def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> EquilibriumState:
-    """Return settled sliding under `force` [N/mm] deeper than `state`, from where it did not grow on.
+    """Return the settled slide under `force` [N/mm] deeper than `state`, beyond which force control failed.
 
-    How deep sliding goes, and how hard it presses there, is found by `existence`; but only where driven a little
-    deeper it has no state. Where it has one, that is where the search goes on. Raises as `settled_state`.
+    `existence` finds the largest depth and its force. Where a slightly deeper state exists nevertheless, the search
+    continues there. Raises as `settled_state`.
     """
     proof = of_depth(finger.scene, state.load._replace(depth=FORCE_SEARCH.beyond * state.load.depth))
     if proof.limited and not proof.lost and proof.numbers[1] < force:
@@ -191,10 +191,10 @@ def _deeper(finger: FiniteFinger, state: EquilibriumState, force: float) -> Equi
 def _slide_reaching_force(
     finger: FiniteFinger, state: EquilibriumState, proof: Reach, force: float
 ) -> EquilibriumState:
-    """Return a slide beyond the depth at which `proof` ends that presses with `force` [N/mm] or more.
+    """Return a slide beyond the limit depth of `proof` with a normal force of `force` [N/mm] or more.
 
-    Depths grow by as much as limits of two meshes differ. Raises NoSteadyState between a depth with a state and one
-    without, NotConverged where it is not known whether there is one.
+    Depths grow by the difference of limits between two meshes. Raises NoSteadyState between a depth with a state and
+    one without, NotConverged where existence is not known.
     """
     depth, most = proof.value, float(proof.numbers[1])
     while most < force:
@@ -215,13 +215,12 @@ def solve_dead_load(
     start: EquilibriumState | None = None,
     steps: int = 4,
 ) -> EquilibriumState:
-    """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], what is held displaced by `prescribed` [mm].
+    """Return the equilibrium under dead `loads` (nodes, 2) [N/mm], with held nodes displaced by `prescribed` [mm].
 
-    `prescribed` (nodes, 2) is 0 where nothing holds. From undeformed, or from `start` (whose contact states are then
-    the first guess), in `steps` equal parts; one that fails is halved. `load` (its default: no contact depth, no
-    friction) stays the same meanwhile. The loads stay on the body for what follows. Raises BodyError for
-    arrays of another shape, ValueError for a load on the centre of an element and for a load state that is none,
-    NotConverged where no equilibrium is found.
+    `prescribed` (nodes, 2) is 0 at free nodes. The path begins at `start` or the undeformed state, and has `steps`
+    equal steps; one that fails is halved. `load` is constant, by default without depth and friction. The loads stay on
+    the body. Raises BodyError for arrays of another shape, ValueError for a load on the centre of an element and for a
+    load state that is not allowed, NotConverged where no equilibrium is found.
     """
     newton, condensed = Newton(body.condensed), body.condensed
     check_loads(body.mesh, loads, prescribed)
@@ -262,11 +261,11 @@ def _on_unknowns(body: FiniteBody, loads: Array) -> Array:
 def steady_body(
     whole: FiniteBody, load: LoadState, skin: Law, start: EquilibriumState | None = None
 ) -> EquilibriumState:
-    """Return the settled sliding state under `load`, followed on this mesh from the one without friction.
+    """Return the settled slide of a body under `load`, followed on its mesh from the frictionless state.
 
-    That is sought from undeformed, or from `start`. `skin` is the law of what may fold. Raises NoSteadyState where the
-    branch ends before, at a limit point or where the skin folds, with the largest friction as this mesh has it;
-    NotConverged where it is lost before, which says nothing about the body, or cannot be begun.
+    The search for that begins at `start` or the undeformed state. `skin` is the law of the tissue that may fold. Raises
+    NoSteadyState with the largest friction on this mesh where the branch ends before, at a limit point or where the
+    skin folds; NotConverged where it is lost before, or has no first state.
     """
     newton = Newton(whole.condensed)
     body = _OwnBody(whole, newton)
@@ -285,7 +284,7 @@ def steady_body(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _OwnBody:
-    """A body of which all skin is looked at that may touch."""
+    """A body whose skin is checked for folds wherever it may touch."""
 
     body: FiniteBody
     newton: Newton

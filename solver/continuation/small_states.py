@@ -1,11 +1,8 @@
-"""Settled states of a scene at small strain on one mesh, or why there is none and how far there would be one.
+"""Settled states at small strain on one mesh, limits of their existence, and the depth under a normal force.
 
-Also the depth to which a normal force presses the finger, for which meshes are made.
-
-As the coefficient of friction grows, so does the force with which the drag presses the finger down, until the finger
-yields less than it is pressed: the forces of the settled state grow without bound at a finite coefficient, and beyond
-it there is no settled state: the drag wedges the finger into the surface. The limit is reached by following the state
-as the coefficient grows.
+The drag of a slide presses the finger down. The larger the coefficient of friction, the larger that force, until the
+forces of the settled state grow without bound at a finite coefficient. Beyond it there is no settled state: the drag
+wedges the finger into the surface. The limit is found by following the state from mu = 0.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,24 +24,24 @@ from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 from solver.scene.tables import SHALLOW, Friction, SceneError
 
-WIDE = 16.0  # margin at which nearly all the palmar skin may touch
-FINENESS = 7.0  # of the meshes on which limits of depth and force are looked for: they hardly depend on the mesh
-ROUGH = 6.0  # of the mesh on which depths under a force are looked for, good to some tenths of a per cent of the depth
-COVERED = 0.9  # of the highest skin that touches: a mesh for that depth looks for contact up to 1.25 times of it
-NEARLY = 0.5  # of what makes it slide, from which a finger that is dragged is about as deep as one that slides
-DEEPEST = 0.85  # of the tissue between first touch and bone: beyond, a small-strain depth means nothing
+WIDE = 16.0  # margin with which nearly all the palmar skin may touch
+FINENESS = 7.0  # of the meshes for limits of depth and force, which hardly depend on the mesh
+ROUGH = 6.0  # of the mesh for depths under a force, accurate to some tenths of a per cent
+COVERED = 0.9  # ratio of the depth a mesh is made for to the highest skin in contact: it covers 1.25 times its depth
+NEARLY = 0.5  # ratio of drag to friction limit from which a dragged finger is about as deep as a sliding one
+DEEPEST = 0.85  # of the tissue between first contact and bone: beyond, small strain is meaningless
 
 
 @dataclass(frozen=True, slots=True)
 class LimitSearch:
-    """How a limit of friction, depth or force is looked for."""
+    """Control of the search for a limit of friction, depth or force."""
 
-    finer: float = 1.6  # times as fine is the mesh on which a limit of depth is looked at once more
-    beyond: float = 2.0  # times the largest depth met as a force grew, up to which the largest is looked for
-    patience: int = 15  # corrections of states that a small step may take
-    least: float = 1e-3  # part of a depth or force below which no limit of it is looked for
-    close: float = 0.005  # relative step of mu below which a limit is taken as found
-    nudge: float = 1e-4  # of a given force, to see whether the finger gives way
+    finer: float = 1.6  # ratio of finenesses of the mesh that confirms a limit of depth
+    beyond: float = 2.0  # ratio of the largest depth searched to the largest that occurred under growing forces
+    patience: int = 15  # systems for the contact states of a step, at most
+    least: float = 1e-3  # smallest fraction of a depth or force that is tried
+    close: float = 0.005  # relative step of mu at which the search for its limit ends
+    nudge: float = 1e-4  # relative increase of a given force that shows whether the finger gives way
 
 
 LIMIT_SEARCH = LimitSearch()
@@ -53,10 +50,10 @@ LIMIT_SEARCH = LimitSearch()
 def continue_in_friction(
     newton: Newton, load: LoadState, force: float | None = None, first: EquilibriumState | None = None
 ) -> tuple[EquilibriumState | None, float]:
-    """Return the settled sliding state under `load` reached by following it from mu = 0, and the largest mu with one.
+    """Return the settled slide under `load`, followed from mu = 0, and the largest mu that has a slide.
 
-    The state is None where that mu falls short of the one of `load`. Under a normal `force`, `first` is the state at
-    mu = 0; the mu is then 0 where contact grew beyond the skin that may touch: nothing is known.
+    The state is None where that is less than the mu of `load`. Under a normal `force`, `first` is the state at mu = 0,
+    and the mu returned is 0 (unknown) where contact grew beyond the skin that may touch.
     """
     reached, step, unknown = 0.0, load.mu, False
     try:
@@ -71,9 +68,9 @@ def continue_in_friction(
             step /= 2.0
             continue
         under_force = first is not None
-        if further.reaches_end:  # the skin that may touch ends: what lies beyond is not known
+        if further.reaches_end:  # contact beyond the skin that may touch is unknown
             step, unknown = step / 2.0, under_force
-        elif under_force and not further.load.depth > 0.0:  # pressed by a surface that it does not reach
+        elif under_force and not further.load.depth > 0.0:  # the surface would pull
             step /= 2.0
         else:
             state, reached, step = further, aim, 2.0 * step
@@ -83,29 +80,29 @@ def continue_in_friction(
 
 
 class Bodies:
-    """Meshes of one finger, each for depths around a power of two."""
+    """A cache of one finger on meshes for depths around powers of two."""
 
     def __init__(self, scene: Scene) -> None:
-        """Make none yet."""
+        """Start empty."""
         self._scene = scene
         self._by_power: dict[int, Newton] = {}
 
     def at(self, depth: float) -> Newton:
-        """Return a body whose mesh serves `depth` [mm], from 0.7 to 1.4 times the one it was made for."""
+        """Return a body whose mesh is made for a depth within a factor of 1.4 of `depth` [mm]."""
         power = round(log2(depth))
         if power not in self._by_power:
             self._by_power[power] = self.build_for(2.0**power, FINENESS)
         return self._by_power[power]
 
     def build_for(self, depth: float, fineness: float) -> Newton:
-        """Return a body with a mesh of its own."""
+        """Return a body with a new mesh."""
         return LinearFinger.of(self._scene, Sizing(fineness, depth, margin=WIDE)).newton
 
 
 def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
     """Return the largest normal force [N/mm] and depth [mm] with settled sliding under `load`, to 3 and 4 %.
 
-    Below those of the scene; the force is None where the scene gives none, and either where it is not known.
+    Both are less than the scene's. The force is None where the scene prescribes a depth; unknown limits are None.
     """
     bodies = Bodies(scene)
     if scene.normal_force is None:
@@ -117,9 +114,9 @@ def limits(scene: Scene, load: LoadState) -> tuple[float | None, float | None]:
 
 
 def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = None) -> float | None:
-    """Return the largest indentation [mm] below `high`, and above `low` where that is known, with settled sliding.
+    """Return the largest indentation [mm] between `low` and `high` with settled sliding.
 
-    None where there is none, or where a finer mesh puts it elsewhere, as it does at coefficients far beyond the limit.
+    None where there is none, or where a finer mesh disagrees, as it does at coefficients far beyond the limit.
     """
 
     def slides(depth: float) -> bool:
@@ -137,9 +134,9 @@ def _deepest(bodies: Bodies, load: LoadState, high: float, low: float | None = N
 
 
 def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> tuple[float | None, float] | None:
-    """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] on the way.
+    """Return the largest normal force [N/mm] below `force` with settled sliding, and the largest depth [mm] tried.
 
-    The force is None where a finer mesh puts it elsewhere; all is None where there is no sliding.
+    The force is None where a finer mesh disagrees; the result is None where there is no slide.
     """
     depths, bone = [0.0], scene.finger.pulp_thickness()
     bare = load._replace(mu=0.0)
@@ -167,7 +164,7 @@ def _strongest(bodies: Bodies, scene: Scene, force: float, load: LoadState) -> t
 
 
 def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
-    """Return up to where between `low`, which does, and `high` there is what `exists`, within 1 %."""
+    """Return the largest value between `low` and `high` for which `exists` is true, to 1 %, by bisection."""
     while high > 1.02 * low:
         middle = sqrt(low * high)
         low, high = (middle, high) if exists(middle) else (low, middle)
@@ -175,10 +172,9 @@ def _largest(exists: Callable[[float], bool], low: float, high: float) -> float:
 
 
 def settled_state(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
-    """Return the settled state, without its history where it has none left, else in `times` the usual load steps.
+    """Return the settled state: a slide directly, a path-dependent one in `times` the usual load steps.
 
-    Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where a given drag is more than
-    friction carries.
+    Raises NotConverged, ContactLost where no slide was found, and NoSteadyState where the given drag exceeds friction.
     """
     load, loading, newton = sliding_load(scene), scene.loading_per_mm, finger.newton
     if loading.direction == 0 and not load.frictionless:
@@ -223,7 +219,7 @@ def gives_way(scene: Scene, finger: LinearFinger, state: EquilibriumState) -> bo
 
 
 def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
-    """Raise SolveFailure where a given force has led to a `depth` [mm] that means nothing, as beyond the bone."""
+    """Raise SolveFailure where a given force leads to a meaningless `depth` [mm], as beyond the bone."""
     room, most = scene.finger.pulp_thickness(), None
     if depth >= room:
         with suppress(ContactLost):
@@ -234,10 +230,10 @@ def in_tissue(scene: Scene, finger: LinearFinger, depth: float) -> None:
 def remove_round_off(
     scene: Scene, finger: LinearFinger, state: EquilibriumState, displacement: Array
 ) -> tuple[EquilibriumState, Array]:
-    """Return a state and its displacement (nodes, 2) once more, with less round-off: balanced, the skin on the surface.
+    """Return a state and its displacement (nodes, 2) after one step of iterative refinement.
 
-    The elimination leaves some 1e-13 of the forces unbalanced, which falls by processor: a Newton step from the forces
-    of the elements takes it out. The contact states stay if they can.
+    The elimination leaves residuals of some 1e-13 of the forces, which differ between processors. A step from the
+    elements' own residual removes them. Contact states change only where they must.
     """
     about, recover = finger.body.linearise_about(displacement)
     newton = Newton(about)
@@ -251,9 +247,10 @@ def remove_round_off(
 
 
 def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
-    """Return the settled state on a coarser mesh, whose friction limit may lie just below the drag asked for.
+    """Return the settled state, or full slip where the friction limit of this mesh lies just below the given drag.
 
-    Where no guess leads to it, as with large coefficients, it is followed from mu = 0. Raises as `settled_state`.
+    Where no first guess converges, as for large coefficients, the state is followed from mu = 0. Raises as
+    `settled_state`.
     """
     try:
         return settled_state(scene, finger)
@@ -271,15 +268,15 @@ def nearest(scene: Scene, finger: LinearFinger) -> EquilibriumState:
 
 
 def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> EquilibriumState:
-    """Return the settled state; where it depends on its way, after so many `times` the usual load steps.
+    """Return the settled state, a path-dependent one after `times` the usual load steps.
 
-    Near a limit, or beyond it, guesses can end in states that no sliding leads to. Where none was found, or one that is
-    folded, only what is reached by following the state from mu = 0 counts. Raises NoSteadyState, NotConverged.
+    Near or beyond a limit, guesses can converge to states to which no slide leads. Where none was found, or a folded
+    one, only the state followed from mu = 0 counts. Raises NoSteadyState, NotConverged.
     """
     direction = scene.loading.direction
     try:
         state = settled_state(scene, finger, times)
-        # in states that no sliding leads to tissue is turned inside out somewhere
+        # a state to which no slide leads has an element turned inside out
         if direction == 0 or state.load.path_dependent or finger.body.smallest_det(finger.displacement(state)) > 0.0:
             return state
         why = "the state found is folded"
@@ -294,7 +291,7 @@ def direct(scene: Scene, finger: LinearFinger, times: float = 1.0) -> Equilibriu
 
 
 def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotConverged:
-    """Return the failure that says what is known."""
+    """Return the failure of a scene without a slide, with the limits that are known."""
     force = scene.normal_force
     at = f"{scene.loading.depth:g} mm indentation" if force is None else f"a normal force of {force:g} N/mm"
     at += f" and mu = {float(scene.friction.mu):g}"
@@ -323,10 +320,10 @@ def _no_answer(scene: Scene, why: str, limit_mu: float) -> NoSteadyState | NotCo
 
 
 def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> tuple[float | None, ...]:
-    """Return for each scene the indentation [mm] at which its settled normal force is the given one [N/mm].
+    """Return the indentation [mm] of each scene at which its settled normal force is the given one [N/mm].
 
-    Found directly, with the depth as an unknown and the force given. All scenes share the finger, materials and
-    receptor of the first. None where the finger would be pressed to its bone, or has no such settled state.
+    The depth is an unknown of one solve. All scenes share the finger, materials and receptor of the first. None where
+    the finger would be pressed to its bone, or has no such settled state.
     """
     if not scenes:
         return ()
@@ -337,33 +334,33 @@ def matching_depths(scenes: Sequence[Scene], normal_forces: Sequence[float]) -> 
 
 
 def expected_depth(scene: Scene) -> float:
-    """Return the indentation [mm], or about what a given force will lead to, for which meshes are made."""
+    """Return the indentation [mm] for which a mesh is made: the given one, or an estimate under a given force."""
     force = scene.normal_force
     if force is None:
         return scene.loading.depth
     deepest = DEEPEST * scene.finger.pulp_thickness()
     try:
         finger = _finger(scene.frictionless_press(deepest))
-    except (SceneError, NotConverged):  # who makes the meshes that count will tell
+    except (SceneError, NotConverged):  # the solve itself will report it
         return deepest
     state = _pressed(finger, scene, force, deepest)
     drag = scene.tangential_force or 0.0
     held = scene.loading.direction == 0 or scene.loading.dragged
     if held and (state is None or drag < NEARLY * abs(state.force[0])):
-        # Then it goes about as deep as one that slides with so much drag and no more.
+        # Then it is about as deep as one that slides under the same drag.
         friction = Friction(min(drag / force, float(scene.friction.mu)), scene.friction.tau_max)
         state = _pressed(finger, replace(scene, friction=friction), force, deepest)
     if state is None:
         return deepest
-    # A strong drag lifts the bone while it lays ever more skin on the surface, which the mesh must be made for.
+    # A strong drag lifts the bone, and yet more skin comes into contact, which the mesh must cover.
     highest = float(finger.body.condensed.rest[state.touching, 1].max())
     return max(state.load.depth, COVERED * highest, SHALLOW)
 
 
 def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
-    """Raise SolveFailure where a given force has led to a `depth` [mm] that no model of the tissue reaches.
+    """Raise SolveFailure where a given force leads to a `depth` [mm] outside the tissue.
 
-    `most` is the normal force [N/mm] that the tissue carries down to the bone, where that is known.
+    `most` is the normal force [N/mm] at the depth of the bone, where known.
     """
     force, room = scene.normal_force, scene.finger.pulp_thickness()
     if force is None or SHALLOW <= depth < room:
@@ -387,12 +384,12 @@ def within_reach(scene: Scene, depth: float, most: float | None = None) -> None:
 
 @lru_cache(maxsize=1)
 def _finger(bare: Scene) -> LinearFinger:
-    """Return the finger on a rough mesh: surfaces of one finger follow each other and share it."""
+    """Return the finger on a coarse mesh, cached for consecutive surfaces of one finger."""
     return LinearFinger.of(bare, Sizing(ROUGH, bare.loading.depth))
 
 
 def _pressed(finger: LinearFinger, scene: Scene, normal_force: float, deepest: float) -> EquilibriumState | None:
-    """Return the settled slide under a normal force [N/mm], None where none is less deep than `deepest` [mm]."""
+    """Return the settled slide under a normal force [N/mm]; None where it is deeper than `deepest` [mm]."""
     try:
         state = slide_under(finger.newton, sliding_load(scene), normal_force, deepest)
     except ContactLost:

@@ -1,9 +1,9 @@
-"""One load step of a body at finite strain: Newton, contact states and displacements updated together.
+"""One load step of a body: Newton's method, which updates displacements and contact states together.
 
-Unknown are the displacements; the states of the skin's nodes (open, stick, slip, slip at the bound) change with every
-iteration (primal-dual active set: Alart and Curnier 1991; Hüeber and Wohlmuth 2005). Nothing is left of a penalty. The
-pressure in the geometric stiffness is the linearised prediction of the iteration before (mixed integration points:
-Magisano, Leonetti and Garcea 2017), which lets a nearly incompressible body take the whole depth in a step or two.
+The states of the skin's nodes (open, stick, slip, shear-limited) change with every iteration by a primal-dual active
+set, without a penalty (Alart and Curnier 1991; Hüeber and Wohlmuth 2005). The pressure in the geometric stiffness is
+the linearised prediction of the iteration before (mixed integration points: Magisano, Leonetti and Garcea 2017). So a
+nearly incompressible body takes the whole depth in a step or two.
 """
 
 from dataclasses import dataclass, replace
@@ -36,34 +36,33 @@ EQUILIBRIUM, BY_DEPTH, BY_FRICTION, BY_TRAVEL = 0, 1, 2, 3  # columns of Newton.
 
 @dataclass(frozen=True, slots=True)
 class NewtonControl:
-    """When the iterations halve a step, keep a tangent and give up.
+    """When the iterations halve a step, keep a tangent or stop.
 
-    Measured on eighteen slides, pushes and courses of a finger at finite strain: to halve or double any of these
-    changes no state by more than 6e-10 and the number of tangents by 3 % at most. With no tangent kept there are 5 %
-    more.
+    Halving or doubling any of these changed no state of eighteen slides, presses and load paths at finite strain by
+    more than 6e-10, and the number of tangents by 3 % at most. Without keeping tangents there are 5 % more.
     """
 
-    shortest: float = 1.0 / 16.0  # part of a step below which a body that turns inside out is given up
+    shortest: float = 1.0 / 16.0  # smallest part of a step that is tried where the whole turns the body inside out
     stride: float = 0.3  # largest change of depth or travel in one iteration where forces are given [mm]
-    rounds: int = 12  # of changes of contact states within one linear system: dense, of the skin alone, and so cheap
-    near: float = 0.1  # step below which the tangent of the state before is tried again [mm]
-    fast: float = 0.02  # fall of the steps' size, below which a new tangent is kept
-    slow: float = 0.5  # the same, above which a kept one is given up
+    rounds: int = 12  # changes of contact states within one linearisation: its systems are small, and so cheap
+    near: float = 0.1  # first step below which the tangent of the state before is kept [mm]
+    fast: float = 0.02  # ratio of consecutive steps below which a new tangent is kept
+    slow: float = 0.5  # the same ratio, above which a kept tangent is renewed
     turned: float = 0.01  # step times bulk over shear stiffness, above which no tangent is kept [mm]
-    patience: int = 20  # systems, and four for each node, after which contact states of a linear body are given up
-    margin: float = 0.5  # part of the tolerance that the step still missing, as judged, may take
-    same: float = 1e-3  # relative difference of steps that are the same
-    again: int = 4  # so many in a row are a circle
-    unbounded: float = 1e3  # displacement that no body bears [mm]
+    patience: int = 20  # most systems for the contact states of a linear body, beside four for each node
+    margin: float = 0.5  # part of the tolerance that the remaining step, as estimated, may take
+    same: float = 1e-3  # relative difference below which two steps count as equal
+    again: int = 4  # equal steps in a row that count as a cycle
+    unbounded: float = 1e3  # displacement from which the body counts as loose [mm]
 
 
 CONTROL = NewtonControl()
 
 
 class LoadState(NamedTuple):
-    """What the surface does: how far it has risen, how far it has moved, and its friction."""
+    """Position of the surface relative to the bone, and its friction."""
 
-    depth: float  # of the bone's travel towards the surface [mm]
+    depth: float  # indentation: travel of the bone towards the surface [mm]
     mu: float  # [-]
     tau: float = np.inf  # traction bound [MPa]
     sense: int = (
@@ -78,11 +77,11 @@ class LoadState(NamedTuple):
 
     @property
     def path_dependent(self) -> bool:
-        """Whether a state depends on the way to it: friction on each node then opposes how that node moved last."""
+        """Whether a state depends on its load path: friction on each node then opposes the node's last motion."""
         return self.sense == 0 and not self.frictionless
 
     def towards(self, other: "LoadState", part: float) -> "LoadState":
-        """Return what lies `part` of the way to `other`; a bound that was not there before takes its value at once."""
+        """Return the load state a `part` of the way to `other`; a bound where there was none is taken whole."""
         if part == 1.0:
             return other
         tau = self.tau + part * (other.tau - self.tau) if max(self.tau, other.tau) < np.inf else other.tau
@@ -93,7 +92,7 @@ class LoadState(NamedTuple):
         return LoadState(depth, self.mu + part * (other.mu - self.mu), tau, other.sense, travel)
 
     def validate(self) -> "LoadState":
-        """Return the same of floats alone, as loops take them. Raises ValueError for friction or ways that are none."""
+        """Return a copy with floats, for the kernels. Raises ValueError for values that are not allowed."""
         law = FrictionLaw(float(self.mu), float(self.tau))
         if self.sense not in (-1, 0, 1):
             raise ValueError(f"sense = {self.sense} is not allowed: friction points along +1 or -1, or is found by 0")
@@ -105,42 +104,42 @@ UNLOADED = LoadState(0.0, 0.0)
 
 
 class ForceLoad(NamedTuple):
-    """What drives the bone: the normal force, and the surface's pull along +x or the surface's travel."""
+    """Given forces on the skin: the normal force, and the tangential force along +x or the surface's travel."""
 
     normal: float  # [N/mm]
     tangential: float | None  # [N/mm]; None: `travel` is given instead
     travel: float = 0.0  # of the surface along +x relative to the bone [mm]
 
     def validate(self) -> "ForceLoad":
-        """Return the same of floats alone, as loops take them. Raises ValueError for what is not finite."""
+        """Return a copy with floats, for the kernels. Raises ValueError for a value that is not finite."""
         drag = None if self.tangential is None else finite("tangential", self.tangential)
         return ForceLoad(finite("normal", self.normal), drag, finite("travel", self.travel))
 
     def towards(self, other: "ForceLoad", part: float) -> "ForceLoad":
-        """Return what lies `part` of the way to `other`, which gives the same kind of thing."""
+        """Return the forces a `part` of the way to `other`, which gives the same quantities."""
         tangential = other.tangential
         if tangential is not None:
-            begun = 0.0 if self.tangential is None else self.tangential
-            tangential = begun + part * (tangential - begun)
+            start = 0.0 if self.tangential is None else self.tangential
+            tangential = start + part * (tangential - start)
         normal = self.normal + part * (other.normal - self.normal)
         return ForceLoad(normal, tangential, self.travel + part * (other.travel - self.travel))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EquilibriumState:
-    """A state of the body; never changed once made. k nodes of skin, e elements."""
+    """An immutable state of a body with k nodes of skin and e elements."""
 
     u: Array  # (nodes, 2) displacements relative to the bone [mm]
-    pressure: Array  # (e, 3) modes of the pressure as the next tangent sees them
-    state: States  # (k,)
+    pressure: Array  # (e, 3) modes of the pressure, as predicted for the next tangent
+    state: States  # (k,) OPEN, STICK, SLIP or SHEAR_LIMITED
     sense: States  # (k,) direction of the friction force on the skin where it slips
     reaction: Array  # (k, 2) forces of the surface on the skin [N/mm]
     load: LoadState
-    iterations: int  # linear systems solved on the way here, from undeformed
+    iterations: int  # linear systems solved since the undeformed state
 
     @staticmethod
     def undeformed(body: CondensedBody, load: LoadState = UNLOADED) -> "EquilibriumState":
-        """Return the body before anything touches it, under a surface with the friction of `load`."""
+        """Return the undeformed body without contact, with the friction of `load`."""
         u, pressure = body.undeformed()
         zero = np.zeros(len(body.held), np.int32)
         return EquilibriumState(u, pressure, zero, zero, np.zeros((len(zero), 2)), load.validate(), 0)
@@ -151,27 +150,27 @@ class EquilibriumState:
 
     @property
     def touching(self) -> NDArray[np.bool_]:
-        """Which nodes touch, (k,)."""
+        """Whether each node is in contact, (k,)."""
         return self.state != OPEN
 
     @property
     def reaches_end(self) -> bool:
-        """Whether contact reaches an end of the skin that may touch, beyond which nothing is looked at."""
+        """Whether contact reaches an end of the skin that may touch, beyond which contact is not considered."""
         return bool(self.touching[[0, -1]].any())
 
     @property
     def sticking(self) -> float:
-        """Part of the touching nodes that stick [-]."""
+        """Fraction of the nodes in contact that stick [-]."""
         return float(np.sum(self.state == STICK) / max(int(self.touching.sum()), 1))
 
     @property
     def normal(self) -> Array:
-        """Push of the surface on each node along +y, (k,) [N/mm]."""
+        """Normal force of the surface on each node along +y, (k,) [N/mm]."""
         return self.reaction[:, 1]
 
     @property
     def tangential(self) -> Array:
-        """Pull of the surface on each node along +x, (k,) [N/mm]."""
+        """Tangential force of the surface on each node along +x, (k,) [N/mm]."""
         return self.reaction[:, 0]
 
     @property
@@ -181,19 +180,19 @@ class EquilibriumState:
 
 
 class Newton:
-    """The iterations on one body, with the memory they need."""
+    """Newton's method on one condensed body, with its work arrays."""
 
     def __init__(self, condensed: CondensedBody) -> None:
-        """Set memory aside for the skin of a body."""
+        """Allocate work arrays for the skin of a body."""
         skin = len(condensed.held)
         self.condensed = condensed
-        self.systems = 0  # tangents assembled, or tried
+        self.systems = 0  # tangents assembled so far
         unknowns = 2 * skin + 3
         self.system = ContactSystem(
             np.zeros(skin), np.zeros(unknowns, np.int32), np.zeros(unknowns**2), np.zeros((unknowns, 4)),
             np.zeros((2 * skin, 4)), np.zeros(2),
         )  # fmt: skip
-        self.steps = self.system.steps  # (2 k, 4) of the skin, as the loops fill them
+        self.steps = self.system.steps  # (2 k, 4) of the skin, which the kernels fill
         self.bulk = condensed.bulk
         self.skin = Skin(condensed.held, condensed.middle, condensed.fixed_length)
         self._rest = condensed.undeformed()[0]
@@ -213,11 +212,11 @@ class Newton:
         *,
         kept: bool = False,
     ) -> bool:
-        """Set up the system at `state` under `load`, solve it for the skin's `steps` (2 k, 4); False where it fails.
+        """Linearise the body at `state` and solve its contact for the `steps` (2 k, 4); return False where that fails.
 
-        `anchor` (k,) are the positions along x where nodes stick [mm]. The states of contact are changed up to `rounds`
-        times until none contradicts the linearised body. Where there are `forces`, the first step meets them too. With
-        `kept` the tangent and its factors are those that are there already.
+        `anchor` (k,) are the positions along x where nodes stick [mm]. Contact states change up to `rounds` times,
+        until none contradicts the linearised body. Under `forces`, the first step meets them too. With `kept`, the last
+        tangent and its factors serve again.
         """
         self.systems += 0 if kept else 1
         body = self.condensed
@@ -228,7 +227,7 @@ class Newton:
     def solve_contact(
         self, state: EquilibriumState, load: LoadState, anchor: Array, rounds: int, forces: ForceLoad | None = None
     ) -> int:
-        """Solve the contact of the linearised body at `state`; return what `solve_active_set` does."""
+        """Solve the contact of the linearised body at `state`; return the result of `solve_active_set`."""
         body = self.condensed
         self._states.state[:], self._states.sense[:] = state.state, state.sense
         kind, drag, push = DEPTH_GIVEN, 0.0, 0.0
@@ -242,23 +241,23 @@ class Newton:
         )  # fmt: skip
 
     def arrays(self) -> CondensedArrays:
-        """Return the linearised body as loops take it."""
+        """Return the linearised body as an argument of the kernels."""
         body = self.condensed
         return CondensedArrays(body.stiffness, body.force)
 
     def _position(self, u: Array, load: LoadState, anchor: Array) -> SkinPosition:
-        """Return where the skin lies for displacements `u`, relative to the surface."""
+        """Return the position of the skin relative to the surface at displacements `u`."""
         place = self.condensed.place(u)
         return SkinPosition(place[:, 0].copy(), place[:, 1] - load.depth, anchor)
 
     def follows(self, steps: Array) -> Array:
-        """Return how the force of the surface along x and y (2, c) changes with `steps` of the skin (2 k, c)."""
+        """Return the changes of the surface's force along x and y (2, c) by `steps` of the skin (2 k, c)."""
         return self.condensed.stiffness.reshape(-1, 2, len(steps)).sum(axis=0) @ steps
 
     def apply_step(
         self, state: EquilibriumState, load: LoadState, skin: Array, anchor: Array, scale: float = 1.0
     ) -> tuple[EquilibriumState, float, int]:
-        """Return the state after the skin's step (2 k,), its largest move [mm], and how many states it changed."""
+        """Return the state after a step of the skin (2 k,), its largest displacement [mm], and its changed states."""
         body, skin = self.condensed, np.ascontiguousarray(skin)
         reaction = (body.force + body.stiffness @ skin).reshape(-1, 2)
         u, pressure, largest = body.recover(state.u, state.pressure, skin, scale)
@@ -269,13 +268,13 @@ class Newton:
     def settle(
         self, start: EquilibriumState, load: LoadState, tolerance: float = 1e-10, limit: int = 25
     ) -> EquilibriumState:
-        """Return the equilibrium under `load`, from `start`, its displacements good to `tolerance` [mm].
+        """Return the equilibrium under `load`, from `start`, with displacements accurate to `tolerance` [mm].
 
-        Tangents are kept, factors and all, where steps are small or fall fast. What is still missing is judged from how
-        the steps fall: with a new tangent as the square, with a kept one in proportion. Raises NotConverged where
-        `limit` iterations do not do it or the body would turn inside out.
+        Tangents and their factors are kept where steps are small or decrease fast. The remaining error is estimated
+        from consecutive steps: convergence is quadratic with a new tangent, linear with a kept one. Raises NotConverged
+        after `limit` iterations, or where the body would turn inside out.
         """
-        x = start.place(self.condensed)[:, 0].copy()  # as loops are compiled for
+        x = start.place(self.condensed)[:, 0].copy()  # contiguous, for the kernels
         anchor = x + (load.travel - start.load.travel)
         begin = self._enter(start, load, x)
         if self.condensed.constant:
@@ -287,7 +286,7 @@ class Newton:
     def _iterate(
         self, start: EquilibriumState, load: LoadState, anchor: Array, tolerance: float, limit: int
     ) -> EquilibriumState:
-        """Do as `settle` from `start`, whose states are those that `load` brings at once, `anchor` (k,) being known."""
+        """Return the equilibrium as `settle` does, from the contact states of `start`, with known `anchor` (k,)."""
         state = before = start
         kept = self.condensed.equilibrium is start.u
         scale, last, new, alike = 1.0, 0.0, False, 0
@@ -321,7 +320,7 @@ class Newton:
                 return state
             new = not kept
             still = largest < CONTROL.near if last == 0.0 else fall < CONTROL.slow
-            # A step along a tangent that has turned changes volume to second order, and a stiff body answers strongly.
+            # A kept tangent has turned by then. Its step changes volume to second order, which a stiff body resists.
             kept = (still if kept else fall < CONTROL.fast and scale == 1.0) and self.bulk * largest < CONTROL.turned
             last = largest
         raise NotConverged(f"no equilibrium within {limit} iterations")
@@ -334,12 +333,12 @@ class Newton:
         forces: ForceLoad | None = None,
         rounds: int | None = None,
     ) -> EquilibriumState:
-        """Return the equilibrium of a body of constant stiffness, its contact states sought from those of `state`.
+        """Return the equilibrium of a body of constant stiffness; the search for contact states begins at `state`.
 
-        Under `forces` depth and travel are found. Raises ContactLost, after so many `rounds` of changes.
+        Under `forces`, depth and travel are unknown. Raises ContactLost, at the latest after `rounds` systems.
         """
         self.systems += 1
-        self.condensed.relinearise(self._rest)  # from which all is one step
+        self.condensed.relinearise(self._rest)  # any state is one step away
         rounds = CONTROL.patience + 4 * len(self.skin_x) if rounds is None else rounds
         used = self.solve_contact(replace(state, u=self._rest), load, anchor, rounds, forces)
         if used == SINGULAR:
@@ -356,16 +355,16 @@ class Newton:
         )
 
     def _enter(self, start: EquilibriumState, load: LoadState, x: Array) -> EquilibriumState:
-        """Return `start`, whose skin lies at `x` (k,) along the surface, with the states that `load` brings at once."""
+        """Return `start` with the contact states that follow from `load`; `x` (k,) are positions along the surface."""
         states = ContactStates(start.state.copy(), start.sense.copy(), start.reaction)
         self._meet(states, self._position(start.u, load, x), load_arguments(load))
         return replace(start, state=states.state, sense=states.sense)
 
 
 def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> EquilibriumState:
-    """Return the state with its lowest node on the surface where nothing touches: forces need one that does.
+    """Return a state without contact with its lowest node in contact, on which forces can act.
 
-    A body that nothing holds needs as many nodes as it has motions.
+    A body without supports gets one node for each rigid motion.
     """
     if start.touching.any():
         return start
@@ -376,5 +375,5 @@ def lower_onto_surface(body: CondensedBody, start: EquilibriumState) -> Equilibr
 
 
 def load_arguments(load: LoadState) -> LoadArguments:
-    """Return `load` as loops take it."""
+    """Return `load` as an argument of the kernels."""
     return LoadArguments(float(load.depth), float(load.mu), float(load.tau), int(load.sense))

@@ -1,6 +1,6 @@
-"""The finger as the solver sees it: a mesh, Newton's iterations on its body, its endings. One serves many surfaces.
+"""The finger on one mesh: its body, Newton's method on it, and its receptor endings; one serves many surfaces.
 
-A state found on one mesh of a finger is carried to another, where Newton starts a few iterations from its end.
+Also the transfer of a state to another mesh of the finger, where Newton's method then needs few iterations.
 """
 
 from abc import ABC, abstractmethod
@@ -32,25 +32,25 @@ from solver.prediction import ROW
 from solver.scene import Scene
 from solver.scene.tables import Material, Materials, SceneError
 
-NO_ENERGY = 1e-14  # part of an energy that is left out of its quadratic form [-]
+NO_ENERGY = 1e-14  # relative eigenvalue of an energy form below which it is left out [-]
 
-Placed = TypeVar("Placed", bound=Patches, covariant=True)  # endings as a kind of body feels them
+Placed = TypeVar("Placed", bound=Patches, covariant=True)  # averages over endings at one kinematics
 
 
-@dataclass(frozen=True, eq=False)  # without slots: what few ask for is made when they ask
+@dataclass(frozen=True, eq=False)  # without slots, for cached properties
 class Finger(ABC, Generic[Placed]):
-    """A finger on one mesh. Bone frame: the bone stays, the surface comes up by the indentation."""
+    """A finger on one mesh. In its frame the bone rests and the surface rises by the indentation."""
 
-    scene: Scene  # whose finger it is; its friction and load may be those of another surface
+    scene: Scene  # finger, materials and receptor; friction and load may be those of another surface
     geometry: FingerMesh
     newton: Newton
     body: Body
 
     @classmethod
     def of(cls, scene: Scene, sizing: Sizing) -> Self:
-        """Mesh the finger of `scene`, whose friction and loading do not matter here.
+        """Return the finger of `scene` on a new mesh; friction and loading do not matter.
 
-        Raises SceneError where the outline cannot be meshed, NotConverged where round-off has swallowed its stiffness.
+        Raises SceneError where the outline cannot be meshed, NotConverged where the stiffness is lost in round-off.
         """
         try:
             return cls.on(scene, finger_mesh(scene.finger, scene.receptor, sizing))
@@ -63,24 +63,24 @@ class Finger(ABC, Generic[Placed]):
     @classmethod
     @abstractmethod
     def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
-        """Do the same on a mesh of the finger that was made before."""
+        """Return the finger of `scene` on an existing mesh."""
 
     @abstractmethod
     def patches(self, placed: Endings) -> Placed:
-        """Return endings that were `placed` on its mesh, as its body feels them."""
+        """Return averages over the endings `placed` on the mesh."""
 
     def endings(self, arcs: Array) -> Placed:
-        """Return endings like the scene's at arc positions `arcs` (r,) [mm]."""
+        """Return averages over endings of the scene's size at arc positions `arcs` (r,) [mm]."""
         return self.patches(endings(self.geometry, self.body.centre, self.scene.receptor, arcs))
 
     @cached_property
     def ending(self) -> Placed:
-        """The reference ending alone."""
+        """The reference ending."""
         return self.endings(np.zeros(1))
 
     @cached_property
     def point(self) -> Placed:
-        """The middle of the reference ending."""
+        """The midpoint of the reference ending."""
         return self.patches(middle(self.geometry, self.body.centre, self.scene.receptor))
 
     @cached_property
@@ -140,11 +140,11 @@ class Finger(ABC, Generic[Placed]):
         return self.ending.responses(self.recover(states, self.ending))[:, 0].T
 
     def recover(self, states: Sequence[EquilibriumState], *patches: Patches) -> Array:
-        """Return the displacements (nodes, 2, c) of states, of the nodes that patches need alone."""
+        """Return the displacements (nodes, 2, c) of states, at least at the nodes of `patches`."""
         return self.displacements(states, distinct(np.concatenate([patch.nodes() for patch in patches])))
 
     def contact_width(self, state: EquilibriumState) -> float:
-        """Return how long the contact is along the surface [mm]."""
+        """Return the width of the contact along the surface [mm]."""
         x = state.place(self.newton.condensed)[:, 0]
         return width(self.arcs, x, state.normal, state.touching)
 
@@ -159,7 +159,7 @@ class LinearFinger(Finger[LinearPatches]):
     """A finger at small strain on one mesh."""
 
     body: LinearBody
-    solve_s: float  # what assembling and reducing took, beside mesh and tables [s]
+    solve_s: float  # duration of assembly and condensation [s]
 
     @classmethod
     def on(cls, scene: Scene, geometry: FingerMesh) -> Self:
@@ -174,7 +174,7 @@ class LinearFinger(Finger[LinearPatches]):
 
     @cached_property
     def ending_by_skin(self) -> Array:
-        """A matrix (a, 2 k): the reference ending's SED is the sum of squares of it times the skin's displacements."""
+        """A matrix B (a, 2 k) with which the reference ending's SED is |B u|^2 for displacements u of the skin."""
         endings, elastic = self.ending.endings, self.body.elastic
         at = elastic.state(elastic.places(endings.probes), self.body.every_step())  # (p, 2 k)
         whole = np.sqrt(endings.weights / endings.areas)[:, None]
@@ -185,7 +185,7 @@ class LinearFinger(Finger[LinearPatches]):
         return sizes[large, None] * turns[large]
 
     def reaches_out(self, state: EquilibriumState, displacement: Array, indentation: float) -> bool:
-        """Return whether skin outside the part that may touch would, so that the part must be made larger."""
+        """Return whether skin would touch outside the part that may, so that this part must be larger."""
         whole = self.geometry.whole
         below = self.geometry.mesh.nodes[whole, 1] + displacement[whole, 1] < indentation * (1.0 - 1e-9)
         may = np.zeros(len(displacement), bool)
@@ -212,7 +212,7 @@ class FiniteFinger(Finger[FinitePatches]):
         return FinitePatches(self.body, placed)
 
     def transfer(self, state: EquilibriumState, other: "FiniteFinger") -> EquilibriumState:
-        """Return `state`, found on `other`, as a start on this mesh."""
+        """Return `state` of the mesh of `other`, interpolated to this mesh as a start."""
         if other not in self._bridges:
             self._bridges[other] = MeshTransfer.of(other.places, self.places)
         return self._bridges[other].transfer_state(state)
@@ -223,13 +223,13 @@ class FiniteFinger(Finger[FinitePatches]):
 
     @cached_property
     def places(self) -> "Places":
-        """Where nodes and quadrature points lie, for states that are carried."""
+        """Positions of nodes and quadrature points, for transfers."""
         return Places.of(self.geometry, self.body)
 
     def skin_compression(self, state: EquilibriumState) -> SkinCompression:
-        """Return how far the skin is squeezed, and whether it has a crease."""
+        """Return the compression of the skin, with its least stretch and its kinks."""
         at = self.geometry
-        touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first of it that may touch
+        touchable = int(np.searchsorted(at.whole, at.mesh.skin[:1])[0])  # the first node that may touch
         return SkinCompression(
             *skin_loops.measure_compression(at.mesh.nodes, state.u, at.whole, at.loose, state.state, touchable)
         )
@@ -243,7 +243,7 @@ KINDS: Mapping[str, type[Finger[Any]]] = {"small": LinearFinger, "finite": Finit
 
 
 def settled_moduli(materials: Materials) -> list[Moduli]:
-    """Return the small-strain moduli of a settled response: those that a tissue has once it has relaxed."""
+    """Return the small-strain moduli of the settled response, which are those of relaxed tissues."""
     return [law.long_term_moduli for law in relaxing_laws(materials)]
 
 
@@ -253,7 +253,7 @@ def relaxing_laws(materials: Materials) -> list[Prony]:
 
 
 def finite_laws(materials: Materials) -> list[Law]:
-    """Return the laws at finite strain of a settled response: the shear modulus relaxed, the bulk modulus as it was."""
+    """Return the finite-strain laws of the settled response, with relaxed shear moduli; bulk moduli do not relax."""
     pairs = zip(materials.by_region, relaxing_laws(materials), strict=True)
     return [_finite(tissue, law.long_term_moduli) for tissue, law in pairs]
 
@@ -267,19 +267,19 @@ def _finite(tissue: Material, moduli: Moduli) -> Law:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Places:
-    """Where a mesh of a finger has its nodes and quadrature points: arc positions [mm], and heights over the bone.
+    """Positions of the nodes and quadrature points of a mesh: arc positions [mm] and heights.
 
     Heights are 0 on the bone, 1 between fat and skin, 2 on the outside.
     """
 
     body: FiniteBody
-    arcs: Array  # (2 a + 1,) of the nodes along the skin
-    heights: Array  # (2 b + 1,) of the nodes across the tissue
-    inner_arcs: Array  # (a, 3) of the quadrature points
+    arcs: Array  # (2 a + 1,) of nodes along the skin
+    heights: Array  # (2 b + 1,) of nodes across the tissue
+    inner_arcs: Array  # (a, 3) of quadrature points
     inner_heights: Array  # (b, 3)
     points: Array  # (e, 9, 2) quadrature points [mm]
-    skin: Array  # (k,) arc positions of the skin that may touch
-    lengths: Array  # (k,) skin that each stands for, along the arc [mm]
+    skin: Array  # (k,) arc positions of nodes that may touch
+    lengths: Array  # (k,) their tributary lengths along the arc [mm]
 
     @staticmethod
     def of(finger: FingerMesh, body: FiniteBody) -> "Places":
@@ -294,23 +294,23 @@ class Places:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshTransfer:
-    """The way from one mesh to another of the same finger: what depends on where their lines lie, made once."""
+    """Interpolation from one mesh to another of the same finger."""
 
     old: Places
     new: Places
-    along: Indices  # (2 a + 1,) first of the three old lines that a new line takes its values from
-    along_parts: Array  # (2 a + 1, 3) its part of each
+    along: Indices  # (2 a + 1,) first of the three old lines along the skin for each new one
+    along_parts: Array  # (2 a + 1, 3) their weights
     across: Indices  # (2 b + 1,) the same of rows
     across_parts: Array  # (2 b + 1, 3)
-    station: Indices  # (a, 3) old elements along the skin that hold the new quadrature points
-    layer: Indices  # (b, 3) and across it
-    forces: Array  # (k, old k) the new skin's forces by the old skin's: by length they are linear between its nodes
-    nearest: Indices  # (k,) old node of the skin
-    driven: Flags  # (nodes, 2) which components of the new nodes are held
+    station: Indices  # (a, 3) old columns that hold the new quadrature points
+    layer: Indices  # (b, 3) old rows
+    forces: Array  # (k, old k) maps the old skin's forces, whose line density is linear between nodes
+    nearest: Indices  # (k,) nearest old node of the skin
+    driven: Flags  # (nodes, 2) held components of the new nodes
 
     @staticmethod
     def of(old: Places, new: Places) -> "MeshTransfer":
-        """Find for each place of the `new` mesh where it lies in the `old` one."""
+        """Return the interpolation from the `old` to the `new` mesh."""
         along, across = _interpolation(old.arcs, new.arcs), _interpolation(old.heights, new.heights)
         station = _piece(old.arcs[::2], new.inner_arcs)
         layer = _piece(old.heights[::2], new.inner_heights)
@@ -320,21 +320,21 @@ class MeshTransfer:
         return MeshTransfer(old, new, *along, *across, station, layer, forces, nearest, new.body.mesh.driven)
 
     def transfer_state(self, state: EquilibriumState) -> EquilibriumState:
-        """Return `state`, found on the old mesh, as a start on the new one."""
+        """Return `state` of the old mesh as a start on the new one."""
         return self.touch(state, *self.fields(state.u, state.pressure))
 
     def touch(self, start: EquilibriumState, u: Array, pressure: Array) -> EquilibriumState:
-        """Return a start on the new mesh of `u` (nodes, 2) and `pressure` (e, 3), touching where `start` does."""
+        """Return a start on the new mesh with `u` (nodes, 2), `pressure` (e, 3) and the contact of `start`."""
         state, sense = start.state[self.nearest], start.sense[self.nearest]
         state[state == STICK] = SLIP
         return EquilibriumState(u, pressure, state, sense, self.forces @ start.reaction, start.load, start.iterations)
 
     def fields(self, u: Array, pressure: Array) -> tuple[Array, Array]:
-        """Return displacements `u` [mm] and modes of `pressure` of the old mesh on the new one, (nodes, 2) and (e, 3).
+        """Return displacements `u` [mm] (nodes, 2) and modes of `pressure` (e, 3) on the new mesh.
 
-        Displacements are interpolated by the elements' own functions in arc position and height, so a mesh carries its
-        state to itself unchanged. Pressures are those of the elements they come from: what interpolated displacements
-        change in volume, small as it is, a stiff body would answer strongly.
+        Displacements are interpolated by the shape functions in arc position and height, so that the transfer of a mesh
+        to itself is exact. Pressures are interpolated too: a nearly incompressible body would make large ones from the
+        small volume changes of interpolated displacements.
         """
         old, new, three = self.old.body, self.new.body, np.arange(3)
         grid = u.reshape(len(self.old.arcs), len(self.old.heights), 2)
@@ -356,7 +356,7 @@ def _inner(lines: Array) -> Array:
 
 
 def _heights(finger: FingerMesh) -> Array:
-    """Return where the nodes of a column lie: 0 on the bone, 1 between fat and skin, 2 on the outside."""
+    """Return the heights of the nodes of a column: 0 on the bone, 1 between fat and skin, 2 on the outside."""
     wide = 2 * (finger.fat + len(finger.depths) - 1) + 1
     fat = finger.mesh.nodes[: 2 * finger.fat + 1]
     way = np.linalg.norm(fat - fat[0], axis=1)
@@ -367,12 +367,12 @@ def _heights(finger: FingerMesh) -> Array:
 
 
 def _piece(ends: Array, points: Array) -> Indices:
-    """Return which gap between `ends` (n + 1,) each of `points` lies in."""
+    """Return the interval between `ends` (n + 1,) that holds each of `points`."""
     return np.searchsorted(ends[1:-1], points, side="right")
 
 
 def _interpolation(nodes: Array, points: Array) -> tuple[Indices, Array]:
-    """Return which three of `nodes` (n,) of quadratic lines values at `points` (p,) come from, first (p,) and parts."""
+    """Return the first of three `nodes` (n,) of quadratic line elements, and their weights, for `points` (p,)."""
     ends = nodes[::2]
     piece = _piece(ends, points)
     local = 2.0 * (points - ends[piece]) / (ends[piece + 1] - ends[piece]) - 1.0

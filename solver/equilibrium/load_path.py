@@ -1,6 +1,6 @@
-"""The course of a finger in time: the bone comes down over 1 s, then slides until nothing changes, or is dragged.
+"""The load path of a finger in time: a press over 1 s, then a slide until the state is settled, or a drag.
 
-Tissues that relax are marched in time, and at last waited for. The steps are those of `CourseSteps`.
+Where tissues relax, a wait for their relaxation follows. `CourseSteps` has the load steps.
 """
 
 from collections.abc import Callable
@@ -21,29 +21,29 @@ from solver.progress import report_progress
 from solver.scene import Scene
 from solver.scene.tables import Loading
 
-PRESSING_TIME = 1.0  # of the pre-indentation [s]
-DRAGGING_TIME = 1.0  # within which a given tangential force grows [s]
-ALL_SLIPS = 1e-6  # part of the friction limit within which a given drag is that of sliding
-SED_STILL = 1e-10  # relative change of the ending's SED in a step from which on a slide at finite strain has settled
+PRESSING_TIME = 1.0  # duration of the press [s]
+DRAGGING_TIME = 1.0  # duration of the growth of a given tangential force [s]
+ALL_SLIPS = 1e-6  # relative difference of a given drag from the friction limit at which all slips
+SED_STILL = 1e-10  # relative change of the ending's SED per step below which a slide at finite strain is settled
 CONTROL = StepControl(smallest=2.0**-13, growth=2.0)
-Report = Callable[[str, float], None]  # called with what is being done, and the part of the course done, 0 to 1
+Report = Callable[[str, float], None]  # called with a text and the fraction of the load path that is done
 
 
 @dataclass(frozen=True, slots=True)
 class CourseSteps:
-    """How a course is cut into steps; those of a slide by the indentation."""
+    """The load steps of a path; lengths of a slide are relative to the indentation."""
 
-    press: int  # of the pre-indentation, and as many of a drag that grows
-    first: float
-    growth: float  # of each step of a slide by the one before
-    largest: float
-    furthest: float  # slide after which a course that has not settled is given up
-    plateau: int = 0  # steps beyond the settled state, to show that nothing changes
+    press: int  # number of steps of the press, and of a drag
+    first: float  # first step of a slide
+    growth: float  # ratio of consecutive steps of a slide
+    largest: float  # largest step of a slide
+    furthest: float  # slide after which a state that still changes is refused
+    plateau: int = 0  # steps beyond the settled state, which show that it stays
     tolerance: float = 1e-10  # of displacements [mm]
-    by_depth: float = 1.0  # the same by the indentation, where that is less
+    by_depth: float = 1.0  # of displacements by the indentation, where that is smaller
 
     def finer(self, times: float) -> "CourseSteps":
-        """Return so many `times` the steps."""
+        """Return `times` as many steps."""
         press = round(self.press * times)
         return replace(self, press=press, first=self.first / times, largest=self.largest / times)
 
@@ -51,17 +51,17 @@ class CourseSteps:
 SMALL = CourseSteps(25, first=0.01, growth=1.2, largest=0.06, furthest=100.0, plateau=4)
 FINITE = CourseSteps(40, first=0.1, growth=1.0, largest=0.1, furthest=8.0, tolerance=1e-7, by_depth=1e-7)
 RELAXING = CourseSteps(25, first=0.02, growth=1.2, largest=0.1, furthest=25.0, tolerance=1e-8, by_depth=1e-7)
-LONG = 25.0  # slide within which all but those near the wedging limit settle, by the indentation
+LONG = 25.0  # slide by the indentation within which states settle, except near the wedging limit
 
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """How long tissues are waited for when nothing but relaxation goes on."""
+    """The steps of the wait for relaxation at the end of a load path."""
 
-    relaxed: float = 14.0  # times of the slowest tissue after which a body may count as relaxed: e^-14 is 8e-7
-    equal: int = 6  # steps of equal length before they are doubled
-    still: float = 1e-6  # change of the SED over such steps from which on it counts as relaxed [-]
-    doublings: int = 60  # of the steps at most
+    relaxed: float = 14.0  # shortest wait by the largest relaxation time: e^-14 is 8e-7
+    equal: int = 6  # steps of equal length before it doubles
+    still: float = 1e-6  # relative change of the SED over equal steps below which it is relaxed
+    doublings: int = 60  # of the step, at most
 
 
 WAITING = Waiting()
@@ -69,36 +69,36 @@ WAITING = Waiting()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instant:
-    """One state on the way."""
+    """A state of a load path, and its time."""
 
     time: float  # [s]
     state: EquilibriumState
 
     @property
     def depth(self) -> float:
-        """The bone's indentation [mm]."""
+        """Indentation of the bone [mm]."""
         return self.state.load.depth
 
     @property
     def travel(self) -> float:
-        """How far the bone has moved along +x [mm]."""
+        """Travel of the bone along +x [mm]."""
         return 0.0 - self.state.load.travel
 
 
 class Aim(NamedTuple):
-    """What drives the bone at an instant."""
+    """The prescribed motion or forces of the bone at an instant."""
 
     time: float  # [s]
-    press: float  # depth [mm], or normal force where that is given [N/mm]
-    along: float  # travel along +x [mm], or the surface's pull along +x where that is given [N/mm]
+    press: float  # depth [mm], or a given normal force [N/mm]
+    along: float  # travel along +x [mm], or a given tangential force on the skin along +x [N/mm]
 
     def towards(self, other: "Aim", part: float) -> "Aim":
-        """Return what lies `part` of the way to `other`."""
+        """Return the aim a `part` of the way to `other`."""
         return Aim(*(a + part * (b - a) for a, b in zip(self, other, strict=True)))
 
 
 class Way:
-    """The states so far, and how the next one is found; where tissues relax, with what they store."""
+    """A load path: its states so far, the step to the next one, and the energies of relaxing tissues."""
 
     def __init__(
         self,
@@ -108,17 +108,17 @@ class Way:
         tolerance: float = SMALL.tolerance,
         tissue: Tissue | None = None,
     ) -> None:
-        """Start untouched, with mu and bound of `friction`; `loading` says what is driven and what is found.
+        """Start undeformed, with mu and bound of `friction`; `loading` prescribes depth or forces.
 
-        Displacements are found to a `tolerance` [mm] where depth and travel are given. `tissue` is one that relaxes.
+        `tolerance` [mm] is that of displacements where depth and travel are given. `tissue` is one that relaxes.
         """
         self.tissue = tissue
-        self.energies: list[tuple[float, ...]] = []  # of the places that it watches, at every instant after rest [MPa]
-        self.sense = 0  # of the friction force on all relaxing skin that touches; 0: it is found
+        self.energies: list[tuple[float, ...]] = []  # of its endings, at every instant after the first [MPa]
+        self.sense = 0  # direction of the friction force on relaxing skin; 0: unknown
         self.newton, self._tolerance = newton, tolerance
         self.frictionless = friction.frictionless
         self.by_force = loading.normal_force is not None
-        # without friction there is no drag to speak of, and nothing that it could hold
+        # a drag needs friction
         self.by_drag = loading.dragged and not self.frictionless
         rest = EquilibriumState.undeformed(newton.condensed, LoadState(0.0, friction.mu, friction.tau))
         self.instants = [Instant(0.0, rest)]
@@ -126,11 +126,11 @@ class Way:
 
     @property
     def last(self) -> EquilibriumState:
-        """The state reached."""
+        """The last state."""
         return self.instants[-1].state
 
     def go(self, aim: Aim) -> None:
-        """Append the state at `aim`, and those of smaller steps where one of that size fails."""
+        """Append the state at `aim`; a step that fails is halved, and its intermediate states are appended too."""
         begin = self.aim
 
         def step(part: float) -> None:
@@ -144,7 +144,7 @@ class Way:
         return at_end_of_path(self.last.load.depth, self.last.load.travel, reason)
 
     def solve_step(self, before: EquilibriumState, aim: Aim) -> EquilibriumState:
-        """Return the state at `aim`, coming from `before`, and let tissues come to it. Raises NotConverged."""
+        """Return the state at `aim` one step from `before`, and advance the tissues. Raises NotConverged."""
         step = aim.time - self.aim.time
         if self.tissue is not None:
             self.newton = self.tissue.ready(step)
@@ -168,11 +168,11 @@ def march(
     relaxing: bool = False,
     report: Report = report_progress,
 ) -> Way:
-    """Drive the finger of a scene down and along, step by step (backward Euler), until every slide has settled.
+    """Return the load path of a scene by backward Euler steps: the press, then settled slides or a drag.
 
-    So many `times` the usual steps are taken. With `relaxing` the tissues relax, and are waited for at last; else they
-    have relaxed from the start. A given drag must be less than what friction carries. Raises NotConverged where a step
-    cannot be made or sliding does not settle, Cancelled.
+    It takes `times` the usual steps. With `relaxing` the tissues relax, and a wait for them ends the path; else they
+    are relaxed from the start. A given drag must be less than the friction limit. Raises NotConverged where a step
+    fails or a slide does not settle, Cancelled.
     """
     steps, loading = steps_of(finger, relaxing=relaxing).finer(times), scene.loading_per_mm
     way = way_of(scene, finger, relaxing=relaxing)
@@ -183,16 +183,16 @@ def march(
 
 
 def end(scene: Scene, finger: Finger[Patches], times: float = 1.0) -> EquilibriumState:
-    """Return the end of the course of a scene, in so many `times` the usual load steps. Raises as `march`."""
+    """Return the end of the load path of a scene in `times` the usual steps. Raises as `march`."""
     return march(scene, finger, times, relaxing=scene.viscoelastic).last
 
 
 def slide_or_hold(
     scene: Scene, slide: Callable[[], EquilibriumState], hold: Callable[[], EquilibriumState]
 ) -> EquilibriumState:
-    """Return the state under the normal force of a scene: the `slide`, or the `hold` of a drag that friction carries.
+    """Return the state under the normal force of a scene: `slide`, or `hold` for a drag below the friction limit.
 
-    A drag may be met where sliding has no state. Raises NoSteadyState where it is more than friction carries, and as
+    A drag may have a state where sliding has none. Raises NoSteadyState where it exceeds the friction limit, and as
     `slide` and `hold` do.
     """
     force, drag = scene.normal_force, scene.tangential_force
@@ -211,12 +211,12 @@ def slide_or_hold(
 
 
 def steps_of(finger: Finger[Patches], *, relaxing: bool = False) -> CourseSteps:
-    """Return the usual steps of the courses of a finger."""
+    """Return the usual load steps of a finger."""
     return SMALL if isinstance(finger, LinearFinger) else RELAXING if relaxing else FINITE
 
 
 def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> Way:
-    """Return the untouched finger of a scene, at the beginning of its course."""
+    """Return the load path of a scene at its beginning, undeformed."""
     steps, loading = steps_of(finger, relaxing=relaxing), scene.loading_per_mm
     good = steps.tolerance
     if loading.normal_force is None:
@@ -226,7 +226,7 @@ def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> 
 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
-    """Return the tissues of a scene's finger at rest, as they relax."""
+    """Return the relaxing tissues of a scene's finger, at rest."""
     laws = relaxing_laws(scene.materials)
     if isinstance(finger, FiniteFinger):
         return FiniteTissue(finger.body, laws, (finger.ending, finger.point))
@@ -238,9 +238,9 @@ def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
 def follow(
     way: Way, finger: Finger[Patches], loading: Loading, steps: CourseSteps, times: float, report: Report
 ) -> None:
-    """Press, and slide or drag, along `way`. Raises as `march`."""
+    """Append the press, and the slides or the drag. Raises as `march`."""
     press = loading.depth if loading.normal_force is None else loading.normal_force
-    share = 1.0 if loading.dragged else 0.5  # of the work
+    share = 1.0 if loading.dragged else 0.5  # of the work, for progress
     count = steps.press * (2 if loading.dragged else 1)
     doing = "pressing and dragging step by step" + _why(way)
     for number in range(1, steps.press + 1):
@@ -263,17 +263,17 @@ def _why(way: Way) -> str:
 
 
 class _EndOfSlide:
-    """Whether a slide has settled, asked before every step of it."""
+    """Criterion for a settled slide, evaluated before every step."""
 
     def __init__(self, way: Way, finger: Finger[Patches], direction: int, times: float) -> None:
         self._way, self._finger, self._direction, self._times = way, finger, direction, times
         self._sed: float | None = None
 
     def __call__(self) -> bool:
-        """Return whether further sliding changes nothing.
+        """Return whether the slide is settled.
 
-        At small strain that is so once every touching point slips against the slide. At finite strain states may go on
-        to change: there the ending's SED must stay too, or the tissues be waited for.
+        At small strain it is once every point in contact slips against the slide. At finite strain the ending's SED
+        must be constant too, unless tissues relax, for which a wait follows.
         """
         state = self._way.last
         if isinstance(self._finger, LinearFinger):
@@ -287,13 +287,13 @@ class _EndOfSlide:
 
 
 def _slide(way: Way, speed: float, steps: CourseSteps, settled: Callable[[], bool], report: Report) -> None:
-    """Append the sliding states until they do not change, and a stretch of them beyond. Raises NotConverged."""
-    begun, depth = way.aim, way.instants[-1].depth
+    """Append the states of a slide until it is settled, and the plateau beyond. Raises NotConverged."""
+    start, depth = way.aim, way.instants[-1].depth
     step, distance = steps.first * depth, 0.0
     direction, longest = np.sign(speed).item(), min(LONG, steps.furthest) * depth
 
     def go(distance: float) -> None:
-        way.go(Aim(begun.time + distance / abs(speed), begun.press, begun.along + direction * distance))
+        way.go(Aim(start.time + distance / abs(speed), start.press, start.along + direction * distance))
 
     while not settled():
         if distance >= steps.furthest * depth:
@@ -311,14 +311,13 @@ def _slide(way: Way, speed: float, steps: CourseSteps, settled: Callable[[], boo
 
 
 def _wait(way: Way, loading: Loading, slowest: float, times: float, report: Report) -> None:
-    """Go on in steps that double until the `slowest` tissue [s] has relaxed, the bone sliding on where it slid last.
+    """Append states in doubling steps until the `slowest` tissue [s] has relaxed, while a slide continues.
 
-    Longer where the energy at the ending still moves: near a limit of sliding a body settles more slowly than any of
-    its tissues.
+    Near a limit of sliding a body relaxes more slowly than its tissues, so that the energy must be constant too.
     """
     speed = 0.0 if loading.dragged else loading.direction * loading.speed
     if not isinstance(way.tissue, LinearTissue):
-        way.sense = -int(np.sign(speed))  # by now all that touches slips
+        way.sense = -int(np.sign(speed))  # by now all skin in contact slips
     step, waited, longest = way.instants[-1].time - way.instants[-2].time, 0.0, WAITING.relaxed * slowest
     for _ in range(WAITING.doublings):
         before = way.energies[-1][0]

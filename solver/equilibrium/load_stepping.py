@@ -1,8 +1,8 @@
-"""Load states and forces one after another, the only cut-back of the solver, force control, and slides directly.
+"""Load stepping with the solver's only cut-back, force control, and settled slides in one step.
 
-Under given forces depth and travel are unknowns: Newton on the bordered system. The columns that say how the body
-follows depth and travel come with every linear solve, and from them follows which change of both makes up for the
-forces that are missing. In a settled slide every touching point slips, so nothing is left of how it came there.
+Under given forces, depth and travel are unknown too: Newton's method on the bordered system. Every linear solve returns
+the derivatives by depth and travel, from which the changes of both follow that balance the forces. In a settled slide
+every point in contact slips, so that the state does not depend on its load path.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -21,16 +21,16 @@ from solver.failures import ContactLost, NotConverged, at_end_of_path
 from solver.progress import check_stop, report_progress
 from solver.scene import Scene
 
-UNMET = 1e-9  # part of the friction limit by which a given drag may be missed
+DRAG_TOLERANCE = 1e-9  # error of a drag that is met, by the friction limit
 
 
 @dataclass(frozen=True, slots=True)
 class StepControl:
-    """How a load path is cut into steps; all are fractions of the path."""
+    """How a load path is cut into steps; lengths are fractions of the path."""
 
     first: float = 1.0
-    smallest: float = 2.0**-8  # a shorter step is refused
-    growth: float = 1.0  # of the next step, after one that succeeded
+    smallest: float = 2.0**-8
+    growth: float = 1.0  # ratio of the next step to one that succeeded
 
 
 Step = Callable[[float], None]
@@ -41,10 +41,10 @@ WHOLE = StepControl()
 def advance(
     step: Step, refusal: Refusal, control: StepControl = WHOLE, exhausted: Callable[[], bool] = lambda: False
 ) -> None:
-    """Call `step` with growing fractions of the path up to 1, each the last that succeeded plus a step.
+    """Call `step` with growing fractions of the path up to 1; halve the step that fails.
 
-    `step` raises NotConverged where it fails, and leaves the state as it was. Where the next is too
-    short, or the work is `exhausted`, this raises what `refusal` makes of the fraction reached, that step and the
+    `step` raises NotConverged where it fails, and leaves the state as it was. Where the next step is too short, or the
+    work is `exhausted`, this raises the exception that `refusal` returns for the fraction reached, that step and the
     reason. Raises Cancelled.
     """
     done, part = 0.0, control.first
@@ -62,19 +62,19 @@ def advance(
 
 
 def load_of(scene: Scene) -> LoadState:
-    """Return depth, friction and bound of a scene as what the surface does; a bound of zero is no friction."""
+    """Return the load state of a scene's press; a bound of zero means no friction."""
     bound = scene.friction.cap
-    depth = scene.loading.depth if scene.normal_force is None else 0.0  # found, where a force is given
+    depth = scene.loading.depth if scene.normal_force is None else 0.0  # unknown where a force is given
     return LoadState(depth, float(scene.friction.mu) if bound > 0.0 else 0.0, bound)
 
 
 def sliding_load(scene: Scene) -> LoadState:
-    """Return what the surface does while it slides as a scene has it, or along +x where that does not matter."""
+    """Return the load state of a scene's settled slide, along +x where the scene has no direction."""
     return load_of(scene)._replace(sense=-(scene.loading.direction or 1))
 
 
 def forces_of(scene: Scene, load: LoadState) -> ForceLoad | None:
-    """Return the forces that a scene gives to a state under `load`, None where it gives a depth."""
+    """Return the forces that a scene prescribes for a state under `load`; None where it prescribes a depth."""
     force, drag = scene.normal_force, scene.tangential_force
     if force is None:
         return None
@@ -88,11 +88,11 @@ def march(
     start: EquilibriumState | None = None,
     tolerance: float = 1e-7,
 ) -> Iterator[EquilibriumState]:
-    """Yield the equilibrium at each aim of `course`, from undeformed or `start`; a failing step is cut in two.
+    """Yield the equilibrium at each load of `course`, from `start` or the undeformed state, with cut-back.
 
-    An aim is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
-    it was or slips from there. Raises NotConverged, saying where, Cancelled, and ValueError for a
-    load state or forces that are none.
+    A load is a load state, or forces under the friction of `start`. Backward Euler: within a step a point sticks where
+    it was, or slips from there. Raises NotConverged, saying where, Cancelled, and ValueError for a load that is not
+    allowed.
     """
     state = EquilibriumState.undeformed(newton.condensed) if start is None else start
     for number, aim in enumerate(aims := [aim.validate() for aim in course]):
@@ -113,15 +113,15 @@ def march(
 
 
 State = TypeVar("State")
-FIRST, FURTHEST = 1e-7, 1.0  # first stride [mm], and where the search for two ends is given up
-SEARCHES = 60
+FIRST, FURTHEST = 1e-7, 1.0  # first and largest stride of the search for a bracket [mm]
+SEARCHES = 60  # evaluations within the bracket, at most
 
 
 def find_root(at: Callable[[float], tuple[float, State]], start: float, close: float) -> State | None:
-    """Return the state in which what `at` tells of a place is 0 to `close`, sought from `start` on; None where none is.
+    """Return the state at the root of an increasing function, to within `close`; None where there is no bracket.
 
-    The function grows with the place, and comes with the state there: strides that double find two ends, and regula
-    falsi with the Illinois rule (Dowell and Jarratt 1971) what lies between.
+    `at` returns the function's value at a place, and the state there. Strides from `start` that double find a bracket,
+    and regula falsi with the Illinois rule the root (Dowell and Jarratt 1971).
 
     >>> round(find_root(lambda x: (x**3 - 8e-9, x), 0.0, 1e-18), 9)
     0.002
@@ -151,10 +151,10 @@ def find_root(at: Callable[[float], tuple[float, State]], start: float, close: f
 def correct(
     newton: Newton, state: EquilibriumState, forces: ForceLoad, origin: Array, before: float, *, kept: bool = False
 ) -> tuple[EquilibriumState, float, int] | None:
-    """Return the state after one iteration towards the forces, its largest displacement, and changed contact states.
+    """Return the state after one iteration towards the forces, its largest displacement, and its changed states.
 
-    `origin` (k,) are the positions along x where the skin's nodes were when the surface had travelled `before`. With
-    `kept` the tangent is the last one. None where there is no way.
+    `origin` (k,) are the positions of the skin's nodes along x when the surface's travel was `before`. With `kept` the
+    last tangent serves again. None where the linear system fails.
     """
     load = state.load
     if forces.tangential is None:
@@ -172,13 +172,13 @@ def correct(
 def solve_under_forces(
     newton: Newton, start: EquilibriumState, forces: ForceLoad, tolerance: float = 1e-8, limit: int = 30
 ) -> EquilibriumState:
-    """Return the equilibrium under `forces`, one backward Euler step from `start`, whose load has friction and sense.
+    """Return the equilibrium under `forces`, one backward Euler step from `start`, with its friction and sense.
 
-    Raises NotConverged where `limit` iterations do not do it.
+    Raises NotConverged after `limit` iterations.
     """
     try:
         state = _iterate(newton, start, start, forces, tolerance, limit)
-    except ContactLost:  # as where friction is so small that all but one node slip
+    except ContactLost:  # for example where friction is so small that all but one node slip
         if forces.tangential is None:
             raise
         return _find_travel(newton, start, start, forces, tolerance, limit)
@@ -188,7 +188,7 @@ def solve_under_forces(
 def _iterate(
     newton: Newton, start: EquilibriumState, begin: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
-    """Return the equilibrium one step from `start`, sought from `begin` on. Raises NotConverged."""
+    """Return the equilibrium one step from `start`; the iteration begins at `begin`. Raises NotConverged."""
     origin, before = start.place(newton.condensed)[:, 0], start.load.travel
     state = begin
     if newton.condensed.constant:
@@ -208,27 +208,27 @@ def _iterate(
 
 
 def _slips_freely(state: EquilibriumState, forces: ForceLoad) -> bool:
-    """Return whether all that touches slips, so that nothing was there to meet the given drag, and it is not met."""
+    """Return whether every node in contact slips and the drag differs from the given one."""
     if forces.tangential is None or not state.load.mu > 0.0 or (state.state == STICK).any():
         return False
-    return abs(state.force[0] - forces.tangential) > UNMET * state.load.mu * forces.normal
+    return abs(state.force[0] - forces.tangential) > DRAG_TOLERANCE * state.load.mu * forces.normal
 
 
 def _find_travel(
     newton: Newton, start: EquilibriumState, state: EquilibriumState, forces: ForceLoad, tolerance: float, limit: int
 ) -> EquilibriumState:
-    """Return the equilibrium that meets the given drag, one step from `start`, its travel sought from `state` on.
+    """Return the equilibrium under the given drag, one step from `start`, by a search for its travel from `state` on.
 
-    The travel holds a body of which nothing sticks, and the drag grows with it. Raises NotConverged.
+    A given travel determines a body without sticking nodes, and the drag grows with the travel. Raises NotConverged.
     """
-    wanted, near = forces.tangential or 0.0, state
+    drag, near = forces.tangential or 0.0, state
 
     def at(travel: float) -> tuple[float, EquilibriumState]:
         nonlocal near
         near = _iterate(newton, start, near, ForceLoad(forces.normal, None, travel), tolerance, limit)
-        return float(near.force[0]) - wanted, near
+        return float(near.force[0]) - drag, near
 
-    there = find_root(at, state.load.travel, UNMET * state.load.mu * forces.normal)
+    there = find_root(at, state.load.travel, DRAG_TOLERANCE * state.load.mu * forces.normal)
     if there is None:
         raise NotConverged("no travel meets the drag")
     return there
@@ -236,17 +236,17 @@ def _find_travel(
 
 @dataclass(frozen=True, slots=True)
 class SlipControl:
-    """Where skin is first thought to touch, and how a slide is led to that one step does not reach.
+    """First guesses of the contact of a slide, and the cut-back where one step does not reach it.
 
-    To halve or double the numbers of a slide at finite strain changes neither states nor tangents of sixteen slides.
+    Halving or doubling the numbers for finite strain changed neither states nor tangents of sixteen slides.
     """
 
-    hertz: float = 0.5  # part of the depth below which skin may touch: half as deep is half the overlap's square
-    short: int = 12  # systems after which that guess is given up
-    parts: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # of the depth in which skin may touch, in turn
-    leading: float = 1e-3  # tolerance of steps that only lead to the last [mm]; looser ones go astray near nu = 0.5
-    work: int = 80  # tangents after which no more steps are halved: a state that is there takes 5 to 30
-    smallest: float = 1.0 / 64.0  # part of the way below which a failing step is given up
+    hertz: float = 0.5  # overlap by depth from which skin is guessed to touch: in Hertz' contact half the overlap does
+    short: int = 12  # systems for that guess, at most
+    parts: tuple[float, ...] = (0.3, 0.6, 0.1, 0.9, 0.03, 0.01)  # of the depth: overlaps that are tried in turn
+    leading: float = 1e-3  # tolerance of steps before the last [mm]; looser ones diverge near nu = 0.5
+    work: int = 80  # tangents after which no more steps are halved: states that exist take 5 to 30
+    smallest: float = 1.0 / 64.0  # smallest step, as a part of the path
 
 
 SLIP_CONTROL = SlipControl()
@@ -255,10 +255,10 @@ SLIP_CONTROL = SlipControl()
 def solve_full_slip(
     newton: Newton, load: LoadState, start: EquilibriumState | None = None, tolerance: float = 1e-10
 ) -> EquilibriumState:
-    """Return the sliding state under `load` (sense +1 or -1), from undeformed or from `start`, in one step.
+    """Return the settled slide under `load` (sense +1 or -1), in one step from `start` or the undeformed state.
 
-    A step that fails is halved, depth, friction and bound together. Raises NotConverged where that does not help,
-    Cancelled, ValueError for a load state that is none.
+    A step that fails is halved in depth, friction and bound together. Raises NotConverged where that does not help,
+    Cancelled, and ValueError for a load state that is not allowed.
     """
     load = load.validate()
     if newton.condensed.constant:
@@ -286,16 +286,16 @@ def solve_full_slip(
 
 
 def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) -> EquilibriumState:
-    """Return the sliding state of a body of constant stiffness, which is one step from any. Raises ContactLost.
+    """Return the settled slide of a body of constant stiffness in one step. Raises ContactLost.
 
-    What differs is the contact that is thought of first: that of `start`, or skin that would lie deep in the surface.
+    The first guess of its contact is that of `start`, or the skin that overlaps the surface.
     """
     if load.sense == 0:
         raise ValueError("sense = 0 is not allowed: friction on what slides points along +1 or -1")
     if start is not None:
         return slide_from_guess(newton, load, start.state)
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
-    if newton.condensed.motions.shape[1]:  # how deep it lies, or a part of it, is found
+    if newton.condensed.motions.shape[1]:  # a rigid motion changes its depth
         return _first_of(newton, load, float(np.ptp(height)), None)
     above = height - load.depth
     guesses = [(above < -SLIP_CONTROL.hertz * load.depth, SLIP, SLIP_CONTROL.short), (above < 0.0, SLIP, None)]
@@ -311,9 +311,9 @@ def _at_once(newton: Newton, load: LoadState, start: EquilibriumState | None) ->
 def slide_from_guess(
     newton: Newton, load: LoadState, guess: NDArray[np.integer], force: float | None = None, rounds: int | None = None
 ) -> EquilibriumState:
-    """Return the slide of a body of constant stiffness whose contact states are sought from a `guess` (k,) of them.
+    """Return the settled slide of a body of constant stiffness from a `guess` (k,) of its contact states.
 
-    Under a normal `force` [N/mm] the depth of `load` is found. Raises ContactLost, after so many `rounds` of changes.
+    Under a normal `force` [N/mm] the depth is unknown. Raises ContactLost, at the latest after `rounds` systems.
     """
     rest = EquilibriumState.undeformed(newton.condensed)
     states = guess.astype(np.int32)
@@ -323,9 +323,9 @@ def slide_from_guess(
 
 
 def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | None = None) -> EquilibriumState:
-    """Return the slide of a body of constant stiffness under a normal `force` [N/mm], its depth found.
+    """Return the settled slide of a body of constant stiffness under a normal `force` [N/mm].
 
-    `deepest` [mm] is the scale of the first guesses, by default the height of the skin. Raises ContactLost.
+    `deepest` [mm] scales the first guesses of the depth, by default the height of the skin. Raises ContactLost.
     """
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     state = _first_of(newton, load, float(np.ptp(height)) if deepest is None else deepest, force)
@@ -335,7 +335,7 @@ def slide_under(newton: Newton, load: LoadState, force: float, deepest: float | 
 
 
 def _first_of(newton: Newton, load: LoadState, scale: float, force: float | None) -> EquilibriumState:
-    """Return the first slide that touching skin leads to which reaches up to parts of a `scale` [mm]."""
+    """Return the first slide found from guesses of contact up to parts of a `scale` [mm] above the lowest node."""
     height = newton.condensed.place(newton.condensed.undeformed()[0])[:, 1]
     guesses = [np.where(height <= float(height.min()) + part * scale, SLIP, OPEN) for part in SLIP_CONTROL.parts]
     for guess in guesses[:-1]:

@@ -1,18 +1,19 @@
 """Bodies whose tissues relax (`constitutive.Prony`), step by step in time.
 
-At small strain, of every term of a series the strain that has not yet relaxed is kept, h(t) = integral of
-exp(-(t - s)/tau) de/ds ds. It is linear in the displacements, so it is kept as displacements of each element's nodes,
-and its stress is the stiffness of the shear modulus times them. Within a step the strain grows evenly, for which the
-recursion is exact (Taylor, Pister and Goudreau 1970; Simo and Hughes 1998, sec. 10.3):
+At small strain each term of a series has an internal variable, the strain that has not yet relaxed: h(t) = integral of
+exp(-(t - s)/tau) de/ds ds. It is linear in the displacements, and is stored as displacements of each element's nodes.
+The recursion is exact for a strain that grows linearly within a step (Taylor, Pister and Goudreau 1970; Simo and
+Hughes 1998, sec. 10.3):
 
     h(t + dt) = exp(-dt/tau) h(t) + kept(dt/tau) (e(t + dt) - e(t)),    kept(x) = (1 - exp(-x))/x.
 
-A step is then elastic, with the moduli `Prony.within(dt)` and what is left of the past as a load. The SED is the energy
-stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, e being the strain's deviator.
+A step is then elastic, with the moduli `Prony.within(dt)` and the stress of the internal variables as a load. The SED
+is the energy stored in all springs of the solid, G (1 - sum g) e:e + sum g G h:h + K/2 theta^2, with the strain
+deviator e.
 
-At finite strain there are a relaxed law and the overstress of the past (`constitutive.Past`). In the end only the
-relaxed law is left. The finger carries its own skin along the surface and nothing flows through it, so that a settled
-slide stands still in the tissue and has relaxed wholly, whatever its speed.
+At finite strain there are a relaxed law and an overstress (`constitutive.Past`), which vanishes in the end. A finger
+carries its own skin along the surface. A settled slide is therefore at rest in the tissue and wholly relaxed, whatever
+its speed.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,29 +31,26 @@ from solver.constitutive import Moduli, Past, Prony, mean_decay, overstress
 from solver.equilibrium import EquilibriumState, Newton
 from solver.mesh import Mesh
 
-KEPT = 4  # lengths of steps that a body is kept ready for, factors and all
+KEPT = 4  # step lengths for which factors are kept
 
 
 class Tissue(Protocol):
-    """A finger's tissues as they relax, and the places that are watched."""
+    """Relaxing tissues of a finger, and the endings at which their energy is computed."""
 
     def ready(self, step: float) -> Newton:
-        """Prepare a step in time [s] and return the iterations on the body that take it."""
+        """Prepare a time step [s] and return Newton's method on the body of that step."""
         ...
 
     def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
-        """Take the step that was made ready, to `state`; return the energy stored in each watched place [MPa]."""
+        """Take the step that was prepared, to `state`; return the energy stored at each ending [MPa]."""
         ...
 
 
 class RelaxingBody:
-    """A held body and its past; e elements, m terms at most in any of its materials."""
+    """A held body at small strain with e elements, and internal variables for up to m terms of a series."""
 
     def __init__(self, mesh: Mesh, laws: Sequence[Prony], *, checked: bool = False) -> None:
-        """Start at rest; `laws` by region. Raises BodyError and MeshError unless `checked`.
-
-        It takes no dead loads.
-        """
+        """Start at rest, without dead loads; `laws` by region. Raises BodyError and MeshError unless `checked`."""
         if not checked:
             check_body(mesh, laws)
             check_terms(laws)
@@ -61,7 +59,7 @@ class RelaxingBody:
         self.mesh, self._laws = mesh, laws
         self._g, self._tau = _terms(laws, mesh.region)
         shear = [Moduli(law.shear, -2.0 / 3.0 * law.shear) for law in laws]
-        self.elastic = Elastic.of(mesh, shear)  # of the shear moduli alone, at once
+        self.elastic = Elastic.of(mesh, shear)  # of the instantaneous shear moduli alone
         self._bulk = np.array([law.bulk for law in laws])[mesh.region]
         self.displacement = np.zeros(mesh.nodes.shape)
         self._left = np.zeros(
@@ -71,14 +69,14 @@ class RelaxingBody:
         self._next: tuple[Callable[[Array], Array], float] | None = None
 
     def rest(self) -> None:
-        """Come to rest for another course; what was made ready for steps of the same lengths still serves."""
+        """Return to rest for another load path; factors for the same step lengths are kept."""
         self.displacement, self._left = np.zeros_like(self.displacement), np.zeros_like(self._left)
         self._steps, self._next = dict(self._steps), None
 
     def ready(self, step: float, prescribed: Array | None = None) -> CondensedLinear:
-        """Return the body as its skin feels it at the end of a `step` [s], its past as a load.
+        """Return the condensed body at the end of a `step` [s], with the stress of its past as a load.
 
-        What is held is then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
+        Held nodes are then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
         """
         form = self._form(step)
         past = self._past(step)
@@ -94,7 +92,7 @@ class RelaxingBody:
         return body
 
     def advance(self, u: Array) -> None:
-        """Take the step that was made ready, which displaced the skin by `u` (k, 2) [mm]."""
+        """Take the step that was prepared, to displacements `u` (k, 2) of the skin [mm]."""
         assert self._next is not None
         recover, step = self._next
         after = recover(u)
@@ -118,13 +116,13 @@ class RelaxingBody:
         return out
 
     def average(self, endings: Endings) -> Array:
-        """Return the stored energy averaged over each patch (r,) [MPa]; nan where there is no patch."""
+        """Return the stored energy averaged over each ending (r,) [MPa]; nan for one outside the skin."""
         return endings.means(self.energy(endings.probes))
 
     def _strain(self, probes: Probes, rows: Array, local: Array) -> tuple[Array, Array]:
-        """Return e:e of the strain's deviator and the volume strain (p,) for element displacements (p, 18).
+        """Return e:e of the strain deviator and the volume strain (p,) for element displacements `local` (p, 18).
 
-        The latter by its `rows` (p, 1, 18).
+        `rows` (p, 1, 18) map displacements to the volume strain.
         """
         gradient = np.einsum("pna,pnb->pab", local.reshape(-1, 9, 2), probes.gradient)
         strain = (gradient + np.swapaxes(gradient, 1, 2)) / 2.0
@@ -132,30 +130,30 @@ class RelaxingBody:
         return np.sum(strain * strain, axis=(1, 2)) - theta**2 / 3.0, theta
 
     def _past(self, step: float) -> Array:
-        """Return the element displacements (e, 18) whose shear stress at once is what the past adds."""
+        """Return the element displacements (e, 18) whose instantaneous shear stress is that of the past."""
         local = self.displacement[self.mesh.elements].reshape(len(self._left), 18)
         ages = step / self._tau
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
         return left - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]
 
     def _form(self, step: float) -> LinearBody:
-        """Return the body as a length of step sees it [s]."""
+        """Return the elastic body of a step length [s]."""
         key = f"{step:.9e}"
         if key not in self._steps:
             while len(self._steps) >= KEPT:
-                del self._steps[next(iter(self._steps))]  # the one asked for longest ago
+                del self._steps[next(iter(self._steps))]  # the least recently used
             self._steps[key] = LinearBody.of(self.mesh, [law.within(step) for law in self._laws], checked=True)
         self._steps[key] = self._steps.pop(key)
         return self._steps[key]
 
 
 class CondensedRelaxing(CondensedFinite):
-    """A body that relaxes, whose own laws are the relaxed ones."""
+    """A relaxing body at finite strain; the laws of its elements are the relaxed ones."""
 
     equilibrium: Array | None
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony]) -> None:
-        """Start at rest; `laws` by region, of which the terms and moduli at once are used. Raises BodyError."""
+        """Start at rest; terms and instantaneous moduli come from `laws` by region. Raises BodyError."""
         super().__init__(body, relaxes=True)
         check_moduli(body.mesh, laws)
         check_terms(laws)
@@ -163,21 +161,21 @@ class CondensedRelaxing(CondensedFinite):
         self.tensor = np.zeros((*body.elements.weight.shape, 4))
 
     def ready(self, step: float) -> None:
-        """Prepare a step in time [s]."""
+        """Prepare a time step [s]."""
         self.tensor = self.past.over(step).reshape(self.tensor.shape)
         self.equilibrium = None
 
     def commit(self, u: Array, step: float) -> None:
-        """Remember the step that was made ready and led to displacements `u` (nodes, 2)."""
+        """Take the step that was prepared, to displacements `u` (nodes, 2)."""
         self.past = self.past.after(self.body.deformation(u).reshape(-1, 2, 2), step)
 
     def assemble(self, u: Array, pressure: Array) -> float:
-        """Fill tangents and forces at a state and return the least det F."""
+        """Fill tangents and forces at a state and return the smallest det F."""
         self._add(u)
         return super().assemble(u, pressure)
 
     def resist(self, u: Array) -> float:
-        """Fill the forces at a state for the tangent that is there and return the least det F."""
+        """Fill the forces at a state, keep the tangent, and return the smallest det F."""
         self._add(u)
         return super().resist(u)
 
@@ -186,7 +184,7 @@ class CondensedRelaxing(CondensedFinite):
         overstress_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
 
     def excess(self, u: Array) -> Array:
-        """Return the forces (e, 18) of the overstress on the nodes of the elements at displacements `u` (nodes, 2)."""
+        """Return the nodal forces (e, 18) of the overstress at displacements `u` (nodes, 2)."""
         body = self.body
         stress = overstress(self.tensor, body.deformation(u))
         gradient = np.stack([body.elements.grad_x, body.elements.grad_y], axis=-1)
@@ -195,7 +193,7 @@ class CondensedRelaxing(CondensedFinite):
         )
 
     def stored_energy(self, u: Array, reaction: Array) -> float:
-        """Return the energy stored at `u`, with what the terms hold at the last instant remembered."""
+        """Return the energy stored at `u`, with that of the overstress at the last committed instant."""
         return super().stored_energy(u, reaction) + float(self.past.energy() @ self.body.elements.weight.ravel())
 
 
@@ -210,33 +208,33 @@ def _terms(laws: Sequence[Prony], region: Indices) -> tuple[Array, Array]:
 
 
 def _at_rest(laws: Sequence[Prony], region: Indices) -> Past:
-    """Return the past of points in regions (p,) that were never strained."""
+    """Return the past of undeformed points in regions (p,)."""
     g, tau = _terms(laws, region)
     return Past.at_rest(g * np.array([law.shear for law in laws])[region, None], tau)
 
 
 class LinearTissue:
-    """Tissues that relax at small strain."""
+    """Relaxing tissues at small strain."""
 
     def __init__(self, body: RelaxingBody, watched: Sequence[Endings]) -> None:
-        """Start as `body` is."""
+        """Start in the state of `body`."""
         self._body, self._watched = body, watched
 
     def ready(self, step: float) -> Newton:
         """Do as `Tissue` says."""
         return Newton(self._body.ready(step))
 
-    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - it was made ready
+    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - `ready` has it
         """Do as `Tissue` says."""
         self._body.advance(state.u)
         return tuple(float(self._body.average(place)[0]) for place in self._watched)
 
 
 class FiniteTissue:
-    """Tissues that relax at finite strain, and what those of the watched places still hold of the past."""
+    """Relaxing tissues at finite strain, and the past at the watched endings."""
 
     def __init__(self, body: FiniteBody, laws: Sequence[Prony], watched: Sequence[FinitePatches]) -> None:
-        """Start at rest; `laws` by region, of which the terms and moduli at once are used."""
+        """Start at rest; terms and instantaneous moduli come from `laws` by region."""
         self._relaxing, self._watched = CondensedRelaxing(body, laws), watched
         self._newton = Newton(self._relaxing)
         self._pasts: list[Past] = [

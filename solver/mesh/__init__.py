@@ -4,6 +4,7 @@ Any mesh can be halved: every element is divided in four by its own quadratic ge
 """
 
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from itertools import pairwise
 from typing import TypeVar
 
@@ -76,7 +77,7 @@ def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
     return ordered[new]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)  # without slots: what is held is listed once
 class Mesh:
     """A body as arrays, read-only. Nodes of an element: corners, then mid-sides, then centre.
 
@@ -109,15 +110,15 @@ class Mesh:
             view.flags.writeable = False
             object.__setattr__(self, f.name, view)
 
-    @property
+    @cached_property
     def fixed(self) -> Indices:
-        """Return the numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
+        """The numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
         along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
         return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
 
-    @property
+    @cached_property
     def driven(self) -> Flags:
-        """Return which components of which nodes are held, (n, 2)."""
+        """Which components of which nodes are held, (n, 2)."""
         out = np.zeros(2 * len(self.nodes), bool)
         out[self.fixed] = True
         return out.reshape(-1, 2)

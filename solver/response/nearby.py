@@ -1,8 +1,8 @@
-"""Slides close to a predicted one, on its mesh and from its state: their SED, and derivatives by friction and load.
+"""Slides near a predicted one, on its mesh and from its state, and derivatives by friction and load.
 
-A nearby slide costs a few small systems, and mesh errors cancel in its difference from the prediction. For derivatives,
-the last system is solved once more for each parameter at fixed contact states, which is exact until a state changes. At
-a kink, where a node is about to change its state, they are one-sided.
+A nearby slide costs a few small systems, and most of the mesh error cancels in its difference from the prediction. A
+derivative is one more solve of the last system at fixed contact states, and is exact until a state changes. At a kink,
+where a node is about to change its state, it is one-sided.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -148,7 +148,7 @@ class Nearby:
     finger: Finger[Any]
 
     def derivatives(self) -> Derivatives:
-        """Return its derivatives, by the tangent at convergence."""
+        """Return the derivatives of the slide from the tangent at convergence."""
         return of_slide(self.finger, self.scene, self.here)
 
     def seds(self, scenes: Sequence[Scene]) -> Array:
@@ -158,7 +158,7 @@ class Nearby:
     def responses(self, scenes: Sequence[Scene]) -> Array:
         """Return every quantity (n, q, 2) of scenes that differ from its own in friction, depth or force alone.
 
-        Averaged over the ending first, then in its middle. nan where this slide leads to no settled slide.
+        The last axis is the average over the ending and its midpoint. nan where no settled slide was found.
         """
         out = np.full((len(scenes), len(NAMES), 2), np.nan)
         near: dict[int, EquilibriumState] = {}
@@ -187,7 +187,7 @@ class Nearby:
         if not isinstance(self.finger, FiniteFinger):
             return True
         beyond = there.load.mu > self.here.load.mu or there.load.depth > self.here.load.depth
-        if beyond and not sound(self.finger, there):  # skin that may have folded since
+        if beyond and not sound(self.finger, there):  # the skin may have folded
             return False
         return not jumped_branch(self.finger, self.here, there)
 

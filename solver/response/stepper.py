@@ -1,9 +1,9 @@
-"""The warm steppers of a live view: measured forces in, the state of the finger and its SED out.
+"""Steppers for a live view, which follow the state of a finger and its SED through readings of its forces.
 
-At small strain the finger is condensed once onto the skin that may touch: its stiffness, and the SED of the ending as a
-quadratic form of the skin's displacements. A reading is then one search for contact states under given forces. At
-finite strain, depth and travel follow from the forces by Newton's method on a bordered system, usually in one iteration
-a reading. The next iteration continues from its residual.
+At small strain the finger is condensed once to the skin that may touch: its stiffness, and the SED of the ending as a
+quadratic form of the skin's displacements. A reading then takes one search for contact states under given forces. At
+finite strain, a reading usually takes one iteration of Newton's method on the bordered system. The next reading
+continues from its residual.
 """
 
 from abc import ABC, abstractmethod
@@ -23,8 +23,8 @@ from solver.failures import ContactLost
 from solver.mesh.mesher import Sizing
 from solver.scene import Scene
 
-SLIDING = 0.995  # part of the friction limit beyond which the tangential force means sliding
-LIGHT = 1e-7  # N/mm: less than this is no touch
+SLIDING = 0.995  # fraction of the friction limit beyond which the tangential force means sliding
+LIGHT = 1e-7  # normal force below which there is no contact [N/mm]
 
 
 class Stepper(ABC):
@@ -39,15 +39,15 @@ class Stepper(ABC):
     """
 
     def __init__(self, finger: Finger[Patches], mu: float, tau: float = np.inf) -> None:
-        """Start untouched, for a surface of friction `mu` and traction bound `tau` [MPa]."""
+        """Start undeformed, on a surface with friction `mu` and traction bound `tau` [MPa]."""
         self.finger, self.newton = finger, finger.newton
-        self.mu = mu  # coefficient of friction, taken anew with every reading [-]
-        self.tau = tau  # traction bound, likewise [MPa]
+        self.mu = mu  # coefficient of friction, may change between readings [-]
+        self.tau = tau  # traction bound, may change between readings [MPa]
         self.state = EquilibriumState.undeformed(self.newton.condensed)
 
     @property
     def depth(self) -> float:
-        """Indentation found [mm]."""
+        """Indentation [mm]."""
         return self.state.load.depth
 
     @property
@@ -56,13 +56,13 @@ class Stepper(ABC):
         return 0.0 - self.state.load.travel
 
     def step(self, normal: float, tangential: float) -> float:
-        """Take one reading and return the SED averaged over the ending [MPa]; nan where there is no state to show.
+        """Take one reading and return the SED averaged over the ending [MPa]; nan where no valid state was found.
 
-        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the surface's pull on it along +x. At small strain
-        the next reading starts afresh from the untouched finger; at finite strain, where that is in vain, the first
-        after the force has eased. A reading that is no number is nan too, and leaves the state as it was.
+        `normal` [N/mm] presses the finger, `tangential` [N/mm] is the tangential force on it along +x. At small strain
+        the next reading then starts from the undeformed finger. At finite strain it does too; where that fails, the
+        next attempt follows once the normal force has decreased. A reading that is not a number changes no state.
         """
-        normal, tangential = float(normal), float(tangential)  # loops are compiled for these alone
+        normal, tangential = float(normal), float(tangential)  # the kernels take floats
         if not isfinite(normal + tangential):
             return float("nan")
         if normal < LIGHT:
@@ -71,25 +71,25 @@ class Stepper(ABC):
         return self.advance(normal, min(max(tangential, -self.mu * normal), self.mu * normal))
 
     def forget(self) -> None:
-        """Start afresh from the untouched finger."""
+        """Return to the undeformed finger."""
         self.state = EquilibriumState.undeformed(self.newton.condensed)
 
     @abstractmethod
     def advance(self, normal: float, tangential: float) -> float:
-        """Return what `step` does of forces [N/mm] that press the finger and that friction carries."""
+        """Return the result of `step` for forces [N/mm] within the friction limit."""
 
     def row(self) -> Array:
-        """Return the SED of the row of endings as it is now (r,) [MPa], at `prediction.ROW`; nan beyond the finger."""
+        """Return the SED (r,) [MPa] of the endings at `prediction.ROW` in the last state; nan beyond the finger."""
         return self.finger.row.average(self.finger.displacement(self.state))
 
     def outline(self) -> Array:
-        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip, the surface being y = 0."""
+        """Return the deformed skin (w, 2) [mm] from the palmar cut round the tip; the surface is y = 0."""
         whole = self.finger.geometry.whole
         displacement = self.finger.displacement(self.state)
         return self.finger.geometry.mesh.nodes[whole] + displacement[whole] - [0.0, self.depth]
 
     def under_friction(self, *, slides: bool, sense: int) -> EquilibriumState:
-        """Return the last state under today's friction; all that touches slips to `sense` where it `slides`."""
+        """Return the last state under the present friction; where it `slides`, its contact slips towards `sense`."""
         last, load = self.state, self.state.load
         state = np.where(last.state == STICK, SLIP, last.state).astype(np.int32) if slides else last.state.copy()
         senses = np.full(len(state), sense, np.int32) if slides else last.sense.copy()
@@ -97,7 +97,7 @@ class Stepper(ABC):
         return replace(last, state=state, sense=senses, load=load)
 
 
-CHANGES = 60  # systems after which a reading is given up: 1 to 3 are usual
+CHANGES = 60  # systems for a reading, at most: 1 to 3 are usual
 
 
 class SmallStepper(Stepper):
@@ -129,7 +129,7 @@ class SmallStepper(Stepper):
         return float(stretched @ stretched)
 
     def _most(self, normal: float) -> float:
-        """Return the largest tangential force the surface can carry [N/mm], pressures shared out as they last were."""
+        """Return the friction limit [N/mm] for the last distribution of pressure."""
         if self.tau == np.inf:
             return self.mu * normal
         push = self.state.normal
@@ -142,20 +142,20 @@ class SmallStepper(Stepper):
 
 @dataclass(frozen=True, slots=True)
 class FollowControl:
-    """When a finger at finite strain is shown, hurried, led to a state anew, and given up."""
+    """Iterations for a reading at finite strain, and criteria for a valid state and for a lost one."""
 
-    met: float = 0.02  # part of the normal force by which a state may miss the forces and still be shown
-    eased: float = 0.7  # of the normal force at which a state was lost for good: from there it is sought again
-    stairs: int = 12  # that lead a finger from nothing to forces it bears already
-    leading: int = 3  # iterations on each
-    arriving: int = 8  # iterations on the last, as after a state that was not shown
-    near: float = 0.01  # size of one after which no more are made [mm]
-    least_stretch: float = 0.65  # of the skin that is shown: it folds from 0.544 on, less so on a coarse mesh
-    largest_kink: float = 0.3  # that is shown: a coarse mesh has this where skin folds behind the contact
-    far: float = 0.15  # displacement in one iteration from which on there is another [mm]
-    hurried: int = 3  # and how many at most
-    stiff: float = 1e3  # bulk over shear stiffness from which on a tangent from elsewhere leads astray (nu 0.4995)
-    furthest: float = 5.0  # displacement in one iteration beyond which the state is lost [mm]
+    met: float = 0.02  # largest error of the forces of a valid state, by the normal force
+    eased: float = 0.7  # ratio of the normal force to that of the last failure at which a lost state is tried again
+    stairs: int = 12  # load steps from the undeformed finger to the forces of a reading
+    leading: int = 3  # iterations for each of these
+    arriving: int = 8  # iterations for the last of these, and after an invalid state, at most
+    near: float = 0.01  # displacement in an iteration that ends those [mm]
+    least_stretch: float = 0.65  # smallest stretch of valid skin: it folds at 0.544, later on a coarse mesh
+    largest_kink: float = 0.3  # largest kink of valid skin: a coarse mesh has this where skin folds
+    far: float = 0.15  # displacement in an iteration after which another follows [mm]
+    hurried: int = 3  # iterations then, at most
+    stiff: float = 1e3  # ratio of bulk to shear stiffness from which a kept tangent diverges (nu 0.4995)
+    furthest: float = 5.0  # displacement in an iteration beyond which the state is lost [mm]
 
 
 CONTROL = FollowControl()
@@ -167,24 +167,24 @@ class FiniteStepper(Stepper):
     finger: FiniteFinger
 
     def __init__(self, finger: FiniteFinger, mu: float, tau: float = np.inf) -> None:
-        """Start untouched, as `Stepper`."""
+        """Start undeformed, as `Stepper`."""
         super().__init__(finger, mu, tau)
         self._lost_at: float | None = None  # normal force [N/mm]
-        self._hopeless = False  # whether these forces were led to in vain
-        self._behind = False  # whether the last state had not caught up with its forces
-        self._stiffness = 0.0  # of the finger pressed deeper, in the last iteration [N/mm per mm]
+        self._hopeless = False  # whether the load steps from the undeformed finger failed
+        self._behind = False  # whether the forces of the last state differ too much
+        self._stiffness = 0.0  # derivative of the normal force by depth in the last iteration [N/mm per mm]
 
     def forget(self) -> None:
-        """Start afresh from the untouched finger."""
+        """Return to the undeformed finger."""
         super().forget()
         self._lost_at, self._hopeless, self._behind = None, False, False
 
     def advance(self, normal: float, tangential: float) -> float:
         """Do as `Stepper` says.
 
-        A state is lost where contact leaves the skin that may touch, and where skin is squeezed so far that it may have
-        folded. The next reading leads to it from nothing. Where that is in vain, it is tried again once the normal
-        force has eased. One that has not caught up with the forces is not shown.
+        A state is lost where contact leaves the skin that may touch, and where the skin may have folded. The next
+        reading takes load steps from the undeformed finger. Where these fail, they are repeated once the normal force
+        has decreased. A state whose forces differ too much gives nan.
         """
         if self._lost_at is None:
             return self._follow(normal, tangential)
@@ -193,7 +193,7 @@ class FiniteStepper(Stepper):
         return self._lead(normal, tangential)
 
     def _lead(self, normal: float, tangential: float) -> float:
-        """Return what `step` does of a finger led from nothing to these forces."""
+        """Return the result of `step` by load steps from the undeformed finger."""
         self.forget()
         sed = float("nan")
         for part in np.linspace(1.0 / CONTROL.stairs, 1.0, CONTROL.stairs).tolist():
@@ -206,11 +206,11 @@ class FiniteStepper(Stepper):
 
     @property
     def lost(self) -> bool:
-        """Whether there is no state until the normal force eases."""
+        """Whether the state is lost, until the normal force decreases."""
         return self._lost_at is not None
 
     def _follow(self, normal: float, tangential: float, iterations: int = 1) -> float:
-        """Return what `step` does of a state that is not lost, or of the untouched finger."""
+        """Return the result of `step` by iterations from the last state."""
         newton = self.newton
         state = self._ready(normal, tangential)
         origin, before = state.place(newton.condensed)[:, 0], state.load.travel
@@ -241,9 +241,9 @@ class FiniteStepper(Stepper):
         return self.finger.sed_ending(state.u)
 
     def _goes_far(self, normal: float) -> bool:
-        """Return whether the finger is about to move far: then the tangent of the last reading leads a part of the way.
+        """Return whether a large displacement is due, so that the first iteration keeps the last tangent.
 
-        With it an iteration takes a third of the time, and only where the finger has come to is worth a new one.
+        Such an iteration takes a third of the time, and a new tangent is of more use at its end.
         """
         missing = abs(normal - float(self.state.force[1]))
         far = self.state.touching.any() and 0.0 < CONTROL.far * self._stiffness < missing
@@ -255,7 +255,7 @@ class FiniteStepper(Stepper):
         return float("nan")
 
     def _ready(self, normal: float, tangential: float) -> EquilibriumState:
-        """Return the last state, its skin in contact states that can carry the forces: slip, or stick somewhere."""
+        """Return the last state with contact states that can carry the forces: slip everywhere, or some stick."""
         slides = abs(tangential) > SLIDING * self.mu * normal
         state = self.under_friction(slides=slides, sense=1 if tangential > 0.0 else -1)
         if not state.touching.any():
@@ -266,17 +266,20 @@ class FiniteStepper(Stepper):
 
 
 FINENESS = {"small": 4.0, "finite": 2.7}  # meshes on which the response is good to about 1 % of its peak
-MARGIN = {"small": 4.0, "finite": 6.0}  # how far above the indentation undeformed skin is looked at for contact
-# A nine-node element as four quadrilaterals, and the middle of each in its coordinates.
+MARGIN = {
+    "small": 4.0,
+    "finite": 6.0,
+}  # by the indentation: height of undeformed skin up to which contact is considered
+# A nine-node element as four quadrilaterals, and the local coordinates of their midpoints.
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 MIDDLES = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 
 
 class LivePicture:
-    """A finger in quadrilaterals, four to an element: `faces` (f, 4) of nodes that lie at `rest` (n, 2) [mm]."""
+    """A finger as quadrilaterals, four to an element: `faces` (f, 4) of nodes at `rest` positions (n, 2) [mm]."""
 
     def __init__(self, finger: Finger[Patches]) -> None:
-        """Place a probe in the middle of each face."""
+        """Place a probe at the midpoint of each face."""
         mesh, count = finger.geometry.mesh, 4 * len(finger.geometry.mesh.elements)
         self.faces, self.rest = mesh.elements[:, QUARTERS].reshape(-1, 4), mesh.nodes
         each = np.arange(count)
@@ -285,18 +288,18 @@ class LivePicture:
         self._finger, self._middles = finger, finger.patches(middles)
 
     def nodes(self, state: EquilibriumState) -> Array:
-        """Return where the nodes are (n, 2) [mm], the surface being y = 0."""
+        """Return the positions of the nodes (n, 2) [mm]; the surface is y = 0."""
         return self.rest + self._finger.displacement(state) - [0.0, state.load.depth]
 
     def sed(self, state: EquilibriumState) -> Array:
-        """Return the SED in the middle of each face (f,) [MPa]."""
+        """Return the SED at the midpoint of each face (f,) [MPa]."""
         return self._middles.average(self._finger.displacement(state))
 
 
 def stepper(scene: Scene) -> Stepper:
-    """Return a stepper for the finger and the surface of `scene`, on a mesh made for its indentation or force.
+    """Return a stepper for the finger and the surface of `scene`, on a mesh for its indentation or force.
 
-    Forces that press much deeper lose the state. Raises SceneError where the finger cannot be meshed.
+    Much larger forces lose the state. Raises SceneError where the finger cannot be meshed.
     """
     kind = scene.solve.kinematics
     sizing = Sizing(FINENESS[kind], expected_depth(scene), margin=MARGIN[kind])
@@ -306,6 +309,6 @@ def stepper(scene: Scene) -> Stepper:
         follower = FiniteStepper(FiniteFinger.of(scene, sizing), mu, tau)
     else:
         follower = SmallStepper(LinearFinger.of(scene, sizing), mu, tau)
-    follower.step(1e-3, 0.0)  # compiles, or loads what was compiled
+    follower.step(1e-3, 0.0)  # compiles or loads the kernels
     follower.forget()
     return follower
