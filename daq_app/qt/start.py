@@ -183,7 +183,7 @@ def _speak(application: "QApplication") -> None:
 def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     from PySide6.QtGui import QIcon
 
-    from daq_app.qt.tokens import palette, style_sheet
+    from daq_app.qt.tokens import palette, style_sheet, tick_palette
 
     application.setApplicationName("daq-app")
     application.setDesktopFileName("daq-app")
@@ -191,6 +191,8 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     if application.style().name() != "fusion":
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
+    for kind in ("QCheckBox", "QRadioButton"):
+        application.setPalette(tick_palette(tokens), kind)
     application.setStyleSheet(style_sheet(tokens, scale))
 
 

@@ -98,6 +98,13 @@ def palette(t: Tokens) -> QPalette:
     return colours
 
 
+def tick_palette(t: Tokens) -> QPalette:
+    """Return the palette of boxes to tick: the style draws their outline in a darker shade of the window's ground."""
+    colours = palette(t)
+    colours.setColor(QPalette.ColorRole.Window, QColor(t.quiet))
+    return colours
+
+
 def style_sheet(t: Tokens, scale: float) -> str:
     """Return the style sheet of every widget of the window; a button is at least as high as a line of its type."""
     sizes = {"small": SMALL, "text": TEXT, "title": TITLE, "headline": HEADLINE}

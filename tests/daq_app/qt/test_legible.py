@@ -5,9 +5,12 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontMetricsF
 from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
     QLineEdit,
     QListWidget,
     QProgressBar,
+    QRadioButton,
     QScrollArea,
     QStyleFactory,
     QTabBar,
@@ -76,9 +79,9 @@ def themed(application, request):
     """Return a function that shows a widget in a theme; the other windows of this process keep theirs."""
     fusion = QStyleFactory.create("Fusion")
 
-    def shown(widget):
+    def shown(widget, palette=tokens.palette):
         widget.setStyle(fusion)
-        widget.setPalette(tokens.palette(request.param))
+        widget.setPalette(palette(request.param))
         widget.setStyleSheet(tokens.style_sheet(request.param, 1.0))
         widget.show()
         application.processEvents()
@@ -108,6 +111,26 @@ def test_a_selected_row_can_be_read_in_both_themes(themed, kind):
     box = widget.visualItemRect(widget.item(0, 0) if kind is QTableWidget else widget.itemAt(30, 10))
     box = box.translated(widget.viewport().mapTo(widget, box.topLeft() * 0))
     assert painted_contrast(widget, box) >= 4.5
+
+
+def test_the_chosen_row_of_an_open_list_can_be_read_in_both_themes(themed, application):
+    widget = QComboBox()
+    widget.addItems(["HHHH 12", "HHHH 34"])
+    themed(widget)
+    widget.showPopup()
+    application.processEvents()
+    rows = widget.view()
+    box = rows.visualRect(rows.model().index(0, 0))
+    assert painted_contrast(rows.viewport(), box.adjusted(1, 1, -1, -1)) >= 4.5
+    widget.hidePopup()
+
+
+@pytest.mark.parametrize("kind", [QCheckBox, QRadioButton])
+def test_the_outline_of_what_can_be_ticked_stands_out_in_both_themes(themed, kind):
+    widget = kind()
+    widget.resize(60, 30)
+    themed(widget, tokens.tick_palette)
+    assert painted_contrast(widget, widget.rect()) >= 3.0  # WCAG 2.1, 1.4.11
 
 
 @pytest.mark.parametrize("part", [0, 100])
