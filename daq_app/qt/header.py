@@ -67,24 +67,29 @@ class Notice(Panel):
         super().__init__("", "banner")
         self._send, self._scale, self._folds = send, scale, False
         self._banner: Banner | None = None
-        self._warning: str | None = None
+        self.warning = ""  # what was answered to somebody, until the session moves on or says something itself
+        self._said: object = None
         self._words = label("", wrap=True)
         self._button = button("", tr("what the notice offers"), self._do)
         self._button.setVisible(False)
         self.show_folding(False)
         hbox((self._words, 1), self._button, on=self, margins=(2 * GRID, 2, GRID, 2))
 
-    def show_view(self, banner: Banner | None, notice: str) -> None:
-        """Show a banner, or else the last message."""
-        if banner is not None:
-            self._warning = None
+    def show_view(self, banner: Banner | None, notice: str, step: str = "") -> None:
+        """Show a banner and a warning of this step of the session, or else the last message."""
+        said = (banner is None, notice, step)
+        if said != self._said:
+            self.warning, self._said = "", said
+        self._show(banner, notice)
+
+    def _show(self, banner: Banner | None, notice: str) -> None:
         before, self._banner = self._banner, banner
         grade = "" if banner is None else banner.grade
         if grade == "wrong" and (before is None or before.grade != "wrong"):
             QApplication.beep()  # nobody looks at the window all the time
-        words = self._warning or notice
-        text = f"{MARKS[grade]} {banner.sentence}" if banner else words[:1].upper() + words[1:]
-        say(self._words, text, tr("Notice:"))
+        words = self.warning or notice
+        text = f"{MARKS[grade]} {banner.sentence} {self.warning}" if banner else words[:1].upper() + words[1:]
+        say(self._words, text.strip(), tr("Notice:"))
         regrade(self, grade)
         self._button.setVisible(banner is not None and banner.sends is not None)
         self._button.setText("" if banner is None else banner.action)
@@ -99,8 +104,8 @@ class Notice(Panel):
         self.setVisible(not folds or bool(self._words.text()))
 
     def warn(self, sentence: str) -> None:
-        self._warning = sentence
-        self.show_view(self._banner, sentence)
+        self.warning = sentence
+        self._show(self._banner, sentence)
 
     def _do(self) -> None:
         if self._banner is not None and self._banner.sends is not None:

@@ -41,7 +41,6 @@ TALL = 620  # below it the type of the headline is smaller
 LOW = 540  # below it an empty notice gives up its line
 CARDS, PLAN = 600, 316  # widths of the checklist and of the plan
 LEAST_CARDS = 260  # width in which no field of the checklist is cut
-LEAVING = 10.0  # closing twice within so long leaves a session that is being recorded [s]
 
 
 class MainWindow(QMainWindow):
@@ -57,7 +56,6 @@ class MainWindow(QMainWindow):
         self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
         self.bridge = bridge
         self._scale = scale
-        self._close_asked = -LEAVING
         self._bench_shown: bool | None = None  # as somebody wished; None: as there is room
         self.header = Header(scale)
         self.notice = Notice(scale, bridge.send)
@@ -97,7 +95,9 @@ class MainWindow(QMainWindow):
     def show_view(self, view: View) -> None:
         course = view.course
         self.header.show_view(view)
-        self.notice.show_view(view.banner, "" if course is None else course.notice)
+        notice, step = ("", "") if course is None else (course.notice, course.headline)
+        self.notice.show_view(view.banner, notice, step)
+        self._warn_of_tablet()
         self.bench.show_view(view.bench)
         self.strip.show_view(view.bench)
         self.middle.show_view(course)
@@ -179,10 +179,8 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Leave; a session that is being recorded only when asked twice, and then it can be resumed."""
-        now = self.bridge.state.now
-        if self.bridge.recording and now - self._close_asked > LEAVING:
-            self._close_asked = now
-            words = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
+        words = tr("A session is being recorded: end it with Ctrl+E, or close once more to leave it for later.")
+        if self.bridge.recording and self.notice.warning != words:
             self.notice.warn(words)
             event.ignore()
             return
@@ -266,11 +264,14 @@ class MainWindow(QMainWindow):
             self.page.show_line(millimetres(self.subject.screen()), self.subject.size())
         else:
             self.page.show_tablet(self.tablet.words, self.tablet.missing, self.tablet.picture())
-            if self.bridge.recording and not self.tablet.server.connected:
-                words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
-                self.notice.warn(words)
+            self._warn_of_tablet()
         if self.bridge.view.course is None:
             self._form_changed()
+
+    def _warn_of_tablet(self) -> None:
+        if self.tablet is not None and self.bridge.recording and not self.tablet.server.connected:
+            words = tr("The tablet does not answer. It keeps its answers; F6 shows the subject's page here.")
+            self.notice.warn(words)
 
     def _draw(self) -> None:
         session = self.bridge.state.session

@@ -2,13 +2,16 @@
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
+from daq_app.window.view import Banner
 from sessions.plan.protocols import protocol_file
 from sessions.plan.study import create_study
 from sessions.recording import Recording
@@ -160,11 +163,36 @@ def test_a_wrong_form_begins_nothing_and_typing_goes_to_the_wrong_field(driver):
     assert words.property("grade") == ""
 
 
-def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that_can_be_resumed(driver):
+def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that_can_be_resumed(driver, monkeypatch):
     begin(driver, "P10")
-    driver.window.close()
-    assert driver.window.isVisible()
-    assert "close once more" in driver.window.notice._words.text()
+    window = driver.window
+    window.close()
+    assert window.isVisible()
+    assert "close once more" in window.notice._words.text()
+    QTest.keyClick(window, SPACE)
+    driver.phase("scoring")
+    assert window.notice._words.text() == ""  # the session has gone on: the question is not asked any more
+    monkeypatch.setattr(window.bridge, "end", lambda: None)
+    monkeypatch.setattr(QGuiApplication, "quit", lambda: None)
+    for leaves in (False, True):
+        event = QCloseEvent()
+        window.closeEvent(event)
+        assert event.isAccepted() is leaves
+        assert "close once more" in window.notice._words.text()
+
+
+def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says(driver):
+    notice, lost = driver.window.notice, Banner("wrong", "The transducer does not answer: no readings for 1 s.")
+    notice.show_view(lost, "", "Mount")
+    notice.warn("Close once more.")
+    for seconds in (2, 3):  # the banner counts
+        notice.show_view(
+            replace(lost, sentence=f"The transducer does not answer: no readings for {seconds} s."), "", "Mount"
+        )
+        assert "does not answer" in notice._words.text()
+        assert notice._words.text().endswith("Close once more.")
+    notice.show_view(None, "Done again: trial 5 (K50).", "Mount")
+    assert notice._words.text() == "Done again: trial 5 (K50)."
 
 
 def test_numbers_on_ones_own_scale_and_practice_before_them_are_asked_for_and_kept(driver):
