@@ -159,8 +159,8 @@ class Course:
     """Forces over the whole recording, thinned to the least and the greatest of each stretch of time."""
 
     time: Numbers  # [s, device time]
-    normal: Numbers  # [N]
-    tangential: Numbers  # [N]
+    normal: tuple[float | None, ...]  # [N]; None where readings are missing
+    tangential: tuple[float | None, ...]  # [N]
 
 
 @dataclass(frozen=True, slots=True)

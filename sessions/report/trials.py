@@ -24,6 +24,7 @@ from sessions.strokes.stroke import AreaLaw, Flaw, Stroke
 Array = NDArray[np.float64]
 
 MOST_INSTANTS = 600  # of a stroke's course that a picture can show
+GAP = 5.0  # usual steps in time [-]; a longer one may show that readings are missing
 STRETCHES = 700  # of the whole recording, each drawn by its least and its greatest value
 
 
@@ -62,16 +63,24 @@ def flaws(analysis: Analysis) -> tuple[Fact, ...]:
 
 
 def course(recording: Recording) -> Course | None:
-    """Return the forces over the whole recording, no zero taken off and unfiltered; None where there are none."""
+    """Return the forces over the whole recording, no zero taken off and unfiltered; None where there are none.
+
+    Readings missing for longer than a stretch of the picture break its curves: no line is drawn across.
+    """
     if recording.info is None:
         return None
     block = recording.readings()
     if not len(block):
         return None
     wrench = in_face_frame(recording.info.calibration.wrench(block.raw, np.zeros(6)), recording.plan.frame)
-    kept = _extremes(-wrench[:, 2])
+    steps = np.diff(block.time)
+    shortest = max((block.time[-1] - block.time[0]) / STRETCHES, GAP * np.median(steps)) if len(steps) else 0.0
+    gaps = np.flatnonzero(steps > shortest)
+    kept = np.union1d(_extremes(-wrench[:, 2]), [gaps, gaps + 1])
     drag = np.hypot(wrench[kept, 0], wrench[kept, 1])
-    return Course(_numbers(block.time[kept]), _numbers(-wrench[kept, 2]), _numbers(drag))
+    behind = np.searchsorted(kept, gaps) + 1
+    normal, tangential = (np.insert(force, behind, np.nan) for force in (-wrench[kept, 2], drag))
+    return Course(_numbers(np.insert(block.time[kept], behind, block.time[gaps])), _known(normal), _known(tangential))
 
 
 def _reasons(stroke: Stroke, position: int, flaws: tuple[Flaw, ...]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from sessions.report.figures.relation import relation_panel
 from sessions.report.pages import page
 from sessions.report.prose import summary
 from sessions.report.tables.session import relation_table
-from sessions.report.trials import _extremes
+from sessions.report.trials import _extremes, course
 from sessions.report.wording import shown_response
 from sessions.statistics.scores import Score, ScoreTable, score_table
 from sessions.strokes.analysis import analyse
@@ -261,6 +261,26 @@ def test_strokes_without_a_plan_are_predicted_at_the_depth_given_for_them(tmp_pa
     )
     assert [p.stroke for p in made.predictions] == [1, 2]
     assert "Predicted responses" in page(made)
+
+
+def test_the_forces_of_the_whole_recording_are_broken_where_readings_are_missing(tmp_path):
+    foreign(tmp_path / "whole")
+    recording = Recording.open(tmp_path / "whole")
+    assert None not in course(recording).normal
+    before, after = 500, 700  # 1 s is missing in the middle of the first stroke
+
+    class Cut:
+        info, plan = recording.info, recording.plan
+
+        def readings(self):
+            block = recording.readings()
+            return ReadingBlock.joined([block.between(0, before), block.between(after, len(block))])
+
+    made = course(Cut())
+    missing = made.normal.index(None)
+    assert [made.normal.count(None), made.tangential.count(None), made.tangential.index(None)] == [1, 1, missing]
+    ends = made.time[missing - 1], made.time[missing + 1]
+    assert ends == pytest.approx([(before - 1) * 0.005, after * 0.005], abs=1e-9)
 
 
 @given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=5000))

@@ -109,7 +109,8 @@ _OF_THE_MODEL = {"finger", "response", "relation"}
 _CAPTIONS: Mapping[str, str] = {
     "course": (
         "Normal and tangential force over the whole recording, unfiltered; each stretch is drawn by its least and its"
-        " greatest value. Grey: the strokes that were found, with their numbers; discarded takes are not searched."
+        " greatest value. Curves break where readings are missing. Grey: the strokes that were found, with their"
+        " numbers; discarded takes are not searched."
     ),
     "scores": (
         "Scores against the index its maker gave each stimulus. Large dots: mean over subjects; bars: 95 % interval "

@@ -41,7 +41,7 @@ def course_panel(course: Course, strokes: tuple[StrokeFinding, ...], *, simulate
             begin, end = _ends(stroke, first, last)
             text = f"stroke {stroke.number}: {begin:.3f} s to {end:.3f} s"
             axes.axvspan(begin, end, color=PALE, alpha=0.6, linewidth=0, gid=drawn.note(text))
-        axes.plot(course.time, values, color=colour, linewidth=0.8)
+        axes.plot(course.time, [math.nan if v is None else v for v in values], color=colour, linewidth=0.8)
         axes.axhline(0.0, color=GREY, linewidth=0.4)
         axes.set(ylabel=f"{name}\n[N]", xlim=(first, last if last > first else first + 1.0))
         axes.margins(y=0.08)
