@@ -191,7 +191,7 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     if application.style().name() != "fusion":
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
-    for kind in ("QCheckBox", "QRadioButton"):
+    for kind in (b"QCheckBox", b"QRadioButton"):
         application.setPalette(tick_palette(tokens), kind)
     application.setStyleSheet(style_sheet(tokens, scale))
 
