@@ -191,8 +191,8 @@ def _dress(application: "QApplication", tokens: "Tokens", scale: float) -> None:
     if application.style().name() != "fusion":
         application.setStyle("Fusion")  # the one style that draws alike, and takes our colours, everywhere
     application.setPalette(palette(tokens))
-    for kind in (b"QCheckBox", b"QRadioButton"):
-        application.setPalette(tick_palette(tokens), kind)
+    for kind in ("QCheckBox", "QRadioButton"):
+        application.setPalette(tick_palette(tokens), kind)  # pyright: ignore[reportArgumentType]  its stub asks for bytes
     application.setStyleSheet(style_sheet(tokens, scale))
 
 
