@@ -9,6 +9,8 @@ from pathlib import Path
 from daq_app.console import WrongValue
 from sessions.plan.plan import Finger, SessionPlan
 from sessions.plan.protocols import Body
+from sessions.plan.protocols.protocol import HEIGHTS
+from sessions.plan.protocols.protocol import LARGEST_SEED as LARGEST
 from sessions.strokes.stroke import FIXED, HERTZ, PLANNED_AT, AreaLaw
 from solver.quantities import NAMES, SED
 
@@ -22,7 +24,7 @@ def within(
 
     `words` say what is allowed where the least and the greatest value do not.
     """
-    ends = f"{least:g} on" if math.isinf(greatest) else f"{least:g} to {greatest:.12g}"
+    ends = f"{least:g} on" if math.isinf(greatest) else f"{least:.12g} to {greatest:.12g}"
     usual = f"a whole number from {ends}" if kind is int else ends
 
     def read(text: str) -> float:
@@ -58,6 +60,17 @@ def add_flag(parser: argparse.ArgumentParser, name: str, meaning: str) -> None:
 def add_seed(parser: argparse.ArgumentParser, use: str, default: int | None = 0, largest: float = LARGEST_SEED) -> None:
     """Declare --seed, of something that is drawn at random."""
     add_number(parser, "--seed", int, (0, largest), use, default)
+
+
+def add_simulated_people(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Declare --simulate-subject, the seed of simulated people."""
+    add_number(parser, "--simulate-subject", int, (0, LARGEST), meaning, metavar="SEED")
+
+
+def add_height(parser: argparse.ArgumentParser, meaning: str) -> None:
+    """Declare --height of the face, which a protocol may state as well."""
+    words = f"{HEIGHTS[0]:g} to {HEIGHTS[1]:g} (mm)"
+    add_number(parser, "--height", float, HEIGHTS, meaning, None, "MM", words)
 
 
 def numbers_by_key(texts: Sequence[str], option: str, example: str) -> dict[str, float]:

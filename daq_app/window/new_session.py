@@ -12,7 +12,7 @@ from daq_app.window.state import BenchState
 from daq_app.wording import sentence, tr
 from sessions.plan.plan import Frame, Hand, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, is_code, plan, protocol
-from sessions.plan.protocols.protocol import LARGEST_SEED, phases_before
+from sessions.plan.protocols.protocol import AREAS, HEIGHTS, LARGEST_SEED, phases_before
 from sessions.plan.study import Study, StudyError, enrol, is_study, open_study, study_key
 from sessions.recording import Recording, RecordingError, Setting
 from sessions.recording.manifest import is_sealed
@@ -20,8 +20,6 @@ from sessions.recording.storage import check_room, need
 from sessions.run.resuming import check_resumable
 from sessions.toml_file import SettingsError
 
-HIGHEST = 500.0  # a face above the transducer's origin [mm]
-AREAS = (1.0, 2000.0)  # of a contact [mm2]
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 PILOT, PILOTS = "PILOT", "pilots"  # code of the simulated subject, and folder below that of the sessions
 SHOWN = 20  # sessions that were cut short, at most
@@ -283,9 +281,10 @@ def _refusals(form: SessionForm, bench: Bench) -> dict[str, str]:
             "A seed is a whole number from 0 to {largest}; leave it empty for a new one.", largest=LARGEST_SEED
         )
     height = _number(form.height)
-    if form.height.strip() and (height is None or not abs(height) <= HIGHEST):
+    lowest, highest = HEIGHTS
+    if form.height.strip() and (height is None or not lowest <= height <= highest):
         wrong["height"] = tr(
-            "A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty.", highest=HIGHEST
+            "A height is a number of millimetres from −{highest:.0f} to {highest:.0f}, or left empty.", highest=highest
         )
     area = _number(form.area)
     if form.area.strip() and (area is None or not AREAS[0] <= area <= AREAS[1]):

@@ -18,10 +18,12 @@ from drivers.transducer import TransducerInfo
 from sessions.exchange.csv_text import COMMENT, ImportRefused, cell_text, content_of, number_in, records
 from sessions.file_access import write_whole
 from sessions.plan.plan import Frame, Origin, SessionPlan
+from sessions.plan.protocols.protocol import HEIGHTS
+from sessions.plan.study import check_code
 from sessions.recording.head import Setting, provenance
 from sessions.recording.writer import SessionWriter
 from sessions.strokes import ZERO_SETTING, ZERO_STATED
-from sessions.toml_file import SettingsError
+from sessions.toml_file import NotAllowed, SettingsError, check_range
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
 TIME = "t"
@@ -155,6 +157,7 @@ RATE_TOLERANCE = 0.01  # a stated rate may differ so much from the one the file'
 UNEVEN = 0.05  # time steps that spread more than this hold no one rate [-]
 NORMALS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _FEWEST = 2
+GREATEST = 1e18  # of a time, force or torque: a thousand times the microseconds since 1970, and no product overflows
 _SIMULATED = "SIMULATED"  # at the head of whatever came from a simulator
 
 
@@ -174,8 +177,11 @@ class ImportOptions:
         """Check what can be checked without the file. Raises SettingsError."""
         if self.normal is not None and self.normal not in NORMALS:
             raise SettingsError(f'--normal "{self.normal}" is not allowed: it must be one of {", ".join(NORMALS)}')
-        if self.height is not None and not math.isfinite(self.height):
-            raise SettingsError(f"--height {self.height} is not allowed: it must be a number of millimetres")
+        try:
+            check_range("--height", self.height, *HEIGHTS, "mm")
+        except NotAllowed as error:
+            raise SettingsError(str(error)) from error
+        check_code("--subject", self.subject)
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0.0):
             raise SettingsError(f"--rate {self.rate} is not allowed: it must be a number of readings a second above 0")
 
@@ -269,9 +275,10 @@ def _row(path: Path, line: int, cells: Sequence[str], width: int, used: dict[int
     row = [math.nan] * width
     for position, name in used.items():
         value = number_in(cells[position])
-        if value is None or not math.isfinite(value):
+        if value is None or not abs(value) <= GREATEST:
             cell = cell_text(cells[position])
-            raise ImportRefused(f'{path}, line {line}: {name} is "{cell}", which is no number; mend or remove the row')
+            words = f'{name} is "{cell}", which is no number that a device gives'
+            raise ImportRefused(f"{path}, line {line}: {words}; mend or remove the row")
         row[position] = value
     return row
 

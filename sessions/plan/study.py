@@ -176,9 +176,9 @@ def free_slot(members: Sequence[Member]) -> int:
 
 
 def check_code(what: str, code: str) -> None:
-    """Raise StudyError unless `code` is one: no name, nothing a file's name could not hold."""
+    """Raise SettingsError unless `code` is one: no name, nothing a file's name could not hold."""
     if not is_code(code):
-        raise StudyError(f'{what} "{code}" is not allowed: a code of letters, digits, - and _, never a name')
+        raise SettingsError(f'{what} "{code}" is not allowed: a code of letters, digits, - and _, never a name')
 
 
 STUDY_FILE = "study.sqlite"

@@ -74,6 +74,7 @@ def test_a_wrong_scene_names_key_value_and_what_is_allowed_with_exit_code_2(text
         ["demo", "--seed", "-1"],
         ["simulate", "net-ft", "--rate", "0"],
         ["simulate", "net-ft", "--factor", "0"],
+        ["simulate", "net-ft", "--seed", "-1"],
         ["simulate", "digital-ft", "--baud", "9600"],
         ["simulate", "serial-ft", "--baud", "7"],
         ["simulate", "carrier-pigeon"],

@@ -264,7 +264,7 @@ def test_a_decision_is_recorded_listed_followed_by_every_verb_and_undone(small, 
         (["--trial", "1", "--steady", "900", "901", "--by", "E02", "--why", "w"], 2, "too few readings"),
         (["--trial", "44", "--drop", "--by", "E02", "--why", "w"], 2, "there is no stroke 1 of trial 44"),
         (["--undo", "9", "--by", "E02", "--why", "w"], 2, "nothing to undo"),
-        (["--trial", "1", "--drop", "--by", "Ada Lovelace", "--why", "w"], 1, "never a name"),
+        (["--trial", "1", "--drop", "--by", "Ada Lovelace", "--why", "w"], 2, "never a name"),
     ],
 )
 def test_a_decision_that_cannot_be_is_refused_in_one_sentence(two, capsys, words, code, sentence):

@@ -127,3 +127,6 @@ def test_the_solver_is_more_moved_by_depth_than_by_a_little_friction(tmp_path, c
     assert told["indices"][0]["name"] == "loading.indentation"
     assert told["design_origin"] == "set"
     assert run(["sensitivity", str(scene), "--samples", "5"]) == 2
+    for words in (["--samples", "0"], ["--keep", "answers"], ["--quantity", "pressure"], ["--workers", "1"]):
+        assert run(["sensitivity", str(scene), *words]) == 2
+        assert f"{words[0]} " in capsys.readouterr().err

@@ -92,7 +92,7 @@ def test_a_row_is_given_back_by_the_command_line(tmp_path, capsys):
         (["run", "paired-comparison", "--scores-only", "--subject", "P01", "--depth", "taste=3"], 2, "no such block"),
         (["enrol", "nowhere", "--subject", "P01"], 1, "is no study"),
         (["enrol", "nowhere", "--subject", "P01", "--blind"], 2, "give --protocol"),
-        (["unblind", "nowhere", "--by", "Jane Doe"], 1, "never a name"),
+        (["unblind", "nowhere", "--by", "Jane Doe"], 2, "never a name"),
         (["unblind", "nowhere", "--by", "E01"], 1, "holds no recording"),
     ],
 )

@@ -182,6 +182,10 @@ def test_a_session_is_never_written_over(recorded, capsys):
         (["--device", "teapot://x", "--subject", "P1"], 2, "teapot"),
         (["--device", "net-ft://127.0.0.1?http=9", "--subject", "P1"], 1, "127.0.0.1"),
         (["--device", "net-ft://127.0.0.1", "--subject", "P1", "--simulate-subject", "1"], 2, "simulate"),
+        (["--device", "sim:", "--subject", "P1", "--height", "nan"], 2, "--height nan is not allowed: -500 to 500"),
+        (["--device", "sim:", "--subject", "P1", "--height", "501"], 2, "--height 501"),
+        (["--device", "sim:", "--subject", "P1", "--contact-area", "0"], 2, "--contact-area 0"),
+        (["--device", "sim:", "--subject", "P1", "--simulate-subject", "-1"], 2, "--simulate-subject -1"),
     ],
 )
 def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, code, named, tmp_path, capsys):
@@ -197,6 +201,7 @@ def test_a_session_that_cannot_begin_says_why_and_leaves_no_folder(arguments, co
     [
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2\n", 1, "line 3"),
         ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,nan,4,5,6\n", 1, "line 3"),
+        ("t_s,Fx_N,Fy_N,Fz_N,Tx_Nm,Ty_Nm,Tz_Nm\n0,1,2,3,4,5,6\n0.1,1,2,1e300,4,5,6\n", 1, "no number that a device"),
         ("", 1, "empty"),
     ],
 )

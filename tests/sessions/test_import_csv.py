@@ -198,7 +198,10 @@ def test_a_file_without_times_needs_a_rate(tmp_path):
     assert "--rate" in sentence
 
 
-@pytest.mark.parametrize("options", [{"rate": -1.0}, {"rate": float("nan")}, {"normal": "z"}, {"height": float("inf")}])
+@pytest.mark.parametrize(
+    "options",
+    [{"rate": -1.0}, {"rate": float("nan")}, {"normal": "z"}, {"height": float("inf")}, {"subject": "Ada Lovelace"}],
+)
 def test_options_that_mean_nothing_are_refused(options):
     with pytest.raises(SettingsError, match="not allowed"):
         ImportOptions(**options)

@@ -10,7 +10,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import get_args
 
-from daq_app.cli.options import add_body_arguments, add_flag, body_of, own_sentence
+from daq_app.cli.options import (
+    add_body_arguments,
+    add_flag,
+    add_height,
+    add_number,
+    add_simulated_people,
+    body_of,
+    own_sentence,
+)
 from daq_app.cli.terminal import attend_session, open_device
 from daq_app.console import Console, WrongValue
 from daq_app.recorder.client import Recorder
@@ -18,6 +26,7 @@ from daq_app.recorder.messages import People, StartSession
 from drivers.transducer import flagged_words
 from sessions.plan.plan import Frame, Phase
 from sessions.plan.protocols import Body, Protocol, StudyPlace, VisitSetting, plan, protocol
+from sessions.plan.protocols.protocol import AREAS
 from sessions.plan.study import open_study, study_key
 from sessions.recording import Setting
 from sessions.run.resuming import RESUMABLE
@@ -38,13 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--phases", nargs="+", choices=get_args(Phase), help="of the visit (the protocol's own)")
     add_body_arguments(parser)
     add_flag(parser, "--headless", "no window: answers at the terminal, or simulated")
-    parser.add_argument("--simulate-subject", type=int, metavar="SEED", help="simulated people")
+    add_simulated_people(parser, "simulated people")
     parser.add_argument(
         "--pace", type=float, default=1.0, help="simulated seconds a real second, simulated people only (1)"
     )
-    parser.add_argument("--height", type=float, metavar="MM", help="of the stimulus's face above the sensor's origin")
+    add_height(parser, "of the stimulus's face above the sensor's origin")
     parser.add_argument("--normal", choices=["+x", "-x", "+y", "-y", "+z", "-z"], help="axis along which pressing is +")
-    parser.add_argument("--contact-area", type=float, metavar="MM2", help="of finger and surface, for tau_max")
+    words = f"{AREAS[0]:g} to {AREAS[1]:g} (mm2)"
+    add_number(parser, "--contact-area", float, AREAS, "of finger and surface, for tau_max", None, "MM2", words)
     parser.add_argument("--stroking-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument("--answering-hand", choices=["left", "right"], help="recorded; unknown unless stated")
     parser.add_argument(

@@ -37,6 +37,8 @@ from solver import Scene
 EXAMPLE = "daq-app sensitivity scene.toml --samples 64"
 NAMES = [quantity.name for quantity in QUANTITIES]
 SAMPLES, OF_FINGERS = 32, 64  # usual ones
+# Options that say nothing of a single scene, and their usual values.
+_OF_FINGERS = {"quantity": "sed", "kinematics": "small", "keep": None, "workers": None, "scheduler": None}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -57,13 +59,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, console: Console) -> int:
-    samples: int = options.samples or (OF_FINGERS if options.scene is None else SAMPLES)
+    usual = OF_FINGERS if options.scene is None else SAMPLES
+    samples: int = usual if options.samples is None else options.samples
     if not 2 <= samples <= 4096 or samples & (samples - 1):
         raise WrongValue(f"--samples {samples} is not allowed: a power of two from 2 to 4096")
     if options.scene is None:
         if options.design is not None:
             raise WrongValue("--design needs a scene: daq-app sensitivity SCENE.toml --design FILE")
         return _signs(options, samples, console)
+    if ignored := next((name for name, usual_one in _OF_FINGERS.items() if getattr(options, name) != usual_one), None):
+        raise WrongValue(f"--{ignored} is for many fingers, and a scene is one: leave out --{ignored} or the scene")
     scene = load_toml(options.scene, Scene)
     if options.design is None:
         design, origin = usual_design(scene), "default: nobody set it"

@@ -10,9 +10,10 @@ import argparse
 import time
 from pathlib import Path
 
-from daq_app.cli.options import add_number
+from daq_app.cli.options import add_number, add_seed
 from daq_app.console import Console, WrongValue
 from daq_app.simulation.wiring import serve_digital_ft, serve_net_ft, serve_serial_ft
+from sessions.plan.protocols.protocol import LARGEST_SEED
 
 EXAMPLE = "daq-app simulate net-ft --rdt-port 50000 --tcp-port 50001 --http-port 8080"
 WIRES = ("net-ft", "serial-ft", "digital-ft")
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     allowed = "the box gives 1 to 7000 readings a second"
     add_number(parser, "--rate", int, (1, 7000), "readings a second of net-ft, 1 to 7000 (200)", words=allowed)
     parser.add_argument("--baud", type=int, help="line speed of serial-ft in bits a second (38400)")
-    parser.add_argument("--seed", type=int, default=0, help="of noise, drift and strokes (0)")
+    add_seed(parser, "of noise, drift and strokes (0)", largest=LARGEST_SEED)
     add_number(parser, "--factor", float, (0.01, 1000.0), "how much faster than real time runs (1)", 1.0)
     parser.add_argument("--script", type=Path, help="TOML timetable of strokes and faults")
 

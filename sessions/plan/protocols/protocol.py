@@ -91,6 +91,10 @@ class BlockOutline:
             raise NotAllowed("repetitions", self.repetitions, "an adaptive block repeats what its answers ask for")
 
 
+HEIGHTS = (-500, 500)  # of a face above the transducer's origin [mm]
+AREAS = (1, 2000)  # of a contact [mm2]
+
+
 @dataclass(frozen=True, slots=True)
 class Face:
     """Where the stimulus's face lies, and the area the finger touches it with; None where nobody stated it."""
@@ -102,8 +106,8 @@ class Face:
 
     def __post_init__(self) -> None:
         """Check ranges."""
-        check_range("height", self.height, -500, 500, "mm")
-        check_range("contact_area", self.contact_area, 1, 2000, "mm2")
+        check_range("height", self.height, *HEIGHTS, "mm")
+        check_range("contact_area", self.contact_area, *AREAS, "mm2")
 
     @property
     def frame(self) -> Frame:
