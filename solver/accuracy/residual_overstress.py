@@ -1,11 +1,10 @@
 """Estimate the overstress that relaxing tissues would still hold once an elastic finger slides steadily.
 
-The load path is marched on a coarse mesh in few steps: the press, then a slide as long as the skin follows the surface
-sideways, at whose end all of an elastic finger slips. A step is exact for a strain that grows evenly, so that few steps
-suffice.
+The load path is marched on a coarse mesh in few steps: the press, then a slide as long as the skin's displacement along
+the surface, at whose end all of an elastic finger slips. A step is exact for a strain that grows linearly, so that few
+steps suffice.
 """
 
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from time import perf_counter
@@ -13,36 +12,36 @@ from typing import Any
 
 import numpy as np
 
-from solver.accuracy.adaptivity import MARGIN
 from solver.accuracy.omitted_effects import RELAXATION, sideways, with_left_out
 from solver.continuation.finite_states import roughly
 from solver.continuation.small_states import settled_state
-from solver.equilibrium.finger import FiniteFinger, LinearFinger, relaxing_laws
-from solver.equilibrium.load_path import PRESSING_TIME, Aim, Way, way_of
-from solver.equilibrium.load_stepping import load_of
-from solver.equilibrium.relaxation import LinearTissue, RelaxingBody
+from solver.equilibrium.finger import FiniteFinger, LinearFinger
+from solver.equilibrium.load_path import PRESSING_TIME, Aim, way_of
 from solver.failures import SolveFailure
 from solver.mesh.mesher import Sizing
 from solver.prediction import Prediction
 from solver.scene import Scene
 from solver.scene.tables import Relaxation
 
-FINENESS_OF_MARCH = {"small": 2.0, "finite": 3.0}  # fineness of the meshes
-STEPS = {"small": (1, 2), "finite": (3, 3)}  # of the press, and of the slide
+FINENESS = 2.0  # elements to a tip radius
+MARGIN = 4.0  # by the indentation: height of the undeformed skin up to which contact is considered
+# Load steps of the press and of the slide. Against 24 of each at a fineness of 5, estimates of 44 scenes differ by 3 to
+# 7 % of themselves in the median, and by 4 % of the SED at most.
+PRESS_STEPS, SLIDE_STEPS = 1, 2
 
 
 @dataclass(frozen=True, slots=True)
 class ResidualOverstress:
-    """The overstress that remains, and when."""
+    """The overstress that remains, and its instant."""
 
-    part: float  # of the settled SED of the ending, by which it is larger [-]
-    slide_s: float  # after the slide began [s]
+    part: float  # surplus of the ending's SED by the settled SED [-]
+    slide_s: float  # since the slide began [s]
 
 
 def relaxing_scene(scene: Scene) -> Scene | None:
-    """Return the scene with tissues that relax: its own series, or else literature's towards its moduli.
+    """Return the scene with relaxing tissues: its own Prony series, or literature's with its moduli as long-term ones.
 
-    The bulk modulus is kept. None for tissue too compressible for that.
+    Bulk moduli do not relax. None for tissue too compressible for that.
     """
     if scene.materials.relax:
         return scene
@@ -60,7 +59,7 @@ def relaxing_scene(scene: Scene) -> Scene | None:
 
 
 def with_viscosity(prediction: Prediction) -> Prediction:
-    """Return `prediction` with the evidence on viscosity marched, where that can be. Raises Cancelled."""
+    """Return `prediction` with the evidence on viscosity from a load path, where there is one. Raises Cancelled."""
     scene, start = prediction.scene, perf_counter()
     if scene.materials.relax and scene.solve.course == "history":
         return prediction
@@ -83,7 +82,7 @@ def with_viscosity(prediction: Prediction) -> Prediction:
 
 
 def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
-    """Return the remaining overstress in the scene of `prediction`, whose skin gives the length of the slide.
+    """Return the remaining overstress for a `prediction`, whose skin determines the length of the slide.
 
     None where the coarse mesh has no such load path. Raises Cancelled.
     """
@@ -93,19 +92,17 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     direction = scene.loading.direction
     touching = prediction.mesh.skin[[state != "open" for state in prediction.skin.state]]
     slide = sideways(prediction.displacement, touching) if direction else 0.0
-    kind, depth = scene.solve.kinematics, scene.loading.depth
+    depth = scene.loading.depth
     slide_s = slide / scene.loading.speed if direction else 0.0
-    press, along = (np.arange(1, steps + 1) / steps for steps in STEPS[kind])
+    press, along = (np.arange(1, steps + 1) / steps for steps in (PRESS_STEPS, SLIDE_STEPS))
     aims = [Aim(PRESSING_TIME * part, depth * part, 0.0) for part in press.tolist()]
     if slide > 0.0:
         aims += [Aim(PRESSING_TIME + slide_s * part, depth, direction * slide * part) for part in along.tolist()]
     try:
-        if kind == "small":
-            way, at_last = _small(scene)
-        else:
-            finger = FiniteFinger.of(scene, Sizing(FINENESS_OF_MARCH[kind], depth, margin=MARGIN))
-            at_last = finger.sed_ending(roughly(finger, scene).u)
-            way = way_of(scene, finger, relaxing=True)
+        finger = _coarse_finger(scene.frictionless_press(depth))
+        state = settled_state(scene, finger) if isinstance(finger, LinearFinger) else roughly(finger, scene)
+        at_last = finger.sed_ending(finger.displacement(state))
+        way = way_of(scene, finger, relaxing=True)
         for aim in aims:
             way.go(aim)
     except SolveFailure:
@@ -113,20 +110,8 @@ def residual_overstress(prediction: Prediction) -> ResidualOverstress | None:
     return ResidualOverstress(abs(way.energies[-1][0] / at_last - 1.0), slide_s) if at_last > 0.0 else None
 
 
-def _small(scene: Scene) -> tuple[Way, float]:
-    """Return the untouched finger of a scene at the beginning of its course, and the settled SED [MPa]."""
-    finger, body = _rough(scene.frictionless_press(scene.loading.depth))
-    body = copy(body)  # each course has a past of its own
-    body.rest()
-    tissue = LinearTissue(body, (finger.ending.endings,))
-    way = Way(finger.newton, load_of(scene), scene.loading_per_mm, tissue=tissue)
-    return way, finger.sed_ending(finger.displacement(settled_state(scene, finger)))
-
-
 @lru_cache(maxsize=1)
-def _rough(scene: Scene) -> tuple[LinearFinger, RelaxingBody]:
-    """Return a rough mesh of a finger, settled and relaxing; surfaces of one finger follow each other and share it."""
-    coarse = LinearFinger.of(scene, Sizing(FINENESS_OF_MARCH["small"], scene.loading.depth, margin=4.0))
-    body = RelaxingBody(coarse.geometry.mesh, relaxing_laws(scene.materials), checked=True)
-    body.ready(PRESSING_TIME / STEPS["small"][0])
-    return coarse, body
+def _coarse_finger(scene: Scene) -> LinearFinger | FiniteFinger:
+    """Return a finger on a coarse mesh, cached for consecutive surfaces of one finger."""
+    kind = FiniteFinger if scene.solve.kinematics == "finite" else LinearFinger
+    return kind.of(scene, Sizing(FINENESS, scene.loading.depth, margin=MARGIN))

@@ -1,5 +1,7 @@
 """Quadrature over the receptor endings in a mesh: probes and weights."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from solver.arrays import Array, Indices
@@ -43,6 +45,14 @@ def middle(finger: FingerMesh, centre: Array, receptor: Receptor) -> Endings:
     depth = receptor.depth + _ASIDE * np.array([-1.0, -1.0, 1.0, 1.0])
     probes, tangent = _probes(finger, centre, arc, depth), finger.outline.tangent(arc)
     return Endings(probes, np.full(4, 0.25), np.zeros(4, np.int64), 1, tangent)
+
+
+def join(one: Endings, other: Endings) -> Endings:
+    """Return the endings of both."""
+    probes = (np.concatenate([getattr(e.probes, f.name) for e in (one, other)]) for f in fields(Probes))
+    weights, tangent = (np.concatenate(pair) for pair in ((one.weights, other.weights), (one.tangent, other.tangent)))
+    patch = np.concatenate([one.patch, one.count + other.patch])
+    return Endings(Probes(*probes), weights, patch, one.count + other.count, tangent)
 
 
 def _gauss(start: Array, stop: Array) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from solver.arrays import Array, Flags, Indices
 from solver.body import VALUES, Body, Endings, Patches
 from solver.body.finite import FiniteBody, FinitePatches
 from solver.body.linear import LinearBody, LinearPatches
-from solver.body.receptor import endings, middle
+from solver.body.receptor import endings, join, middle
 from solver.constitutive import Law, Moduli, NeoHooke, Ogden, Prony
 from solver.contact import SkinCompression, width
 from solver.equilibrium import EquilibriumState, Newton
@@ -79,9 +79,10 @@ class Finger(ABC, Generic[Placed]):
         return self.endings(np.zeros(1))
 
     @cached_property
-    def point(self) -> Placed:
-        """The midpoint of the reference ending."""
-        return self.patches(middle(self.geometry, self.body.centre, self.scene.receptor))
+    def ending_and_midpoint(self) -> Placed:
+        """The reference ending, then its midpoint."""
+        midpoint = middle(self.geometry, self.body.centre, self.scene.receptor)
+        return self.patches(join(self.ending.endings, midpoint))
 
     @cached_property
     def row(self) -> Placed:
@@ -108,9 +109,9 @@ class Finger(ABC, Generic[Placed]):
         return self.ending_and_middle(states)[:, 0]
 
     def ending_and_middle(self, states: Sequence[EquilibriumState]) -> Array:
-        """Return every quantity at the reference ending and in its middle (c, q, 2) of several states."""
-        displacement = self.recover(states, self.ending, self.point)
-        return np.stack([patch.responses(displacement)[:, 0].T for patch in (self.ending, self.point)], axis=2)
+        """Return every quantity at the reference ending and at its midpoint (c, q, 2) of several states."""
+        patches = self.ending_and_midpoint
+        return np.moveaxis(patches.responses(self.recover(states, patches)), 2, 0)
 
     def numbers(self, states: Sequence[EquilibriumState]) -> Array:
         """Return SED of the ending, normal and tangential force along +x (c, 3) of several states."""
@@ -123,16 +124,16 @@ class Finger(ABC, Generic[Placed]):
         They are the SED, both forces, depth, the bone's shift along +x, contact width, the middle's SED, and every
         quantity at the ending.
         """
-        return self._numbers(states, self.recover(states, self.ending, self.point))
+        return self._numbers(states, self.recover(states, self.ending_and_midpoint))
 
     def _numbers(self, states: Sequence[EquilibriumState], displacement: Array) -> Array:
-        responses = self.ending.responses(displacement)[:, 0].T
+        responses = self.ending_and_midpoint.responses(displacement)  # (q, 2, c)
         rest = [(*s.force[::-1], s.load.depth, 0.0 - s.load.travel, self.contact_width(s)) for s in states]
-        return np.column_stack([responses[:, 0], rest, self.point.average(displacement)[0], responses])
+        return np.column_stack([responses[0, 0], rest, responses[0, 1], responses[:, 0].T])
 
     def numbers_and_row(self, states: Sequence[EquilibriumState]) -> Array:
         """Return `all_numbers`, then the SED of each ending of the row (c, COUNT + r); nan where it ends."""
-        displacement = self.recover(states, self.ending, self.point, self.row)
+        displacement = self.recover(states, self.ending_and_midpoint, self.row)
         return np.hstack([self._numbers(states, displacement), self.row.average(displacement).T])
 
     def responses(self, states: Sequence[EquilibriumState]) -> Array:

@@ -4,22 +4,26 @@ Where tissues relax, a wait for their relaxation follows. `CourseSteps` has the 
 """
 
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
 from solver._kernels.compiling import OPEN, STICK
+from solver.arrays import Array
 from solver.body import Patches
 from solver.equilibrium import EquilibriumState, ForceLoad, LoadState, Newton, lower_onto_surface
 from solver.equilibrium.finger import Finger, FiniteFinger, LinearFinger, relaxing_laws
 from solver.equilibrium.load_stepping import StepControl, advance, load_of, solve_under_forces
 from solver.equilibrium.relaxation import FiniteTissue, LinearTissue, RelaxingBody, Tissue
 from solver.failures import NotConverged, SolveFailure, at_end_of_path, beyond_friction
+from solver.mesh import Mesh
 from solver.progress import report_progress
 from solver.scene import Scene
-from solver.scene.tables import Loading
+from solver.scene.tables import Loading, Materials
 
 PRESSING_TIME = 1.0  # duration of the press [s]
 DRAGGING_TIME = 1.0  # duration of the growth of a given tangential force [s]
@@ -113,7 +117,7 @@ class Way:
         `tolerance` [mm] is that of displacements where depth and travel are given. `tissue` is one that relaxes.
         """
         self.tissue = tissue
-        self.energies: list[tuple[float, ...]] = []  # of its endings, at every instant after the first [MPa]
+        self.energies: list[Array] = []  # of its endings, at every instant after the first [MPa]
         self.sense = 0  # direction of the friction force on relaxing skin; 0: unknown
         self.newton, self._tolerance = newton, tolerance
         self.frictionless = friction.frictionless
@@ -227,12 +231,18 @@ def way_of(scene: Scene, finger: Finger[Patches], *, relaxing: bool = False) -> 
 
 def tissue_of(scene: Scene, finger: Finger[Patches]) -> Tissue:
     """Return the relaxing tissues of a scene's finger, at rest."""
-    laws = relaxing_laws(scene.materials)
     if isinstance(finger, FiniteFinger):
-        return FiniteTissue(finger.body, laws, (finger.ending, finger.point))
+        return FiniteTissue(finger.body, relaxing_laws(scene.materials), finger.ending_and_midpoint)
     assert isinstance(finger, LinearFinger)
-    body = RelaxingBody(finger.geometry.mesh, laws, checked=True)
-    return LinearTissue(body, (finger.ending.endings, finger.point.endings))
+    body = copy(_relaxing_body(finger.geometry.mesh, scene.materials))
+    body.rest()
+    return LinearTissue(body, finger.ending_and_midpoint.endings)
+
+
+@lru_cache(maxsize=1)
+def _relaxing_body(mesh: Mesh, materials: Materials) -> RelaxingBody:
+    """Return the relaxing body of a mesh, cached for consecutive load paths."""
+    return RelaxingBody(mesh, relaxing_laws(materials), checked=True)
 
 
 def follow(

@@ -17,6 +17,7 @@ its speed.
 """
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -41,8 +42,8 @@ class Tissue(Protocol):
         """Prepare a time step [s] and return Newton's method on the body of that step."""
         ...
 
-    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
-        """Take the step that was prepared, to `state`; return the energy stored at each ending [MPa]."""
+    def commit(self, state: EquilibriumState, step: float) -> Array:
+        """Take the step that was prepared, to `state`; return the energy stored at each ending (r,) [MPa]."""
         ...
 
 
@@ -56,7 +57,7 @@ class RelaxingBody:
             check_terms(laws)
             check_driven(mesh)
             check_held(mesh)
-        self.mesh, self._laws = mesh, laws
+        self.mesh = mesh
         self._g, self._tau = _terms(laws, mesh.region)
         shear = [Moduli(law.shear, -2.0 / 3.0 * law.shear) for law in laws]
         self.elastic = Elastic.of(mesh, shear)  # of the instantaneous shear moduli alone
@@ -65,20 +66,25 @@ class RelaxingBody:
         self._left = np.zeros(
             (len(mesh.elements), 18, self._g.shape[1])
         )  # h of each term, as displacements of the elements' nodes
-        self._steps: dict[str, LinearBody] = {}
         self._next: tuple[Callable[[Array], Array], float] | None = None
 
+        @lru_cache(maxsize=KEPT)
+        def elastic_body(step: float) -> LinearBody:
+            return LinearBody.of(mesh, [law.within(step) for law in laws], checked=True)
+
+        self._elastic_body = elastic_body
+
     def rest(self) -> None:
-        """Return to rest for another load path; factors for the same step lengths are kept."""
+        """Return to rest for another load path; a copy of the body shares the factors of its step lengths."""
         self.displacement, self._left = np.zeros_like(self.displacement), np.zeros_like(self._left)
-        self._steps, self._next = dict(self._steps), None
+        self._next = None
 
     def ready(self, step: float, prescribed: Array | None = None) -> CondensedLinear:
         """Return the condensed body at the end of a `step` [s], with the stress of its past as a load.
 
         Held nodes are then displaced by `prescribed` (nodes, 2) [mm] relative to the drive.
         """
-        form = self._form(step)
+        form = self._elastic_body(float(f"{step:.9e}"))  # steps that differ by round-off share factors
         past = self._past(step)
         load = -self.elastic.forces(past.reshape(-1, 9, 2))
         moved = np.zeros(self.mesh.nodes.shape)
@@ -135,16 +141,6 @@ class RelaxingBody:
         ages = step / self._tau
         left = np.einsum("eim,em->ei", self._left, self._g * np.exp(-ages))
         return left - local * np.sum(self._g * mean_decay(ages), axis=1)[:, None]
-
-    def _form(self, step: float) -> LinearBody:
-        """Return the elastic body of a step length [s]."""
-        key = f"{step:.9e}"
-        if key not in self._steps:
-            while len(self._steps) >= KEPT:
-                del self._steps[next(iter(self._steps))]  # the least recently used
-            self._steps[key] = LinearBody.of(self.mesh, [law.within(step) for law in self._laws], checked=True)
-        self._steps[key] = self._steps.pop(key)
-        return self._steps[key]
 
 
 class CondensedRelaxing(CondensedFinite):
@@ -216,44 +212,36 @@ def _at_rest(laws: Sequence[Prony], region: Indices) -> Past:
 class LinearTissue:
     """Relaxing tissues at small strain."""
 
-    def __init__(self, body: RelaxingBody, watched: Sequence[Endings]) -> None:
+    def __init__(self, body: RelaxingBody, endings: Endings) -> None:
         """Start in the state of `body`."""
-        self._body, self._watched = body, watched
+        self._body, self._endings = body, endings
 
     def ready(self, step: float) -> Newton:
         """Do as `Tissue` says."""
         return Newton(self._body.ready(step))
 
-    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:  # noqa: ARG002 - `ready` has it
+    def commit(self, state: EquilibriumState, step: float) -> Array:  # noqa: ARG002 - `ready` has it
         """Do as `Tissue` says."""
         self._body.advance(state.u)
-        return tuple(float(self._body.average(place)[0]) for place in self._watched)
+        return self._body.average(self._endings)
 
 
 class FiniteTissue:
-    """Relaxing tissues at finite strain, and the past at the watched endings."""
+    """Relaxing tissues at finite strain, and the past at the endings."""
 
-    def __init__(self, body: FiniteBody, laws: Sequence[Prony], watched: Sequence[FinitePatches]) -> None:
+    def __init__(self, body: FiniteBody, laws: Sequence[Prony], patches: FinitePatches) -> None:
         """Start at rest; terms and instantaneous moduli come from `laws` by region."""
-        self._relaxing, self._watched = CondensedRelaxing(body, laws), watched
+        self._relaxing, self._patches = CondensedRelaxing(body, laws), patches
         self._newton = Newton(self._relaxing)
-        self._pasts: list[Past] = [
-            _at_rest(laws, body.mesh.region[patches.endings.probes.element]) for patches in watched
-        ]
+        self._past = _at_rest(laws, body.mesh.region[patches.endings.probes.element])
 
     def ready(self, step: float) -> Newton:
         """Do as `Tissue` says."""
         self._relaxing.ready(step)
         return self._newton
 
-    def commit(self, state: EquilibriumState, step: float) -> tuple[float, ...]:
+    def commit(self, state: EquilibriumState, step: float) -> Array:
         """Do as `Tissue` says."""
         self._relaxing.commit(state.u, step)
-        self._pasts = [
-            past.after(at.deformation(state.u), step) for past, at in zip(self._pasts, self._watched, strict=True)
-        ]
-        means: list[float] = []
-        for past, at in zip(self._pasts, self._watched, strict=True):
-            energy = at.energy(state.u) + past.energy()
-            means.append(float(energy @ at.endings.weights / at.endings.weights.sum()))
-        return tuple(means)
+        self._past = self._past.after(self._patches.deformation(state.u), step)
+        return self._patches.endings.means(self._patches.energy(state.u) + self._past.energy())
