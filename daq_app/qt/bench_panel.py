@@ -89,6 +89,7 @@ class BenchPanel(Panel):
             self._send(view.connect)
         elif uri := self._chosen():
             self._send(Connect(uri))
+            self._show_begin()
 
     def _leave(self, *, connecting: bool = False) -> None:
         if connecting:
@@ -110,8 +111,11 @@ class BenchPanel(Panel):
         self._choice.setCurrentIndex(at)
         if at < 0:
             self._choice.setEditText(wanted)
+        self._show_begin()
+
+    def _show_begin(self) -> None:
         if (typed_in := self._choice.lineEdit()) is not None:
-            typed_in.setCursorPosition(0)
+            typed_in.setCursorPosition(0)  # of an address that is too long the kind of transducer is seen
 
     def _built(self) -> QWidget:
         inside, fields = QWidget(), self._fields

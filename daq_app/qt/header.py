@@ -16,6 +16,7 @@ from daq_app.window.view_course import Button
 from daq_app.wording import tr
 
 ONE_ROW = 1100  # width in which subject and lamp stand beside each other, before the font's scale [px]
+LEAST = 2 * GRID  # height of what to do now, where it has no words [px]
 MARKS = {"wrong": "■", "look": "▲"}  # before the sentence of a banner
 
 
@@ -120,7 +121,7 @@ class ToDo(Panel):
         self._small = False
         self._arrow = Arrow()
         self.sentence = label("", "headline", wrap=True)
-        self.sentence.setMinimumHeight(2 * GRID)
+        self.sentence.setMinimumHeight(LEAST)
         self.primary = button("", tr("do it"), primary, "primary")
         self.second = button(tr("Review  F4"), tr("look at the session that has ended"), review)
         self.second.hide()
@@ -143,6 +144,14 @@ class ToDo(Panel):
             self.primary.setAccessibleName(f"{primary.label}: {sentence}")
             self.primary.setEnabled(primary.enabled)
         self.primary.setVisible(primary is not None)
+        if self.isVisible() and not self._small:  # what is below stays in place when a shorter sentence comes
+            tallest = max(self.sentence.minimumHeight(), self.sentence.heightForWidth(self.sentence.width()))
+            self.sentence.setMinimumHeight(tallest)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        if event.size().width() != event.oldSize().width():
+            self.sentence.setMinimumHeight(LEAST)
 
     def show_small(self, small: bool) -> None:
         """Use smaller type, and one button below the other, where there is little room."""
@@ -152,6 +161,7 @@ class ToDo(Panel):
             self._buttons.setDirection(ways.BottomToTop if small else ways.LeftToRight)
             regrade(self.sentence, "title" if small else "headline", "role")
             self.setMinimumHeight(0)
+            self.sentence.setMinimumHeight(LEAST)
 
 
 class Arrow(QWidget):

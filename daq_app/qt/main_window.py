@@ -71,6 +71,7 @@ class MainWindow(QMainWindow):
         self.tablet = tablet
         self.side = SubjectSide(self, bridge, self.subject, tablet, self.course, self.act)
         self.side.line_changed.connect(self._line_changed)
+        self.subject.closed.connect(self._subject_closed)
         self.keyboard = self.side.keyboard
         self.rooms = Rooms(bridge, scale, self.rail, Menus(self, self.act))
         self.keys = KeysPage(self, scale)
@@ -255,7 +256,9 @@ class MainWindow(QMainWindow):
             self._fit()
             (self.page.subject if page == 0 else self).setFocus()
             self.subject.given_with = None  # an answer of another session
-            if page == 0:
+            if page == 1:
+                self.side.begin()
+            else:
                 self.page.subject.clear()  # the next session is not begun by whoever was there last
                 self.page.look_for_unfinished()
 
@@ -267,6 +270,10 @@ class MainWindow(QMainWindow):
             self._warn_of_tablet()
         if self.bridge.view.course is None:
             self._form_changed()
+
+    def _subject_closed(self) -> None:
+        if self.bridge.recording:
+            self.notice.warn(tr("The subject's window was closed; F6 brings it again."))
 
     def _warn_of_tablet(self) -> None:
         if self.tablet is not None and self.bridge.recording and not self.tablet.server.connected:

@@ -235,7 +235,7 @@ class ReviewRoom(QWidget):
     def _list(self) -> None:
         self.recent.clear()
         for place in recent_sessions():
-            item = QListWidgetItem(place.name)
+            item = QListWidgetItem("\n".join(place.name.rsplit("_", 2)))  # subject, protocol, time: none is cut off
             item.setToolTip(str(place))
             item.setData(Qt.ItemDataRole.UserRole, str(place))
             self.recent.addItem(item)

@@ -138,6 +138,11 @@ class SubjectSide(QObject):
         self._subject.raise_()
         self._subject.activateWindow()
 
+    def begin(self) -> None:
+        """Show the page on a second screen from the first step on; the keyboard stays where it is."""
+        if self._tablet is None and self._with_people():
+            self._place(activating=False)
+
     def show_view(self, view: View) -> None:
         """Show what the subject sees now, small in the mirror too; bring the page for an answer that is due."""
         session, subject = self._bridge.state.session, self._subject
@@ -186,14 +191,17 @@ class SubjectSide(QObject):
 
     def _bring(self) -> None:
         """Bring the subject's window for an answer that is due, and the keyboard unless somebody is typing."""
-        session = self._bridge.state.session
-        if not self._subject.scoring or session is None or session.people == "simulated people":
+        if not self._subject.scoring or not self._with_people():
             return
         active = QGuiApplication.applicationState() == Qt.ApplicationState.ApplicationActive
         if active and self.keyboard.typed_in() is None:
             self.show()
         else:
             self._place(activating=False)
+
+    def _with_people(self) -> bool:
+        session = self._bridge.state.session
+        return session is not None and session.people != "simulated people"
 
     def _answered(self, event: Message) -> None:
         self._bridge.send(event)

@@ -28,6 +28,7 @@ class SubjectWindow(QWidget):
 
     answered = Signal(object)  # Scored, MagnitudeEstimate or PairedChoice
     screen_changed = Signal()
+    closed = Signal()  # by somebody, not by the program
 
     def __init__(self, scale: float, now: Callable[[], float]) -> None:
         super().__init__()
@@ -192,6 +193,7 @@ class SubjectWindow(QWidget):
         """Only hide: an answer that is being given is not lost."""
         event.ignore()
         self.hide()
+        self.closed.emit()
 
     def _message_page(self) -> QWidget:
         page = QWidget()

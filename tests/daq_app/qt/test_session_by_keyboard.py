@@ -4,9 +4,10 @@ import os
 import signal
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QRect, Qt
 from PySide6.QtGui import QCloseEvent, QGuiApplication
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
@@ -179,6 +180,37 @@ def test_closing_while_a_session_is_recorded_asks_once_and_leaves_a_session_that
         window.closeEvent(event)
         assert event.isAccepted() is leaves
         assert "close once more" in window.notice._words.text()
+
+
+def test_on_a_second_screen_the_subject_sees_every_page_from_the_first_on_and_the_keyboard_stays(driver, monkeypatch):
+    window = driver.window
+    window.subject.hide()
+    other = SimpleNamespace(availableGeometry=lambda: QRect(1500, 0, 800, 600))
+    monkeypatch.setattr(QGuiApplication, "screens", lambda: [window.screen(), other])
+    begin(driver, "P12")
+    assert window.subject.isVisible()
+    assert "Keep your fingers off" in window.subject._text.text()
+    assert window.subject.testAttribute(Qt.WidgetAttribute.WA_ShowWithoutActivating)
+    window.subject.close()
+    assert "F6 brings it again" in window.notice._words.text()
+    QTest.keyClick(window, SPACE)
+    driver.phase("ready", "stroking")
+    assert not window.subject.isVisible()  # whoever closed it is not contradicted before an answer is due
+    driver.phase("scoring")
+    driver.until(window.subject.isVisible, "the page for an answer")
+
+
+def test_what_is_below_the_sentence_stays_in_place_when_a_shorter_one_comes(driver):
+    window, to_do = driver.window, driver.window.to_do
+    window.resize(1100, 900)
+    long = "Mount sample K50, its arrow away from the subject. Then press Space to zero. " * 2
+    places = []
+    for sentence in (long, "Stroke on K50 is being recorded."):
+        to_do.show_what(sentence, None, 1)
+        driver.application.processEvents()
+        places.append(window.middle.mapTo(window, window.middle.rect().topLeft()).y())
+    assert places[0] == places[1]
+    window.resize(1440, 900)
 
 
 def test_a_warning_stands_beside_a_banner_and_gives_way_to_what_the_session_says(driver):
