@@ -1,4 +1,4 @@
-"""Types of arrays that every module shares, two-by-two matrices, and the arrays that compiled loops take together."""
+"""Array types that all modules share, two-by-two matrices, and the groups of arrays that compiled loops take."""
 
 from typing import NamedTuple
 
@@ -25,19 +25,19 @@ def inverse(matrices: Array) -> Array:
 
 
 class ElementGeometry(NamedTuple):
-    """What is integrated over e elements, whatever they are made of; q = 9 quadrature points."""
+    """Integrals over e elements that do not depend on the material; q = 9 quadrature points."""
 
     grad_x: Array  # as in `ElementArrays`
     grad_y: Array
     weight: Array
     modes: Array
     laplace: Array
-    centre: Array  # (e, 2) from which x and y of the modes are counted [mm]
-    combination: Array  # (e, 3, 3) the modes by 1, x, y: the inverse of the Cholesky factor of their mass
+    centre: Array  # (e, 2) origin of x and y in the modes [mm]
+    combination: Array  # (e, 3, 3) the modes by 1, x, y: inverse Cholesky factor of their mass matrix
 
 
 class ElementArrays(NamedTuple):
-    """Elements of nine nodes and what they are made of: e elements, q = 9 quadrature points."""
+    """Geometry and material of e nine-node elements; q = 9 quadrature points."""
 
     grad_x: Array  # (e, q, 9) gradients of the shape functions at the quadrature points [1/mm]
     grad_y: Array  # (e, q, 9)
@@ -52,41 +52,41 @@ class ElementArrays(NamedTuple):
 
 
 class ElementSystem(NamedTuple):
-    """Forces and tangents of e elements whose centre nodes are eliminated inside them; n unknowns."""
+    """Forces and tangents of e elements whose centre nodes are condensed; n unknowns."""
 
     tangent: Array  # (e, 16, 16) of the outer nodes, lower half [N/mm per mm]
     force: Array  # (n,) internal forces [N/mm]
     recovery_matrix: Array  # (e, 2, 17): displacement of the centre = -(recovery_matrix @ (outer displacements, 1))
     condensed_inverse: Array  # (e, 3) of the centre's stiffness: xx, xy, yy
-    dilate: Array  # (e, 3, 18) derivative of the modes of ln J
-    volume: Array  # (e, 3) those modes
-    more_force: Array  # (e, 18) of relaxing tissue, ordered as in `ElementWork`; (0, 18) where there is none
-    more_tangent: Array  # (e, 18, 18) of it, or (0, 18, 18)
+    dilate: Array  # (e, 3, 18) derivatives of the modes of ln J by displacements
+    volume: Array  # (e, 3) modes of ln J
+    overstress_force: Array  # (e, 18) of the overstress, ordered as in `ElementWork`; (0, 18) without relaxation
+    overstress_tangent: Array  # (e, 18, 18) of the overstress; (0, 18, 18) without relaxation
 
 
 class ElementWork(NamedTuple):
     """Memory for one element. Sums over quadrature points are products of small matrices of a fixed size.
 
-    Their sixteen columns are x of the outer nodes, then y; the centre's come last.
+    Columns are x of the eight outer nodes, y of these, and x and y of the centre.
     """
 
-    turned: Array  # (q, 4) inverse of F, transposed: xx, xy, yx, yy
-    exceeds: Array  # (q, 4) F less that
-    h: Array  # (q, 18) gradients of shape functions times the former: in the deformed body
-    s: Array  # (q, 18) and times the latter
-    wide: Array  # (q, 3) weights times modes
-    push: Array  # (q,) shear modulus as it has grown, by weight
-    more: Array  # (q,) how fast it grows, by weight
-    bend: Array  # (q,) the modulus less the pressure, by weight
+    f_inv_t: Array  # (q, 4) F^-T: xx, xy, yx, yy
+    f_diff: Array  # (q, 4) F - F^-T
+    h: Array  # (q, 18) F^-T times gradients of shape functions: in the deformed body
+    s: Array  # (q, 18) F - F^-T times these gradients
+    wide: Array  # (q, 3) weights times pressure modes
+    push: Array  # (q,) weight times present shear modulus
+    shear_slope: Array  # (q,) weight times twice its derivative by Q
+    bend: Array  # (q,) weight times (shear modulus - pressure)
     d: Array  # (3, 18) derivatives of the modes of ln J
-    f: Array  # (18,) forces
-    by_x: Array  # (9, 16) products of deformed gradients, by x of a node
+    f: Array  # (18,) internal forces
+    by_x: Array  # (9, 16) integrals of products of deformed gradients, by x of a node
     by_y: Array  # (9, 16) and by its y
-    laplace: Array  # (9, 9) as in `ElementArrays`, times the shear modulus as it has grown [N/mm per mm]
-    left: Array  # (18, 5) the tangent less the products is left right: three modes of pressure, and the centre
+    laplace: Array  # (9, 9) as in `ElementArrays`, times the present shear modulus [N/mm per mm]
+    left: Array  # (18, 5) left @ right is the tangent's part from three pressure modes and the centre
     right: Array  # (5, 16)
-    own: Array  # (18, 18) what stiffening and relaxing tissue add to the tangent
-    product: Array  # (16, 16) of left and right
+    own: Array  # (18, 18) terms of stiffening and overstress in the tangent
+    product: Array  # (16, 16) left @ right
 
 
 class BodyState(NamedTuple):
@@ -97,41 +97,41 @@ class BodyState(NamedTuple):
 
 
 class ShapeFunctions(NamedTuple):
-    """The shape functions of nine nodes at the quadrature points."""
+    """Shape functions of the nine nodes at the quadrature points."""
 
     values: Array  # (q, 9)
-    along: Array  # (q, 9) slopes along the first local coordinate
-    up: Array  # (q, 9) and along the second
+    along: Array  # (q, 9) derivatives by the first local coordinate
+    up: Array  # (q, 9) by the second
     weights: Array  # (q,)
 
 
 class SymbolicFactorization(NamedTuple):
-    """Parts of a body, p of them, children before parents, and the unknowns n that each eliminates.
+    """Plan of an elimination: p parts of a body, children before parents, and the unknowns that each part eliminates.
 
-    Unknowns are numbered in the order of their elimination; those of the skin, m, come last: x, y of each of its nodes.
+    The n unknowns are numbered in elimination order; the m of the skin come last, x and y of each of its nodes.
     """
 
     unknown: Narrow  # (e, 16) of the elements' outer nodes, -1 where fixed
     size: int  # n
     start: Narrow  # (p,) first unknown eliminated in each part
-    inner: Narrow  # (p,) how many are
-    border: Narrow  # (p,) how many are passed on
-    children: Narrow  # (p, 2) parts joined in each, -1 in a leaf
-    border_at: Narrow  # (p,) where each part's border begins in `numbers` and `place`
+    inner: Narrow  # (p,) number of unknowns eliminated
+    border: Narrow  # (p,) number of unknowns passed on
+    children: Narrow  # (p, 2) child parts, -1 in a leaf
+    border_at: Narrow  # (p,) start of each part's border in `numbers` and `place`
     numbers: Narrow  # unknowns of all borders
-    place: Narrow  # where each of them stands in the front of the parent
-    run: Narrow  # where in its border the run of neighbours ends that are neighbours there too
-    factor_at: Indices  # (p,) where each part's factor begins
-    wait_at: Indices  # (p,) where each part's border waits for the parent
+    place: Narrow  # position of each in the front of the parent
+    run: Narrow  # where in its border the run ends of entries whose positions are consecutive
+    factor_at: Indices  # (p,) start of each part's factor
+    wait_at: Indices  # (p,) start of each part's Schur complement in `waiting`
     leaf: Narrow  # (p, 2) range of `order` that belongs to each leaf
     order: Narrow  # (e,) elements, leaf after leaf
-    at: Narrow  # (e, 16) in that order: where an element's unknowns stand in the front of its leaf, -1 where fixed
-    factors: int  # numbers that all factors hold
-    waiting: int  # numbers that wait at once
+    at: Narrow  # (e, 16) positions of their unknowns in the front of their leaf, in this order; -1 where fixed
+    factors: int  # size of the memory for factors
+    waiting: int  # size of the memory for Schur complements
 
 
 class Factors(NamedTuple):
-    """The factors of an elimination, and where they stand; the integer arrays are a SymbolicFactorization's."""
+    """The factors of an elimination and their places; the integer arrays are those of a SymbolicFactorization."""
 
     start: Narrow
     inner: Narrow
@@ -144,22 +144,22 @@ class Factors(NamedTuple):
 
 
 class CondensedArrays(NamedTuple):
-    """A linearised body as its skin of k nodes feels it: x, y of one node, x, y of the next."""
+    """A linearised body condensed to its skin of k nodes: x, y of one node, x, y of the next."""
 
     stiffness: Array  # (2 k, 2 k) [N/mm per mm]
-    force: Array  # (2 k,) of the skin on the surface, were there no surface [N/mm]
+    force: Array  # (2 k,) reaction of the surface at zero step [N/mm]
 
 
 class Skin(NamedTuple):
     """The skin that may touch: k nodes."""
 
-    held: Narrow  # (k,) whether a node is held: along x HELD_X, along y HELD_Y, both their sum
-    middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformed skin, else 0
-    fixed_length: Array  # (k,) skin that each node stands for whatever the state [mm]
+    held: Narrow  # (k,) HELD_X, HELD_Y or their sum where displacements are prescribed, else 0
+    middle: Narrow  # (k,) 1 at the middle of an edge whose length follows the deformation, else 0
+    fixed_length: Array  # (k,) tributary length whatever the state [mm]
 
 
 class ContactControl(NamedTuple):
-    """Which of depth and travel follow from forces, in one linear system, and how often states may change."""
+    """Which of depth and travel follow from prescribed forces in one linear system, and how often states may change."""
 
     kind: int  # DEPTH_GIVEN, PUSH_GIVEN or DRAG_GIVEN
     drag: float  # of the surface along +x [N/mm]
@@ -169,52 +169,52 @@ class ContactControl(NamedTuple):
 
 
 class LoadArguments(NamedTuple):
-    """What the surface does."""
+    """Position and friction of the surface."""
 
-    depth: float  # how far it has risen [mm]
+    depth: float  # rise of the surface [mm]
     mu: float  # coefficient of friction [-]
-    tau: float  # bound of its traction [MPa]
-    sense: int  # +1, -1: all that touches slips, the friction force pointing there; 0: sticks, slips and turns round
+    tau: float  # traction bound [MPa]
+    sense: int  # +1, -1: touching nodes slip, with friction in this sense; 0: they stick, slip and reverse
 
 
 class SkinPosition(NamedTuple):
-    """Where the skin's nodes are in relation to the surface."""
+    """Positions of the skin's nodes relative to the surface."""
 
     x: Array  # (k,) along the surface [mm]
-    above: Array  # (k,) over it [mm]
-    anchor: Array  # (k,) positions along it where nodes stick [mm]
+    above: Array  # (k,) height over it [mm]
+    anchor: Array  # (k,) positions along it at which nodes stick [mm]
 
 
 class ContactStates(NamedTuple):
     """States of the skin's k nodes and the forces on them."""
 
     state: Narrow  # (k,) OPEN, STICK, SLIP or SHEAR_LIMITED
-    sense: Narrow  # (k,) direction of the friction force where they slip
+    sense: Narrow  # (k,) +1 or -1: sense of the friction force where they slip
     reaction: Array  # (k, 2) forces of the surface on them [N/mm]
 
 
 class ContactSystem(NamedTuple):
-    """The linear system of the skin's contact, and memory for it: n = 2 k + 3 unknowns at most."""
+    """The linear system of contact and memory for it: n = 2 k + 3 unknowns at most."""
 
-    length: Array  # (k,) length of skin on which a bound acts that each node stands for [mm]
+    length: Array  # (k,) length of skin on which the traction bound acts at each node [mm]
     free: Narrow  # (n,) the unknowns, displacements or forces
     matrix: Array  # (n n,)
     right: Array  # (n, 4)
     steps: Array  # (2 k, 4) of the skin: to equilibrium, and by depth, mu and travel of the surface along +x
-    motion: Array  # (2,) change of depth and travel in the first of them, where forces are given [mm]
+    motion: Array  # (2,) changes of depth and travel in the first column, for prescribed forces [mm]
 
 
 class StateChanges(NamedTuple):
-    """States of the skin's k nodes that a solution calls for."""
+    """States of the skin's k nodes that a solution requires."""
 
     state: Narrow  # (k,)
     sense: Narrow  # (k,)
-    badness: Array  # (k,) how badly each node contradicts its own [N/mm]; -1 where it does not
+    violation: Array  # (k,) how much each node violates its present state [N/mm]; -1 without contradiction
 
 
 class Slack(NamedTuple):
-    """What is round-off of forces and heights, by the largest of each."""
+    """Round-off of forces and heights, relative to the largest of each."""
 
     force: float  # [N/mm]
     height: float  # [mm]
-    by_height: float  # the largest force by the largest height [N/mm per mm]
+    by_height: float  # largest force by largest height [N/mm per mm]

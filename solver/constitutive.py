@@ -1,9 +1,9 @@
 """Energy, stress and tangent of the tissues, a class each; the lists of materials and of laws are at the foot.
 
-At small strain gradients are those of the displacement. At finite strain, in plane strain, F is (..., 2, 2) and
-F_zz = 1. W is energy per undeformed volume [MPa], P = dW/dF the nominal stress (first Piola-Kirchhoff) and A = dP/dF.
-Every law at finite strain is W = shape(Q) + lambda/2 (ln J)^2 with Q = tr C - 3 - 2 ln J >= 0, so that elements may
-replace ln J in the last term by a best fit of it.
+At small strain, gradients are those of the displacement. At finite strain F is (..., 2, 2) with F_zz = 1 (plane
+strain). W is energy per undeformed volume [MPa], P = dW/dF the nominal stress (first Piola-Kirchhoff) and A = dP/dF.
+Every law at finite strain is W = G/2 shape(Q) + lambda/2 (ln J)^2 with Q = tr C - 3 - 2 ln J >= 0. So elements may
+replace the logarithm in the last term by a best fit.
 """
 
 from dataclasses import dataclass, replace
@@ -14,13 +14,13 @@ import numpy as np
 from solver.arrays import Array, determinant, inverse
 
 PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law
-HUMAN_SKIN = 9.0  # and that of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
-NEAR = 0.04  # Q up to which the series serves: further on, nothing is lost by differences
-TERMS = 14  # of it: enough up to an exponent of 20
+HUMAN_SKIN = 9.0  # Ogden's exponent of human skin (ascribed to Shergold and Fleck 2004; docs/scene-file.md)
+NEAR = 0.04  # Q up to which the series is used: above, the closed form loses no digits
+TERMS = 14  # of the series: enough up to an exponent of 20
 
 
 class Elasticity(Protocol):
-    """What elements ask of a material."""
+    """Elastic constants that elements need of a material."""
 
     @property
     def shear(self) -> float:
@@ -35,7 +35,7 @@ class Elasticity(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Isotropic:
-    """An elastic tissue of two constants, those of its small strains.
+    """An isotropic elastic tissue, given by the two constants of small strain.
 
     >>> round(Isotropic(0.08, 0.48).shear, 8), round(Isotropic(0.08, 0.48).lame, 8)
     (0.02702703, 0.64864865)
@@ -62,7 +62,7 @@ class Hooke(Isotropic):
 
 @dataclass(frozen=True, slots=True)
 class Moduli:
-    """The two moduli by which elements are integrated."""
+    """The two moduli in the integrals of an element."""
 
     shear: float  # [MPa]
     lame: float  # Lamé's first constant [MPa]
@@ -80,10 +80,10 @@ class Moduli:
 
 @dataclass(frozen=True, slots=True)
 class Prony(Isotropic):
-    """Linear viscoelasticity at small strain: Hooke at once, whose shear modulus relaxes in terms (g, tau).
+    """Linear viscoelasticity at small strain: Hooke's law whose shear modulus relaxes in terms (g, tau).
 
-    G(t) = G (1 - sum g + sum g exp(-t/tau)), the bulk modulus staying as it is: a generalised Maxwell solid, as in Simo
-    and Hughes (1998), Computational Inelasticity, sec. 10.2. Its two constants are those at once.
+    G(t) = G (1 - sum g + sum g exp(-t/tau)), and the bulk modulus does not relax: a generalised Maxwell solid, as in
+    Simo and Hughes (1998), Computational Inelasticity, sec. 10.2. E and nu are the instantaneous constants.
     """
 
     terms: tuple[tuple[float, float], ...] = ()  # g [-] and tau [s] of each
@@ -95,12 +95,12 @@ class Prony(Isotropic):
 
     @property
     def long_term(self) -> float:
-        """Part of the shear modulus that never relaxes [-]."""
+        """Long-term part of the shear modulus [-]."""
         return 1.0 - sum(g for g, _ in self.terms)
 
     @property
     def long_term_moduli(self) -> Moduli:
-        """The moduli in the end.
+        """The long-term moduli.
 
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).long_term_moduli.shear / Prony(0.08, 0.48).shear, 6)
         0.7
@@ -108,9 +108,9 @@ class Prony(Isotropic):
         return self._with(self.long_term)
 
     def within(self, step: float) -> Moduli:
-        """Return the moduli that a strain has which grows evenly over `step` [s]: what of it is left at the end.
+        """Return the moduli, stress by strain, at the end of a `step` [s] in which strain grows linearly from zero.
 
-        After one relaxation time that is 0.7 + 0.3 (1 - 1/e):
+        After one relaxation time the shear modulus is 0.7 + 0.3 (1 - 1/e) of the instantaneous one:
 
         >>> round(Prony(0.08, 0.48, ((0.3, 1.0),)).within(1.0).shear / Prony(0.08, 0.48).shear, 6)
         0.889636
@@ -123,18 +123,18 @@ class Prony(Isotropic):
 
 
 def mean_decay(times: Array) -> Array:
-    """Return what is left of a strain that grew evenly over so many relaxation times (> 0): (1 - exp(-x)) / x."""
+    """Return the unrelaxed part of a strain that grew linearly for `times` > 0 relaxation times: (1 - exp(-x)) / x."""
     return -np.expm1(-times) / times
 
 
 class Law(Elasticity, Protocol):
-    """What an element asks of a law at finite strain."""
+    """Properties that elements need of a law at finite strain."""
 
     name: ClassVar[str]
 
     @property
     def stiffening(self) -> float:
-        """Ogden's exponent, by which the shear modulus grows with strain; PLAIN where it stays [-]."""
+        """Ogden's exponent, by which the shear modulus grows with strain; PLAIN for a constant modulus [-]."""
         ...
 
 
@@ -149,19 +149,18 @@ class NeoHooke(Isotropic):
 
     @property
     def stiffening(self) -> float:
-        """No stiffening."""
+        """The exponent without stiffening."""
         return PLAIN
 
 
 @dataclass(frozen=True, slots=True)
 class Ogden(Isotropic):
-    """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, that stiffens as it is strained.
+    """W = 2 G/a^2 (l^a + l^-a - 2) + lambda/2 (ln J)^2, with l^2 + l^-2 - 2 = Q: skin, which stiffens with strain.
 
-    Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches as
-    long as the volume stays; made compressible like the neo-Hookean law, which it is for a = 2. That human skin has
-    a = 9 is ascribed to Shergold and Fleck (2004, Proc. R. Soc. Lond. A 460, 3037).
-    P = G f(Q) (F - F^-T) + lambda ln J F^-T with f = 2/a sinh(a s)/sinh(2 s), l = exp(s). Pulled to twice its length,
-    with a = 4: 2 G/16 (16 + 1/16 - 2):
+    Ogden's law of one term (1972, Proc. R. Soc. Lond. A 326, 565) in plane strain, where l and 1/l are the stretches at
+    constant volume. It is made compressible like the neo-Hookean law, which is the case a = 2. For human skin, a = 9 is
+    ascribed to Shergold and Fleck (2004, Proc. R. Soc. Lond. A 460, 3037). P = G f(Q) (F - F^-T) + lambda ln J F^-T
+    with f = 2/a sinh(a s)/sinh(2 s), l = exp(s). At a stretch of 2 with a = 4, W is 2 G/16 (16 + 1/16 - 2):
 
     >>> float((shape(np.array(4.0), np.array(2.0**2 + 0.5**2 - 2.0)) / 2.0).round(6))
     1.757812
@@ -172,25 +171,25 @@ class Ogden(Isotropic):
 
 
 def log1p(x: Array) -> Array:
-    """Return ln(1 + x), of complex numbers for the smallest imaginary parts: NumPy's own loses a small x's digits."""
+    """Return ln(1 + x); NumPy's own loses digits of a small complex x. Imaginary parts must be infinitesimal."""
     log = np.log1p(x.real)
     return cast("Array", log + 1j * (x.imag / (1.0 + x.real))) if np.iscomplexobj(x) else log
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalState:
-    """Deformation and moduli of n places, in c states of the body each. All arrays broadcast to (n, c).
+    """Deformation and moduli of n points, in c states of the body each. All arrays broadcast to (n, c).
 
-    The displacement gradient is du_a/dx_b; at small strain its symmetric part alone. `tangent` is the direction of the
-    undeformed skin above the place, towards the tip: a unit vector in the plane. Its normal points into the tissue.
-    Numbers may be complex, for derivatives by complex steps.
+    The displacement gradient is du_a/dx_b; at small strain only its symmetric part. `tangent` is a unit vector along
+    the undeformed skin above the point, towards the tip; its normal points into the tissue. Numbers may be complex, for
+    complex-step derivatives.
     """
 
     xx: Array
     xy: Array
     yx: Array
     yy: Array
-    dilatation: Array  # volume strain at small strain, ln J at finite: each element's best fit of it [-]
+    dilatation: Array  # volume strain at small strain, ln J at finite: the element's best fit [-]
     shear: Array  # modulus [MPa]
     lame: Array  # Lamé's first constant [MPa]
     stiffening: Array  # Ogden's exponent [-]; at small strain unused
@@ -198,17 +197,17 @@ class LocalState:
 
     @property
     def volume(self) -> Array:
-        """J: volume by undeformed volume at the place itself [-]."""
+        """J, volume by undeformed volume at the point itself [-]."""
         return 1.0 + self._volume_growth
 
     @property
     def log_volume(self) -> Array:
-        """Logarithm of the volume to the digits of the strains [-]."""
+        """Logarithm of J at the point itself, without cancellation [-]."""
         return log1p(self._volume_growth)
 
     @property
     def excess(self) -> Array:
-        """Tr C - 3 - 2 ln J at the place itself, to the digits of the strains [-]."""
+        """Tr C - 3 - 2 ln J at the point itself, without cancellation [-]."""
         squares = self.xx**2 + self.xy**2 + self.yx**2 + self.yy**2
         return 2.0 * (self.trace - self.log_volume) + squares
 
@@ -218,7 +217,7 @@ class LocalState:
 
     @property
     def trace(self) -> Array:
-        """Trace of the gradient: the volume strain at the place itself, at small strain [-]."""
+        """Trace of the displacement gradient: at small strain, the volume strain at the point itself [-]."""
         return self.xx + self.yy
 
     @property
@@ -228,17 +227,17 @@ class LocalState:
 
 
 def shape(exponent: Array, Q: Array) -> Array:
-    """Return W by G/2 (...) of Ogden's exponents, without the term of ln J: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
-    some = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
+    """Return W by G/2 (...), without the term of ln J, for Ogden's exponents: 16/a^2 sinh^2(a s/2), Q = 4 sinh^2 s."""
+    positive = np.where(np.real(Q) > 0.0, Q, 0.0 * Q)
     if np.all(exponent == PLAIN):
-        return some
-    return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(some) / 2.0)) ** 2
+        return positive
+    return 16.0 / exponent**2 * np.sinh(exponent / 2.0 * np.arcsinh(np.sqrt(positive) / 2.0)) ** 2
 
 
 def slopes(exponent: Array, Q: Array) -> tuple[Array, Array]:
-    """Return f = dW/dQ by G/2, by which the shear modulus has grown, and df/dQ (...).
+    """Return f = dW/dQ by G/2, the growth factor of the shear modulus, and df/dQ (...).
 
-    f is Gauss's series 2F1(1 + a/2, 1 - a/2; 3/2; -Q/4), of which the first terms serve where Q is small.
+    f is Gauss's series 2F1(1 + a/2, 1 - a/2; 3/2; -Q/4); its first terms are used where Q is small.
 
     >>> [float(number) for number in slopes(np.array(4.0), np.array(0.01))]  # 1 + Q/2
     [1.005, 0.5]
@@ -280,19 +279,19 @@ def tangent(law: Law, F: Array) -> Array:
     """Return dP_aA/dF_bB (..., a, A, b, B) [MPa]."""
     J, inverse, Q = _parts(F)
     wide = (..., None, None, None, None)
-    grown, growth = slopes(np.array(law.stiffening), Q)
-    shear, more = (law.shear * grown)[wide], (2.0 * law.shear * growth)[wide]
+    factor, slope = slopes(np.array(law.stiffening), Q)
+    shear, shear_slope = (law.shear * factor)[wide], (2.0 * law.shear * slope)[wide]
     pressure = law.lame * np.log(J)[wide]
     excess = F - inverse
     unit = np.einsum("ab,AB->aAbB", np.eye(2), np.eye(2))
     crossed = np.einsum("...aB,...bA->...aAbB", inverse, inverse)  # minus the derivative of F^-T
     stretched = np.einsum("...aA,...bB->...aAbB", excess, excess)
     squeezed = np.einsum("...aA,...bB->...aAbB", inverse, inverse)
-    return shear * (unit + crossed) + more * stretched - pressure * crossed + law.lame * squeezed
+    return shear * (unit + crossed) + shear_slope * stretched - pressure * crossed + law.lame * squeezed
 
 
 def inverse_metric(F: Array) -> Array:
-    """Return B (..., 4) for deformation gradients F (..., 2, 2).
+    """Return B = (C J^-2/3)^-1 (..., 4) for deformation gradients F (..., 2, 2).
 
     >>> inverse_metric(np.array([[1.0, 0.5], [0.0, 1.0]])).tolist()  # simple shear
     [1.25, 1.0, -0.5, 1.0]
@@ -314,7 +313,7 @@ def stress_parts(F: Array, T: Array) -> tuple[Array, Array, Array, Array]:
 def overstress(T: Array, F: Array) -> Array:
     """Return the nominal stress (..., 2, 2) [MPa], J^-2/3 (F T - T:C/3 F^-T).
 
-    A term of 1 MPa, just sheared by 0.5: its true shear stress is 0.5 MPa.
+    For a term of 1 MPa, suddenly sheared by 0.5, the true shear stress is 0.5 MPa:
 
     >>> F = np.array([[1.0, 0.5], [0.0, 1.0]])
     >>> (overstress(np.array([1.0, 1.0, 0.0, 1.0]), F) @ F.T).round(6)[0, 1].item()
@@ -326,20 +325,20 @@ def overstress(T: Array, F: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Past:
-    """What p points remember of their strain: the overstress of relaxing tissue; m terms at most in any of them.
+    """Strain history of p points, which gives the overstress of relaxing tissue; at most m terms at each.
 
-    Each term (g, tau) is a network whose strands let go and join again unstrained (Green and Tobolsky 1946, J. Chem.
+    Each term (g, tau) is a network whose strands detach and reattach unstrained (Green and Tobolsky 1946, J. Chem.
     Phys. 14, 80; as a law of solids Linder, Tkachuk and Miehe 2011, J. Mech. Phys. Solids 59, 2134). A is the inverse
-    metric in which it would be unstrained. It follows the body's own, and what stress is left is of the shape alone, as
-    in Simo (1987, Comput. Meth. Appl. Mech. Eng. 60, 153): with B = (C J^-2/3)^-1,
+    metric in which the network would be unstrained. It follows the body's own, B = (C J^-2/3)^-1. The stress is
+    isochoric, as in Simo (1987, Comput. Meth. Appl. Mech. Eng. 60, 153):
 
         dA/dt = (B - A)/tau,    W = g G/2 (tr(A B^-1) - 3 - ln det A),    S = g G J^-2/3 (A - (A:C)/3 C^-1).
 
-    Nothing is gained ever: what is lost is g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues a of A B^-1.
-    After a sudden strain S falls as exp(-t/tau), and at small strain this is the generalised Maxwell solid of `Prony`.
-    Within a step B grows evenly, for which the recursion is exact (as in `equilibrium.relaxation`), and all terms pull
-    by one tensor T = sum g G A', A' being A without what it takes from the B at the end, which has no stress: a step is
-    elastic with W = 1/2 J^-2/3 T:C. Tensors are (..., 4): xx, yy, xy, zz, the two others zero; plane strain, F_zz = 1.
+    Energy is only dissipated, at a rate of g G/(2 tau) times the sum of a + 1/a - 2 over the eigenvalues a of A B^-1.
+    After a sudden strain S decays as exp(-t/tau); at small strain this is the generalised Maxwell solid of `Prony`.
+    Within a step B changes linearly, for which the recursion is exact (as in `equilibrium.relaxation`). All terms act
+    as one tensor T = sum g G A', where A' is A without the share of B at the end, which has no stress. So a step is
+    elastic with W = 1/2 J^-2/3 T:C. Tensors are (..., 4): xx, yy, xy, zz, the other two zero; plane strain, F_zz = 1.
     """
 
     shear: Array  # (p, m) g G [MPa]
@@ -349,28 +348,28 @@ class Past:
 
     @staticmethod
     def at_rest(shear: Array, tau: Array) -> "Past":
-        """Return points that were never strained."""
+        """Return the history of points that were never strained."""
         one = np.array([1.0, 1.0, 0.0, 1.0])
         return Past(shear, tau, np.broadcast_to(one, (*shear.shape, 4)), np.broadcast_to(one, (len(shear), 4)))
 
     def _decay(self, step: float) -> Array:
         """Return A' (p, m, 4) at the end of a `step` [s]."""
         ages = step / self.tau
-        left, grown = np.exp(-ages), mean_decay(ages)
-        return left[..., None] * self.metric + (grown - left)[..., None] * self.before[:, None]
+        decay, mean = np.exp(-ages), mean_decay(ages)
+        return decay[..., None] * self.metric + (mean - decay)[..., None] * self.before[:, None]
 
     def over(self, step: float) -> Array:
-        """Return T (p, 4) [MPa] of a `step` [s]."""
+        """Return T (p, 4) [MPa] for a `step` [s]."""
         return np.sum(self.shear[..., None] * self._decay(step), axis=1)
 
     def after(self, F: Array, step: float) -> "Past":
-        """Return the past at the end of a `step` [s] that led to the deformation gradients F (p, 2, 2)."""
+        """Return the history after a `step` [s] that ends at the deformation gradients F (p, 2, 2)."""
         now = inverse_metric(F)
         metric = self._decay(step) + (1.0 - mean_decay(step / self.tau))[..., None] * now[:, None]
         return replace(self, metric=metric, before=now)
 
     def energy(self) -> Array:
-        """Return the energy density (p,) [MPa] that the terms store now."""
+        """Return the energy density (p,) [MPa] stored in the terms."""
         A, B = self.metric, self.before[:, None]
         det = B[..., 0] * B[..., 1] - B[..., 2] ** 2
         trace = (A[..., 0] * B[..., 1] + A[..., 1] * B[..., 0] - 2.0 * A[..., 2] * B[..., 2]) / det

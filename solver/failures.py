@@ -1,10 +1,10 @@
-"""How a solve ends when there is no answer: with a sentence, and with what is known of the limit."""
+"""Failures of a solve: a sentence each, and the limits where they are known."""
 
 from typing import Any
 
 
 class SolveFailure(Exception):
-    """A scene without an answer. `kind` tells scripts which failure it is."""
+    """A scene without a solution. `kind` tells scripts which failure it is."""
 
     kind = "failed"
 
@@ -16,11 +16,11 @@ class SolveFailure(Exception):
         limit_indentation: float | None = None,
         limit_normal_force: float | None = None,
     ) -> None:
-        """Say at which load, why and what was tried; limits where they are known.
+        """Say at which load the solver failed, why and what it tried; give limits where they are known.
 
-        `limit_mu` is the largest coefficient of friction at this depth, or under this force, with this bound;
-        `limit_indentation` [mm] the largest depth at this coefficient and bound, `limit_normal_force` [N/mm] the
-        largest force, where one was given.
+        `limit_mu` is the largest coefficient of friction at this depth or force, with this bound. `limit_indentation`
+        [mm] is the largest depth at this coefficient and bound. `limit_normal_force` [N/mm] is the largest force, where
+        one was given.
         """
         super().__init__(message)
         self.limit_mu, self.limit_indentation, self.limit_normal_force = (
@@ -28,11 +28,11 @@ class SolveFailure(Exception):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what `daq-app solve --json` prints instead of a prediction."""
+        """Return the object that `daq-app solve --json` prints instead of a prediction."""
         return {"error": {"kind": self.kind, **vars(self), "message": str(self)}}
 
     def in_a_sentence(self) -> "SolveFailure":
-        """Return this failure with its message begun and ended as a sentence: parts of the solver tell fragments.
+        """Return this failure with its message as a sentence; other modules raise fragments.
 
         >>> str(SolveFailure("no equilibrium within 25 iterations").in_a_sentence())
         'No equilibrium within 25 iterations.'
@@ -42,13 +42,13 @@ class SolveFailure(Exception):
 
 
 class NoSteadyState(SolveFailure):
-    """The finger cannot slide steadily: its drag wedges it into the surface faster than it yields."""
+    """The finger cannot slide steadily: friction wedges it into the surface faster than it yields."""
 
     kind = "no_steady_state"
 
 
 def beyond_friction(drag: float, most: float, normal_force: float) -> NoSteadyState:
-    """Return the failure of a `drag` asked for where the finger slides from `most` on [N/mm]."""
+    """Return the failure of a prescribed `drag` beyond the friction limit; the finger slides from `most` on [N/mm]."""
     return NoSteadyState(
         f"A drag of {drag:.4g} N/mm lies outside the friction limit: pressed with {normal_force:.4g} N/mm, the finger "
         f"slides from {most:.4g} N/mm on; ask for less drag, or leave it out to let the finger slide."
@@ -59,17 +59,17 @@ MIXED = "nearly incompressible tissues, or ones whose stiffnesses differ by many
 
 
 class NotConverged(SolveFailure):
-    """The equations have not been solved; whether they have a solution is not known."""
+    """The equations have not been solved; it is unknown whether they have a solution."""
 
     kind = "not_converged"
 
 
 class ContactLost(NotConverged):
-    """No set of contact states was found that contradicts nothing; the message says what was tried."""
+    """No set of contact states without contradiction was found; the message says what was tried."""
 
 
 def at_end_of_path(depth: float, travel: float, reason: object) -> NotConverged:
-    """Return the failure of a course that could be followed to a `depth` after a `travel` [mm] and not beyond.
+    """Return the failure of a load path that ends at a `depth` and a `travel` [mm], before its target.
 
     >>> str(at_end_of_path(1.5, -0.2, "no equilibrium"))[:67]
     'the course was followed to 1.5 mm of indentation and 0.2 mm of slid'

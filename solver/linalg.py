@@ -1,8 +1,8 @@
-"""The order of elimination of a body's inner unknowns, down to those of its skin: nested dissection.
+"""Elimination order of a body's inner unknowns, down to those of its skin: nested dissection.
 
-Elements are halved again and again by their position; the unknowns inside each part are eliminated, the parts are
-joined, and so on up the tree (George 1973, SIAM J. Numer. Anal. 10, 345; Duff and Reid 1983, ACM TOMS 9, 302). What
-is left is the stiffness of the skin alone (Schur complement), exact, and contact is solved with that small dense
+Elements are bisected by position again and again. The unknowns inside each part are eliminated, then the parts are
+joined, and so on up the tree (George 1973, SIAM J. Numer. Anal. 10, 345; Duff and Reid 1983, ACM TOMS 9, 302). The
+result is the exact Schur complement, the stiffness condensed to the skin. Contact is solved with this small dense
 matrix. The work grows like unknowns^1.5.
 """
 
@@ -20,28 +20,28 @@ from solver.mesh import Mesh, distinct
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """A part of the body: which unknowns it eliminates, which it passes on, and where its children's go."""
+    """A part of the body: the unknowns that it eliminates and those that it passes on."""
 
     inner: Indices  # (k,) unknowns eliminated here
     border: Indices  # (b,) unknowns passed on
-    children: tuple[int, ...]  # numbers of parts joined here, none for a leaf
-    elements: slice  # leaf: its elements, in the order of `Tree.order`
+    children: tuple[int, ...]  # numbers of the parts joined here, none for a leaf
+    elements: slice  # of a leaf: its elements, in the order of `Tree.order`
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tree:
-    """The order of elimination of one mesh."""
+    """Elimination order of one mesh."""
 
     order: Indices  # (e,) elements, leaf after leaf
     parts: tuple[Part, ...]  # children before parents; the last one is the whole body
-    kept: Indices  # (m,) unknowns never eliminated, in the order asked for
+    kept: Indices  # (m,) unknowns never eliminated, in the order given
     size: int  # number of unknowns, fixed ones included
 
     @staticmethod
     def of(elements: Indices, centres: Array, fixed: Indices, kept: Indices, leaf: int) -> "Tree":
-        """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` in a leaf.
+        """Plan the elimination for `elements` (e, n) of unknowns at `centres` (e, 2), at most `leaf` elements a leaf.
 
-        Unknowns in `fixed` take no part (their displacement is zero); those in `kept` are passed on to the end.
+        Unknowns in `fixed` have zero displacement and take no part. Those in `kept` are passed on to the end.
         """
         order, ranges, children = _bisect(centres, leaf)
         position = np.empty(len(order), np.int64)
@@ -57,12 +57,12 @@ class Tree:
         free[fixed] = False
         parts: list[Part] = []
         for (low, high), below in zip(ranges, children, strict=True):
-            mine = elements[order[low:high]]
-            met = mine.ravel() if not below else np.concatenate([parts[c].border for c in below])
-            met = distinct(met)
-            met = met[free[met]]
-            complete = (first[met] >= low) & (last[met] < high)
-            inner, border = met[complete], met[~complete]
+            own = elements[order[low:high]]
+            unknowns = own.ravel() if not below else np.concatenate([parts[c].border for c in below])
+            unknowns = distinct(unknowns)
+            unknowns = unknowns[free[unknowns]]
+            complete = (first[unknowns] >= low) & (last[unknowns] < high)
+            inner, border = unknowns[complete], unknowns[~complete]
             if high - low == len(order):
                 border = kept
             parts.append(Part(inner, border, below, slice(low, high)))
@@ -78,11 +78,11 @@ def _bisect(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], 
     def halve(low: int, high: int) -> int:
         below: tuple[int, ...] = ()
         if high - low > leaf:
-            mine = order[low:high]
-            along = int(np.argmax(np.ptp(centres[mine], axis=0)))
-            order[low:high] = mine = mine[np.argsort(centres[mine, along], kind="stable")]
-            # between two rows or columns: a cut with a step in it runs past more nodes
-            cuts = low + 1 + np.flatnonzero(np.diff(centres[mine, along]))
+            subset = order[low:high]
+            along = int(np.argmax(np.ptp(centres[subset], axis=0)))
+            order[low:high] = subset = subset[np.argsort(centres[subset, along], kind="stable")]
+            # cut between two rows or columns: the line of a stepped cut has more nodes
+            cuts = low + 1 + np.flatnonzero(np.diff(centres[subset, along]))
             middle = int(cuts[np.abs(2 * cuts - low - high).argmin()]) if len(cuts) else (low + high) // 2
             below = (halve(low, middle), halve(middle, high))
         ranges.append((low, high))
@@ -94,13 +94,13 @@ def _bisect(centres: Array, leaf: int) -> tuple[Indices, list[tuple[int, int]], 
 
 
 def places(elements: Indices) -> Array:
-    """Return where elements (e, 9) stand in rows and columns (e, 2), read off their neighbours.
+    """Return the row and column (e, 2) of each of the `elements` (e, 9), from their neighbours.
 
-    In a body much longer than it is thick, or bent like a finger, halves cut by rows and columns share far fewer nodes
-    than halves cut along x or y. Where a mesh has no rows and columns the numbers still say what lies near what.
+    In a body much longer than it is thick, or bent like a finger, cuts between rows and columns share far fewer nodes
+    than cuts along x or y. In a mesh without rows and columns, close elements still get close numbers.
     """
     count = len(elements)
-    sides = elements[:, 4:8].ravel()  # each mid-side node is met by two elements at most
+    sides = elements[:, 4:8].ravel()  # at most two elements share a mid-side node
     order = np.argsort(sides, kind="stable")
     twice = np.flatnonzero(sides[order][1:] == sides[order][:-1])
     neighbours = np.full(4 * count, -1)
@@ -121,20 +121,20 @@ def places(elements: Indices) -> Array:
     return out
 
 
-LEAF: Final = 8  # elements in a part that is not halved any more
+LEAF: Final = 8  # most elements in a part that is not bisected
 
 
 def symbolic_factorization(mesh: Mesh) -> SymbolicFactorization:
-    """Plan the elimination of `mesh`, the centres of its elements already eliminated inside them.
+    """Plan the elimination of `mesh`, whose element centres are condensed before.
 
-    It does not depend on where nodes lie, so the last ones are kept for meshes that differ in nothing else.
+    The plan does not depend on nodal positions: the last plans are kept for meshes that differ only in these.
     """
     return _plan(len(mesh.nodes), mesh.elements.tobytes(), mesh.skin.tobytes(), mesh.fixed.tobytes())
 
 
-@lru_cache(maxsize=16)  # a search for a tolerance plans 8 meshes: 4 made each anew, 32 gain nothing more
+@lru_cache(maxsize=16)  # a search for a tolerance makes 8 plans; room for 4 makes each anew, for 32 gains nothing
 def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
-    """Return the plan for `count` nodes and the numbers of elements' nodes (e, 9), the skin's, and unknowns held."""
+    """Return the plan for `count` nodes; `numbers` are bytes: element nodes (e, 9), skin nodes, fixed unknowns."""
     elements, skin_nodes, fixed = (np.frombuffer(part, np.int64) for part in numbers)
     elements = elements.reshape(-1, 9)
     raw = (2 * elements[:, :8, None] + np.arange(2)).reshape(-1, 16)
@@ -153,7 +153,7 @@ def _plan(count: int, *numbers: bytes) -> SymbolicFactorization:
     children = np.full((len(border), 2), -1)
     leaf = np.zeros((len(border), 2), np.int64)
     at = np.full((len(tree.order), 16), -1)
-    where = np.full(total + 1, -1)  # the last place is that of fixed unknowns, whose number is -1
+    where = np.full(total + 1, -1)  # index -1, the number of fixed unknowns, is the last place
     number[fixed] = -1
     for p, part in enumerate(tree.parts):
         where[start[p] : start[p] + inner[p]] = np.arange(inner[p])
@@ -193,7 +193,7 @@ def _narrow(numbers: Indices) -> Narrow:
 
 
 def _runs(place: Narrow, border: Indices) -> Indices:
-    """Return for each unknown of each border where in that border the run of consecutive places it lies in ends."""
+    """Return, for each unknown of each border, where in that border its run of consecutive positions ends."""
     number = np.arange(len(place))
     owner = np.repeat(np.arange(len(border)), border)
     last = np.ones(len(place), bool)
@@ -203,7 +203,10 @@ def _runs(place: Narrow, border: Indices) -> Indices:
 
 
 def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
-    """Return where each part's border waits for its parent: a place for each generation's first and second child."""
+    """Return where each part's Schur complement waits for its parent, and the size of the memory for all.
+
+    Each level of the tree has a place for a first and a second child.
+    """
     level = np.zeros(len(border), np.int64)
     second = np.zeros(len(border), np.int64)
     for p in range(len(border) - 1, -1, -1):
@@ -217,7 +220,7 @@ def _waiting(children: Indices, border: Indices) -> tuple[Indices, int]:
 
 
 class Some(NamedTuple):
-    """Elements whose displacements are wanted."""
+    """Elements whose displacements are recovered."""
 
     parts: Flags  # (p,) of the elimination that hold their unknowns
     nodes: Narrow  # (e, 9)
@@ -226,13 +229,13 @@ class Some(NamedTuple):
 
 
 class Elimination:
-    """One body's tangent, eliminated down to its skin; the memory is set aside once."""
+    """Elimination of one body's tangent down to its skin, with its own memory."""
 
     def __init__(self, plan: SymbolicFactorization, waiting: Array | None = None) -> None:
-        """Set memory aside for `plan`, but for what is `waiting` where that is given."""
+        """Allocate memory for `plan`; `waiting`, if given, is the memory for Schur complements."""
         skin = int(plan.border[-1])
         self.plan = plan
-        self.stiffness = np.zeros((skin, skin))  # what is left of the tangent for the skin
+        self.stiffness = np.zeros((skin, skin))  # the tangent's Schur complement
         values, near = np.empty(plan.factors), np.empty(int((plan.inner + plan.border).max()))
         waiting = np.empty(plan.waiting) if waiting is None else waiting
         factors = Factors(
@@ -245,18 +248,18 @@ class Elimination:
         self._displace = bind_arguments(multifrontal.displace, factors)
 
     def factorise(self, tangent: Array) -> int:
-        """Eliminate the elements' tangents (e, 16, 16), lower halves; return UNSOLVABLE, INDEFINITE or DEFINITE."""
+        """Eliminate the element tangents (e, 16, 16), lower halves; return UNSOLVABLE, INDEFINITE or DEFINITE."""
         return self._eliminate(tangent)
 
     def condense(self, force: Array) -> Array:
-        """Replace `force` (n,) by what `back_substitute` needs of it, and return its end (m,): what the skin feels."""
+        """Condense `force` (n,) in place for `back_substitute`; return its end (m,), the force on the skin."""
         self._condense(force)
         return force[self.plan.size - len(self.stiffness) :]
 
     def parts_holding(self, unknowns: Narrow) -> Flags:
-        """Return which parts (p,) hold the displacements of some `unknowns`, -1 being those of none."""
+        """Return the parts (p,) that recover the displacements of some `unknowns`, where -1 stands for a fixed one."""
         plan = self.plan
-        part = np.full(plan.size + 1, len(plan.inner))  # the last stands for no part
+        part = np.full(plan.size + 1, len(plan.inner))  # the last entry stands for no part
         part[: -len(self.stiffness) - 1] = np.repeat(np.arange(len(plan.inner)), plan.inner)
         out = np.zeros(len(plan.inner) + 1, bool)
         out[part[unknowns]] = True
@@ -265,12 +268,15 @@ class Elimination:
             out[p] |= out[one] or out[other]
         return out[:-1]
 
-    def back_substitute(self, carried: Array, skin: Array) -> Array:
-        """Return all displacements (n,) for the skin's (m,) under a force that was condensed, `carried` (n,)."""
+    def back_substitute(self, condensed_force: Array, skin: Array) -> Array:
+        """Return all displacements (n,) for the skin's (m,) under a `condensed_force` (n,)."""
         out = np.empty(self.plan.size)
-        self._back_substitute(carried, np.ascontiguousarray(skin), self._every, out)
+        self._back_substitute(condensed_force, np.ascontiguousarray(skin), self._every, out)
         return out
 
-    def displace(self, carried: Array, skin: Array, some: Some, out: Array) -> None:
-        """Fill the displacements `out` (nodes, 2, c) of some elements for the skin's (c, m) under a condensed force."""
-        self._displace(carried, np.ascontiguousarray(skin), *some, out)
+    def displace(self, condensed_force: Array, skin: Array, some: Some, out: Array) -> None:
+        """Fill `out` (nodes, 2, c) with displacements of some elements for the skin's (c, m).
+
+        `condensed_force` (n,) is the result of `condense`.
+        """
+        self._displace(condensed_force, np.ascontiguousarray(skin), *some, out)

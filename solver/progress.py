@@ -1,4 +1,4 @@
-"""What the solver is at: for whoever listens, since nobody knows how long a hard scene takes.
+"""Progress reports of the solver: nobody knows beforehand how long a hard scene takes.
 
 with listening(lambda doing, part: print(f"{doing}: {part:.0%} of it")):
     solve(scene)
@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 
 class Cancelled(Exception):
-    """The caller asked to stop."""
+    """The caller stopped the solve."""
 
 
-Listener = Callable[[str, float], None]  # called with what is being done, and the part of it done, 0 to 1
+Listener = Callable[[str, float], None]  # called with the current work, and the part of it done, 0 to 1
 Progress = Callable[[float], bool]  # called with the part done, 0 to 1; returns False to stop the work
 
 
 @dataclass(slots=True)
 class _Audience:
-    """Who listens, and what was said last."""
+    """The listener and the last report."""
 
     listener: Listener
     doing: str = ""
@@ -32,7 +32,7 @@ _CHECK: ContextVar[Callable[[], None]] = ContextVar("check", default=lambda: Non
 
 @contextmanager
 def listening(listener: Listener) -> Generator[None]:
-    """Let `listener` hear what the solver is at in this thread, until the block ends."""
+    """Send the progress reports of this thread to `listener` until the block ends."""
     before = _AUDIENCE.set(_Audience(listener))
     try:
         yield
@@ -41,7 +41,7 @@ def listening(listener: Listener) -> Generator[None]:
 
 
 def report_progress(doing: str, part: float = 0.0) -> None:
-    """Say what is being done, and which part of it is done.
+    """Report the current work, and the `part` of it done, 0 to 1.
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append((doing, part))):
@@ -67,19 +67,19 @@ def interruptible(progress: Progress | None, part: Callable[[], float]) -> Gener
 
 
 def check_stop() -> None:
-    """Raise Cancelled where the caller asked to stop: called between any two steps that take long."""
+    """Raise Cancelled where the caller stops the solve. Code calls it between any two steps that take long."""
     _CHECK.get()()
 
 
 def report_part(progress: Progress | None, part: float) -> None:
-    """Call `progress`, where there is one, with the part done. Raises Cancelled where it says so."""
+    """Call `progress`, if there is one, with the part done. Raises Cancelled where it returns False."""
     if progress is not None and not progress(part):
         raise Cancelled
 
 
 @contextmanager
 def aside(doing: str) -> Generator[None]:
-    """Say what is done in between, until the block ends; then again what was said before, "solving" where nothing was.
+    """Report other work until the block ends; then repeat the previous report, or "solving" where there was none.
 
     >>> heard = []
     >>> with listening(lambda doing, part: heard.append(doing)):

@@ -1,8 +1,8 @@
-"""Responses of the tissue at a receptor, from what is known of a place: energies, strains and stresses.
+"""Responses of the tissue at a receptor, from the local state: energies, strains and stresses.
 
-At an ending each is averaged over the ending's patch: the mean of the values at its places. Strains along the skin are
-in the frame of the skin at rest; stretches are given less one. Stresses are Cauchy's, those across the plane included.
-The list of quantities is at the foot; the first is the published one.
+At an ending, each response is averaged over the points of its patch. Strains along the skin are in the frame of the
+undeformed skin; stretches are given less one. Stresses are Cauchy's, with the out-of-plane ones. The list of quantities
+is at the foot; the first is the published one.
 """
 
 from collections.abc import Callable
@@ -16,12 +16,12 @@ from solver.constitutive import LocalState, shape, slopes
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One response of the tissue at a place."""
+    """One response of the tissue at a point."""
 
     name: str  # key in files and options
-    label: str  # for people
+    label: str  # name in tables and figures
     unit: str  # "MPa", or "-" for a strain
-    meaning: str  # in a sentence
+    meaning: str  # one phrase
     small: Callable[[LocalState], Array]
     finite: Callable[[LocalState], Array]
 
@@ -33,17 +33,17 @@ def _small_energy(at: LocalState) -> Array:
 
 
 def _finite_energy(at: LocalState) -> Array:
-    """Return W of `solver.constitutive` [MPa], ln J being the element's best fit of it."""
+    """Return W of `solver.constitutive` [MPa]; ln J is the element's best fit."""
     return at.shear / 2.0 * shape(at.stiffening, at.excess) + at.lame / 2.0 * at.dilatation**2
 
 
 def _small_volumetric(at: LocalState) -> Array:
-    """Return K/2 theta^2, K = lambda + 2 G/3; the part of it that G makes is of the volume strain at the place."""
+    """Return K/2 theta^2, K = lambda + 2 G/3; the part of G is from the volume strain at the point itself."""
     return at.lame / 2.0 * at.dilatation**2 + at.shear / 3.0 * at.trace**2
 
 
 def _finite_volumetric(at: LocalState) -> Array:
-    """Return W of the same change of volume, alike in all three directions."""
+    """Return W of the same change of volume, equal in all three directions."""
     dilated = 3.0 * np.expm1(2.0 / 3.0 * at.log_volume) - 2.0 * at.log_volume  # tr C - 3 - 2 ln J
     return at.shear / 2.0 * shape(at.stiffening, dilated) + at.lame / 2.0 * at.dilatation**2
 
@@ -114,7 +114,7 @@ def _finite_shear_along(at: LocalState) -> Array:
 
 
 def _size(number: Array) -> Array:
-    """Return the size of real numbers; that of complex ones keeps their small imaginary parts' slope."""
+    """Return the absolute value, in a form that complex-step derivatives pass through."""
     return np.sqrt(number * number)
 
 
@@ -205,7 +205,7 @@ def _principal(stress: Stress) -> tuple[Array, Array]:
 
 
 def _of_stress(name: str, label: str, meaning: str, invariant: Callable[[Stress], Array]) -> Quantity:
-    """Return the quantity that is an invariant of the stress [MPa]."""
+    """Return the quantity that is an `invariant` of the stress [MPa]."""
     return Quantity(
         name, label, "MPa", meaning, lambda at: invariant(_small_stress(at)), lambda at: invariant(_finite_stress(at))
     )
@@ -239,5 +239,5 @@ QUANTITIES = (
     VON_MISES,
 )
 NAMES: tuple[str, ...] = tuple(quantity.name for quantity in QUANTITIES)
-# What is drawn over the whole tissue. Principal stresses are drawn only: no receptor is said to answer to them.
+# Quantities drawn over the whole tissue. Principal stresses are only drawn: no receptor is said to respond to them.
 FIELDS = (SED, GREATEST_STRAIN, LEAST_STRAIN, GREATEST_STRESS, LEAST_STRESS, VON_MISES, PRESSURE)

@@ -1,6 +1,6 @@
-"""The compiled loops of the solver, and the only modules that are compiled (numba, cached on disk).
+"""The compiled loops of the solver (numba, cached on disk). No other module is compiled.
 
-The tests hold a plain twin of them in NumPy, and compare the two.
+The tests compare them with plain NumPy versions.
 """
 
 import gc
@@ -16,21 +16,21 @@ from solver.progress import aside
 
 
 class _Compilation(events.Listener):
-    """Says which loop is being compiled, and makes sure that Ctrl-C is not lost meanwhile.
+    """Report which loop numba compiles, and deliver a Ctrl-C that arrives meanwhile.
 
-    Python delivers Ctrl-C between two of its own steps. One that comes while LLVM calls Python is printed and lost, so
-    it is raised once more when the loop is compiled.
+    Python raises KeyboardInterrupt between two bytecodes. Where LLVM calls back into Python, the exception is printed
+    and lost. So it is raised again once the loop is compiled.
     """
 
     def __init__(self) -> None:
-        """Listen to nothing yet."""
+        """Start with no compilation in progress."""
         self._count = 0
         self._open: ExitStack | None = None
         self._loop: object = None
         self._stopped = False
 
     def on_start(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
-        """Report the loop whose compilation begins, unless it is part of another's."""
+        """Report the loop whose compilation starts, unless it is part of another loop's compilation."""
         loop = event.data["dispatcher"]
         if self._open is not None or loop.py_func.__module__.rpartition(".")[0] != __name__:
             return
@@ -39,13 +39,13 @@ class _Compilation(events.Listener):
         self._loop, self._open = loop, ExitStack()
         doing = f"compiling {loop.py_func.__name__}, loop number {self._count}, once on this machine"
         self._open.enter_context(aside(doing))
-        if gc.isenabled():  # numba makes millions of objects that stay: to look through them is a sixth of its time
+        if gc.isenabled():  # numba makes millions of lasting objects: scanning them costs a sixth of the time
             gc.disable()
             self._open.callback(gc.enable)
         self._hear_ctrl_c()
 
     def on_end(self, event: Any) -> None:  # noqa: ANN401 - numba declares no types
-        """Report again what was reported before; raise KeyboardInterrupt where Ctrl-C came meanwhile."""
+        """Restore the previous progress report; raise KeyboardInterrupt if Ctrl-C came during the compilation."""
         if self._open is None or event.data["dispatcher"] is not self._loop:
             return
         opened, self._open = self._open, None
@@ -55,8 +55,8 @@ class _Compilation(events.Listener):
             raise KeyboardInterrupt
 
     def _hear_ctrl_c(self) -> None:
-        mine = threading.current_thread() is threading.main_thread()
-        if not mine or signal.getsignal(signal.SIGINT) is not signal.default_int_handler or self._open is None:
+        in_main = threading.current_thread() is threading.main_thread()
+        if not in_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler or self._open is None:
             return
 
         def stop(number: int, frame: FrameType | None) -> None:
@@ -69,7 +69,7 @@ class _Compilation(events.Listener):
 
 @cache
 def _warn() -> None:
-    """Say, once a process, why the first run ever takes so long."""
+    """Log, once per process, why the first run takes longer."""
     import logging
 
     logging.getLogger(__name__).warning("Compiling the loops, once on this machine: half a minute if it is not busy.")

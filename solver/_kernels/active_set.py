@@ -1,7 +1,7 @@
-"""The one search for contact states: a primal-dual active set on the condensed skin of a linearised body.
+"""Search for the contact states: a primal-dual active set on the condensed skin of a linearised body.
 
-Alart and Curnier 1991, Comput. Meth. Appl. Mech. Eng. 92, 353; Hüeber and Wohlmuth 2005, ibid. 194, 3147. States that
-contradict the solution change all at once; where that goes round in circles, the worst one changes alone.
+Alart and Curnier 1991, Comput. Meth. Appl. Mech. Eng. 92, 353; Hüeber and Wohlmuth 2005, ibid. 194, 3147. All states
+that contradict the solution change at once. After states have repeated, only the worst one changes in a round.
 """
 
 import numpy as np
@@ -29,23 +29,23 @@ from solver.arrays import (
     StateChanges,
 )
 
-SLACK = 1e-12  # a contradiction smaller than this, relative to the largest of its kind, is round-off
-DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # what drives the body: its depth, its normal force, its drag too
-UNSETTLED, SINGULAR = 0, -1  # what `solve_active_set` returns in place of the number of systems it solved
+SLACK = 1e-12  # a contradiction smaller than this, relative to the largest force or height, is round-off
+DEPTH_GIVEN, PUSH_GIVEN, DRAG_GIVEN = 0, 1, 2  # prescribed: the depth; the normal force; normal force and drag
+UNSETTLED, SINGULAR = 0, -1  # results of `solve_active_set` other than the number of solved systems
 
 
 @subroutine
 def contradictions(
     states: ContactStates, above: Array, slip: Array, length: Array, load: LoadArguments, changes: StateChanges
 ) -> int:
-    """Fill the `changes` of state and sense that a solution calls for; return how many nodes contradict it.
+    """Fill `changes` with the states and senses that a solution requires; return how many nodes contradict it.
 
-    `above` (k,) are heights over the surface, `slip` (k,) is how far each node went along +x relative to the surface
-    since the last step, `length` (k,) as in `bounded_length`. Where the load has a sense every touching node slips, the
-    friction force pointing there; else nodes stick, slip and turn round.
+    `above` (k,) are heights over the surface. `slip` (k,) are displacements along +x relative to the surface since the
+    last step, and `length` (k,) is that of `bounded_length`. Where the load has a sense, every touching node slips with
+    the friction force in that sense; else nodes stick, slip and reverse.
     """
     state, sense, reaction = states
-    wanted, turned, badness = changes
+    next_state, next_sense, violations = changes
     changed = 0
     force = height = 0.0
     for i in range(state.shape[0]):
@@ -53,29 +53,31 @@ def contradictions(
         height = max(height, abs(above[i]))
     slack = Slack(SLACK * force, SLACK * height, force / height if height > 0.0 else 0.0)
     for i in range(state.shape[0]):
-        now, way, bad = state[i], sense[i], 0.0
-        if now == OPEN:
+        new_state, new_sense, violation = state[i], sense[i], 0.0
+        if new_state == OPEN:
             if above[i] < -slack.height:
-                now, bad = touching_state(load), -above[i] * slack.by_height
-                way = load.sense if load.sense != 0 else way
+                new_state, violation = touching_state(load), -above[i] * slack.by_height
+                new_sense = load.sense if load.sense != 0 else new_sense
         elif reaction[i, 1] < -slack.force:
-            now, bad = OPEN, -reaction[i, 1]
+            new_state, violation = OPEN, -reaction[i, 1]
         else:
             bound = load.tau * max(length[i], 0.0)
-            now, way, bad = friction_state(now, way, reaction[i], slip[i], bound, load, slack)
-        if now != state[i] or (now >= SLIP and way != sense[i]):
+            new_state, new_sense, violation = friction_state(
+                new_state, new_sense, reaction[i], slip[i], bound, load, slack
+            )
+        if new_state != state[i] or (new_state >= SLIP and new_sense != sense[i]):
             changed += 1
         else:
-            bad = -1.0
-        wanted[i], turned[i], badness[i] = now, way, bad
+            violation = -1.0
+        next_state[i], next_sense[i], violations[i] = new_state, new_sense, violation
     return changed
 
 
 @subroutine
 def touching_state(load: LoadArguments) -> int:
-    """Return the state in which a node is first thought to touch.
+    """Return the state first assumed for a node that comes into contact.
 
-    Where friction is steep, slip is a bad guess: the node's own drag may lift it off by more than it is pressed.
+    With steep friction, slip is a bad guess: the node's own drag may lift it off by more than it is pressed.
     """
     if load.sense != 0:
         return SHEAR_LIMITED if load.mu > STEEP and load.tau < np.inf else SLIP
@@ -84,25 +86,25 @@ def touching_state(load: LoadArguments) -> int:
 
 @subroutine
 def friction_state(
-    was: int, sense: int, reaction: Array, slip: float, bound: float, load: LoadArguments, slack: Slack
+    state: int, sense: int, reaction: Array, slip: float, bound: float, load: LoadArguments, slack: Slack
 ) -> tuple[int, int, float]:
-    """Return state and sense of a node that is pressed, and how badly it contradicts those it has [N/mm]."""
+    """Return state and sense of a pressed node, and how much it violates its present ones [N/mm]."""
     coulomb = load.mu * max(reaction[1], 0.0)
     most = min(coulomb, bound)
     slips = SLIP
-    if bound < coulomb - slack.force or (was == SHEAR_LIMITED and bound <= coulomb + slack.force):
+    if bound < coulomb - slack.force or (state == SHEAR_LIMITED and bound <= coulomb + slack.force):
         slips = SHEAR_LIMITED
-    now, way, bad = slips, sense, reaction[1]
+    new_state, new_sense, violation = slips, sense, reaction[1]
     if load.sense != 0:
-        way = load.sense
-    elif was == STICK:
-        now, bad = STICK, 0.0
+        new_sense = load.sense
+    elif state == STICK:
+        new_state, violation = STICK, 0.0
         if abs(reaction[0]) > most + slack.force:
-            way = 1 if reaction[0] > 0.0 else -1
-            now, bad = SHEAR_LIMITED if bound < coulomb else SLIP, abs(reaction[0]) - most
+            new_sense = 1 if reaction[0] > 0.0 else -1
+            new_state, violation = SHEAR_LIMITED if bound < coulomb else SLIP, abs(reaction[0]) - most
     elif slip * sense > slack.height and most > 0.0:
-        now, bad = STICK, slip * sense * slack.by_height
-    return now, way, bad
+        new_state, violation = STICK, slip * sense * slack.by_height
+    return new_state, new_sense, violation
 
 
 @compile_loop
@@ -118,58 +120,61 @@ def solve_active_set(
 ) -> int:
     """Solve the skin's system of contact, changing `states` up to `rounds` times until none contradicts the solution.
 
-    Exact for the linearised body where the rounds suffice. With a `compliance`, forces are unknown, fewer than steps.
-    Filled: reactions of `states`, and `steps` of `system`, but only that to equilibrium where forces are unknown.
+    Exact for the linearised body where the rounds suffice. With a `compliance`, the unknowns are forces, of which there
+    are fewer. Fills the reactions of `states`, and `steps` of `system`; with a compliance only the step to equilibrium.
     Returns the number of systems solved, UNSETTLED or SINGULAR.
     """
     size, steps, motion = states.state.shape[0], system.steps, system.motion
-    sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # how the force of the surface follows steps, or forces
-    answer, untouched = steps, loads
+    sums, loads = np.zeros((2, 2 * size)), np.zeros(2)  # resultant: derivatives by steps or forces, constant part
+    answer, unloaded_step = steps, loads
     by_forces = compliance.shape[0] > 0
     if by_forces:
-        answer, untouched = np.zeros((compliance.shape[0], COLUMNS)), np.zeros(compliance.shape[0])
-        release(body.force, compliance, sums, untouched)
+        answer, unloaded_step = np.zeros((compliance.shape[0], COLUMNS)), np.zeros(compliance.shape[0])
+        unload(body.force, compliance, sums, unloaded_step)
     else:
         sum_stiffness(body, control.kind, sums, loads)
     changes = StateChanges(np.empty(size, np.int32), np.empty(size, np.int32), np.empty(size))
-    entered = np.zeros(size, np.int32)  # how often each node came to touch
-    seen, known = np.empty((control.rounds + 1, 2, size), np.int32), 0
+    entries = np.zeros(size, np.int32)  # how often each node came into contact
+    history, recorded = np.empty((control.rounds + 1, 2, size), np.int32), 0
     ahead, above, slip = np.empty(size), np.empty(size), np.empty(size)
     one_by_one, may_hold = False, load.mu > 0.0 and load.tau > 0.0
     for turn in range(control.rounds + 1):
         bounded_length(position.x, skin, states.state, load.mu, system.length)
         if by_forces:
-            count = assemble_force_system(compliance, skin, states, load, position, untouched, system, answer)
+            count = assemble_force_system(compliance, skin, states, load, position, unloaded_step, system, answer)
         else:
             count = assemble_contact_system(body, skin, states, load, position, system)
         if not solve(system.matrix, system.right, count):
             return SINGULAR
-        take_answer(system, count, by_forces, states, load.mu, answer)
+        scatter_answer(system, count, by_forces, states, load.mu, answer)
         stuck, dragged = count_in(states.state, STICK) > 0, control.kind == DRAG_GIVEN
         if dragged and not stuck and may_hold and turn < control.rounds:
-            hold(states.state)  # free along x, the body needs a node that holds it: all are asked again, one by one
+            hold(states.state)  # free along x, the body needs sticking nodes: all stick, then change one by one
             may_hold, one_by_one = False, True
             continue
-        regular = balance(states.state, sums, loads, answer, control, stuck, motion)
+        regular = control_forces(states.state, sums, loads, answer, control, stuck, motion)
         if by_forces:
-            regular &= follow(compliance, answer, untouched, steps, states.reaction)
+            regular &= recover_steps(compliance, answer, unloaded_step, steps, states.reaction)
         else:
-            regular &= resist(body, steps, states.reaction)
+            regular &= recover_reaction(body, steps, states.reaction)
         if not regular or turn == control.rounds:
             return UNSETTLED if regular else SINGULAR
         look_ahead(position, steps, motion, dragged and not stuck, ahead, above, slip)
         bounded_length(ahead, skin, states.state, load.mu, system.length)
         if contradictions(states, above, slip, system.length, load, changes) == 0:
             return turn + 1
-        change_states(states, changes, slip, entered, one_by_one)
-        met = met_before(states, seen, known)
-        one_by_one, known = one_by_one or met, 1 if met else known + 1
+        change_states(states, changes, slip, entries, one_by_one)
+        repeated = record_states(states, history, recorded)
+        one_by_one, recorded = one_by_one or repeated, 1 if repeated else recorded + 1
     return UNSETTLED
 
 
 @subroutine
 def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -> None:
-    """Fill how the surface's force along x and y follows steps, `sums` (2, 2 k) beside `loads` (2,), where asked."""
+    """Fill the derivatives of the resultant by steps, `sums` (2, 2 k), and its constant part `loads` (2,).
+
+    Nothing is filled where the depth is prescribed.
+    """
     if kind != DEPTH_GIVEN:
         for i in range(body.force.shape[0]):
             loads[i % 2] += body.force[i]
@@ -178,19 +183,19 @@ def sum_stiffness(body: CondensedArrays, kind: int, sums: Array, loads: Array) -
 
 
 @subroutine
-def release(force: Array, compliance: Array, sums: Array, untouched: Array) -> None:
-    """Fill how the surface's force follows forces, `sums` (2, 2 k), and the step `untouched` (2 k + m,) without it."""
+def unload(force: Array, compliance: Array, sums: Array, unloaded_step: Array) -> None:
+    """Fill the derivatives of the resultant by forces, `sums` (2, 2 k), and the `unloaded_step` (2 k + m,)."""
     for i in range(force.shape[0]):
         sums[i % 2, i] = 1.0
-        for c in range(untouched.shape[0]):
-            untouched[c] -= force[i] * compliance[i, c]
+        for c in range(unloaded_step.shape[0]):
+            unloaded_step[c] -= force[i] * compliance[i, c]
 
 
 @subroutine
-def take_answer(
+def scatter_answer(
     system: ContactSystem, count: int, by_forces: bool, states: ContactStates, mu: float, answer: Array
 ) -> None:
-    """Fill the `answer` with what was unknown, and with the drag of what slips where those are forces."""
+    """Fill `answer` with the unknowns; where these are forces, also with the friction forces of slipping nodes."""
     for r in range(count):
         for c in range(COLUMNS):
             answer[system.free[r], c] = system.right[r, c]
@@ -204,9 +209,9 @@ def take_answer(
 def look_ahead(
     position: SkinPosition, steps: Array, motion: Array, loose: bool, ahead: Array, above: Array, slip: Array
 ) -> None:
-    """Fill where the skin's nodes will be along the surface and over it, and how far each slips (k,).
+    """Fill positions along and over the surface that the skin's nodes step to, and their slip (k,).
 
-    Nothing slips where the body is `loose`, as along a surface that does not hold it.
+    The slip is zero where the body is `loose`: the surface does not hold it along x.
     """
     for i in range(ahead.shape[0]):
         ahead[i] = position.x[i] + steps[2 * i, 0]
@@ -216,7 +221,7 @@ def look_ahead(
 
 @compile_loop
 def count_in(state: Narrow, which: int) -> int:
-    """Return how many nodes are in a state of contact."""
+    """Return the number of nodes in the contact state `which`."""
     count = 0
     for i in range(state.shape[0]):
         count += state[i] == which
@@ -225,15 +230,15 @@ def count_in(state: Narrow, which: int) -> int:
 
 @compile_loop
 def hold(state: Narrow) -> None:
-    """Let every node that touches stick."""
+    """Set all touching nodes to STICK."""
     for i in range(state.shape[0]):
         if state[i] != OPEN:
             state[i] = STICK
 
 
 @subroutine
-def resist(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
-    """Fill the `reaction` (k, 2) of the surface to `steps` (2 k, 4); False where a number is not finite."""
+def recover_reaction(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
+    """Fill the surface's `reaction` (k, 2) to `steps` (2 k, 4); return False where a number is not finite."""
     whole = 0.0
     for i in range(steps.shape[0]):
         total = body.force[i]
@@ -245,12 +250,12 @@ def resist(body: CondensedArrays, steps: Array, reaction: Array) -> bool:
 
 
 @subroutine
-def follow(compliance: Array, answer: Array, untouched: Array, steps: Array, reaction: Array) -> bool:
-    """Fill the `reaction` (k, 2) of the surface and the step to equilibrium; False where a number is not finite."""
+def recover_steps(compliance: Array, answer: Array, unloaded_step: Array, steps: Array, reaction: Array) -> bool:
+    """Fill the surface's `reaction` (k, 2) and the step to equilibrium; return False where a number is not finite."""
     size, whole = steps.shape[0], 0.0
     for i in range(size):
         reaction[i // 2, i % 2] = answer[i, 0]
-        steps[i, 0] = untouched[i]
+        steps[i, 0] = unloaded_step[i]
         whole += answer[i, 0]
     for i in range(answer.shape[0]):
         if answer[i, 0] != 0.0:
@@ -260,56 +265,57 @@ def follow(compliance: Array, answer: Array, untouched: Array, steps: Array, rea
 
 
 @subroutine
-def change_states(states: ContactStates, changes: StateChanges, slip: Array, entered: Narrow, one_by_one: bool) -> None:
+def change_states(states: ContactStates, changes: StateChanges, slip: Array, entries: Narrow, one_by_one: bool) -> None:
     """Change all states that contradict the solution, or the worst one alone.
 
-    A node that comes to touch again and again slips every other time; `entered` (k,) counts that.
+    A node that comes into contact repeatedly slips every second time, by its count in `entries` (k,).
     """
     state, sense, _ = states
-    wanted, turned, badness = changes
+    next_state, next_sense, violations = changes
     worst = 0
     for i in range(state.shape[0]):
-        if badness[i] > badness[worst]:
+        if violations[i] > violations[worst]:
             worst = i
     for i in range(state.shape[0]):
         if one_by_one and i != worst:
             continue
-        if state[i] == OPEN and (wanted[i] == SHEAR_LIMITED or wanted[i] == STICK):
-            entered[i] += 1
-            if entered[i] % 2 == 0:
-                if wanted[i] == STICK:
-                    turned[i] = -1 if slip[i] > 0.0 else 1
-                wanted[i] = SLIP
-        state[i], sense[i] = wanted[i], turned[i]
+        if state[i] == OPEN and (next_state[i] == SHEAR_LIMITED or next_state[i] == STICK):
+            entries[i] += 1
+            if entries[i] % 2 == 0:
+                if next_state[i] == STICK:
+                    next_sense[i] = -1 if slip[i] > 0.0 else 1
+                next_state[i] = SLIP
+        state[i], sense[i] = next_state[i], next_sense[i]
 
 
 @subroutine
-def met_before(states: ContactStates, seen: Narrow, known: int) -> bool:
-    """Return whether the states are among the first `known` of those `seen` (n, 2, k), and add them to these.
+def record_states(states: ContactStates, history: Narrow, count: int) -> bool:
+    """Return whether the states are among the first `count` of the `history` (n, 2, k), and add them to it.
 
-    Where they are, they become the only ones.
+    If they are, the history starts again from them.
     """
     state, sense, _ = states
-    met = False
-    for n in range(known):
+    repeated = False
+    for n in range(count):
         same = True
         for i in range(state.shape[0]):
-            same &= seen[n, 0, i] == state[i] and seen[n, 1, i] == sense[i]
-        met |= same
-    place = 0 if met else known
+            same &= history[n, 0, i] == state[i] and history[n, 1, i] == sense[i]
+        repeated |= same
+    place = 0 if repeated else count
     for i in range(state.shape[0]):
-        seen[place, 0, i], seen[place, 1, i] = state[i], sense[i]
-    return met
+        history[place, 0, i], history[place, 1, i] = state[i], sense[i]
+    return repeated
 
 
 @subroutine
-def balance(
+def control_forces(
     state: Narrow, sums: Array, loads: Array, answer: Array, control: ContactControl, stuck: bool, motion: Array
 ) -> bool:
-    """Add to the first of `answer` (2 k, 4) the change of depth, and of travel where `stuck`, that meets given forces.
+    """Add the changes of depth, and of travel where `stuck`, that balance the prescribed forces.
 
-    `sums` (2, 2 k) is how the surface's force along x and y follows the answer, beside `loads` (2,). Fills `motion`
-    (2,) with both changes, at most its stride. False where nothing touches, or nothing meets them.
+    They change the first column of `answer` (2 k, 4). The surface's resultant along x and y is `loads` (2,) plus `sums`
+    (2, 2 k) times the answer. Fills `motion` (2,) with both changes, limited to the control's stride. Returns False
+    where nothing touches, or no change balances the forces.
     """
     motion[0] = motion[1] = 0.0
     if control.kind == DEPTH_GIVEN or count_in(state, OPEN) == state.shape[0]:
@@ -319,32 +325,34 @@ def balance(
         for s in range(COLUMNS):
             drag[s] += sums[0, c] * answer[c, s]
             push[s] += sums[1, c] * answer[c, s]
-    less, lack = control.drag - loads[0] - drag[0], control.push - loads[1] - push[0]
-    deeper = along = 0.0
+    drag_residual, push_residual = control.drag - loads[0] - drag[0], control.push - loads[1] - push[0]
+    depth_change = travel_change = 0.0
     if stuck and control.kind == DRAG_GIVEN:
         det = push[1] * drag[3] - push[3] * drag[1]
         if det == 0.0:
             return False
-        deeper = (lack * drag[3] - less * push[3]) / det
-        along = (push[1] * less - drag[1] * lack) / det
+        depth_change = (push_residual * drag[3] - drag_residual * push[3]) / det
+        travel_change = (push[1] * drag_residual - drag[1] * push_residual) / det
     elif push[1] != 0.0:
-        deeper = lack / push[1]
-    most = max(abs(deeper), abs(along))
+        depth_change = push_residual / push[1]
+    most = max(abs(depth_change), abs(travel_change))
     if not np.isfinite(most):
         return False
     if most > control.stride:
-        deeper, along = deeper * control.stride / most, along * control.stride / most
+        depth_change, travel_change = depth_change * control.stride / most, travel_change * control.stride / most
     for c in range(answer.shape[0]):
-        answer[c, 0] += deeper * answer[c, 1] + along * answer[c, 3]
-    motion[0], motion[1] = deeper, along
+        answer[c, 0] += depth_change * answer[c, 1] + travel_change * answer[c, 3]
+    motion[0], motion[1] = depth_change, travel_change
     return True
 
 
 @compile_loop
-def meet(states: ContactStates, position: SkinPosition, load: LoadArguments, skin: Skin, length: Array) -> int:
-    """Change `states` where the forces on the skin, or its position, contradict them; return how many were changed.
+def update_contact_states(
+    states: ContactStates, position: SkinPosition, load: LoadArguments, skin: Skin, length: Array
+) -> int:
+    """Update `states` that contradict the forces on the skin or its position; return how many changed.
 
-    The anchors are positions that nodes have slid from. Filled: `length` (k,), of skin on which a bound acts.
+    The anchors are the positions from which nodes have slid. Fills `length` (k,), on which the traction bound acts.
     """
     bounded_length(position.x, skin, states.state, load.mu, length)
     size, slip = length.shape[0], np.empty(length.shape[0])

@@ -1,4 +1,4 @@
-"""How numba compiles the loops, once on a machine, and the types and constants they share."""
+"""Compilation of the loops by numba, once per machine, and the types and constants they share."""
 
 import os
 from collections.abc import Callable, Generator
@@ -16,23 +16,23 @@ States = NDArray[np.int8]
 Loop = TypeVar("Loop", bound=Callable[..., Any])
 Result = TypeVar("Result")
 
-HELD_X, HELD_Y = 1, 2  # of a node of the skin that is held; both: their sum
-OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # states of a node of the skin
-# nan and infinity keep their meaning
+HELD_X, HELD_Y = 1, 2  # flags of a skin node whose displacement is prescribed; their sum: both
+OPEN, STICK, SLIP, SHEAR_LIMITED = 0, 1, 2, 3  # contact states of a skin node
+# all of fastmath except nnan and ninf: nan and infinity keep their meaning
 _OPTIONS: dict[str, Any] = {
     "fastmath": {"contract", "reassoc", "arcp", "nsz"}, "error_model": "numpy", "no_cfunc_wrapper": True,
 }  # fmt: skip
 _FOLDER = Path(__file__).parent
-_ARRAYS = _FOLDER.parent / "arrays.py"  # what the loops take
+_ARRAYS = _FOLDER.parent / "arrays.py"  # types of the loops' arguments
 
 
 def _cache_folder() -> Path:
-    """Return where numba keeps compiled loops: one folder for each version of their sources.
+    """Return the folder where numba keeps compiled loops: one for each version of their sources.
 
-    Numba looks at a loop's own file alone to see whether its code is out of date, and not at what the loop calls. The
-    folder is the first of these in which nobody but the user may write, since the process runs what lies there: the one
-    that the environment variable NUMBA_CACHE_DIR names, one beside the sources, one among the user's own caches, and
-    else an empty one of this process, in which everything is compiled again.
+    Numba checks only the file of a loop to see whether its code is outdated, not the functions that the loop calls. The
+    process runs what lies in the folder, so only the user may have write access. The first such folder is taken: the
+    one that the environment variable NUMBA_CACHE_DIR names, one beside the sources, or one among the user's caches.
+    Without any, this process gets an empty folder and compiles everything again.
     """
     from platformdirs import user_cache_path
 
@@ -40,11 +40,11 @@ def _cache_folder() -> Path:
     for file in (*sorted(_FOLDER.glob("*.py")), _ARRAYS):
         sources.update(file.read_bytes())
     version = f"solver-{sources.hexdigest()}"
-    named = os.environ.get("NUMBA_CACHE_DIR")
+    setting = os.environ.get("NUMBA_CACHE_DIR")
     places = [_FOLDER / "__pycache__"] if only_mine(_FOLDER) else []
     places.append(user_cache_path("daq-app", appauthor=False))
-    if named:
-        places.insert(0, Path(named).parent if Path(named).name == version else Path(named))
+    if setting:
+        places.insert(0, Path(setting).parent if Path(setting).name == version else Path(setting))
     for place in places:
         with suppress(OSError):
             (place / version).mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -54,53 +54,53 @@ def _cache_folder() -> Path:
 
 
 def only_mine(folder: Path) -> bool:
-    """Return whether this user may write in `folder` and no other may, where the system has owners of files."""
+    """Return whether this user may write in `folder` and nobody else may, on systems where files have owners."""
     if not os.access(folder, os.W_OK) or not hasattr(os, "getuid"):
         return os.access(folder, os.W_OK)
     status = folder.stat()
     return status.st_uid == os.getuid() and not status.st_mode & 0o022
 
 
-os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, when it is imported
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_folder())  # numba reads it once, at import
 _numba: Any = import_module("numba")
 _caching: Any = import_module("numba.core.caching")
 events: Any = import_module("numba.core.event")
 
 
 class _SharedCache(_caching.FunctionCache):
-    """Numba's cache on disk, which processes that start together write one after the other.
+    """Numba's cache on disk with a lock, so that processes that start together write one after the other.
 
-    Numba reads the index of a loop, adds an entry, and writes it back: two processes at once could lose an entry, or
-    point it to the other's code.
+    Numba reads the index of a loop, adds an entry, and writes it back. Two processes at once could lose an entry, or
+    make it point to the other's code.
     """
 
     def save_overload(self, sig: object, data: object) -> None:
-        """Keep compiled code and its entry in the index."""
+        """Save compiled code and its index entry."""
         with _alone(Path(os.environ["NUMBA_CACHE_DIR"])):
             _caching.FunctionCache.save_overload(self, sig, data)
 
 
 @contextmanager
 def _alone(folder: Path) -> Generator[None]:
-    """Keep other processes of this machine out until the block ends, where the system has such locks."""
-    with ExitStack() as held:
+    """Hold an exclusive lock on `folder` until the block ends, on systems with file locks."""
+    with ExitStack() as resources:
         try:
             from fcntl import LOCK_EX, flock
 
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            flock(held.enter_context((folder / "lock").open("w")), LOCK_EX)
-        except (ImportError, OSError):  # no such locks here: code may be compiled once more
+            flock(resources.enter_context((folder / "lock").open("w")), LOCK_EX)
+        except (ImportError, OSError):  # no file locks here: a loop may be compiled twice
             pass
         yield
 
 
 def compile_loop(function: Loop) -> Loop:
-    """Return `function` as a loop that numba compiles when Python first calls it, and keeps on disk.
+    """Return `function` as a loop that numba compiles at the first call from Python and caches on disk.
 
-    In another loop that calls it, it is copied: of two versions of it in two loops, the one that a process loads first
-    would serve both, so that the last bits of a result would depend on what was called before, and on whether this
-    process compiled or loaded them. A division by zero makes infinity: to raise would take a branch each time, and a
-    sixth more time to compile.
+    A loop that calls another one inlines its source. Without inlining, the version that a process loads first would
+    serve all callers. The last bits of a result would then depend on earlier calls, and on whether the process compiled
+    or loaded the code. A division by zero gives infinity: to raise would take a branch each time, and a sixth more time
+    to compile.
     """
     loop = _numba.njit(**_OPTIONS, inline="always")(function)
     loop._cache = _SharedCache(function)  # noqa: SLF001 - what `cache=True` does, with a lock
@@ -108,34 +108,33 @@ def compile_loop(function: Loop) -> Loop:
 
 
 def subroutine(function: Loop) -> Loop:
-    """Return `function` as a part of loops, into which LLVM copies it; Python cannot call it.
+    """Return `function` as a subroutine that LLVM inlines into loops; Python cannot call it.
 
-    That takes less time to compile than to copy its source, but hides the shapes of small arrays from LLVM.
+    It compiles faster than inlined source, but hides the shapes of small arrays from LLVM.
     """
     return cast("Loop", _numba.njit(**_OPTIONS, no_cpython_wrapper=True, forceinline=True)(function))
 
 
 def bind_arguments(loop: Callable[..., Result], *last: object) -> Callable[..., Result]:
-    """Return `loop` with its `last` arguments given for good, so that only the first are looked at in every call.
+    """Return `loop` with its `last` arguments bound, so that a call inspects the types of the first ones only.
 
-    For numba to look at thirty arrays takes five times as long as to hand them over, and as long as a tenth of the
-    work on a small mesh.
+    For thirty arrays, numba's inspection takes five times as long as passing them: a tenth of the work on a small mesh.
     """
-    ending = tuple([_kind(argument) for argument in last])
-    mine: dict[tuple[object, ...], Callable[..., Result]] = {}
+    last_kinds = tuple([_kind(argument) for argument in last])
+    entries: dict[tuple[object, ...], Callable[..., Result]] = {}
 
     def call(*first: object) -> Result:
         key = tuple([_kind(argument) for argument in first])
-        entry = mine.get(key)
+        entry = entries.get(key)
         if entry is None:
-            entry = mine[key] = _entry(loop, (key, ending), (*first, *last))
+            entry = entries[key] = _entry(loop, (key, last_kinds), (*first, *last))
         return entry(*first, *last)
 
     return call
 
 
 def _entry(loop: Callable[..., Result], kinds: tuple[object, ...], arguments: tuple[object, ...]) -> Callable[..., Any]:
-    """Return the code of a loop for arguments of these `kinds`, compiled or loaded where it is not there yet."""
+    """Return the compiled code of a loop for arguments of these `kinds`; compile or load it at first use."""
     entry = _ENTRIES.get((loop, *kinds))
     if entry is None:
         dispatcher: Any = loop
@@ -146,7 +145,7 @@ def _entry(loop: Callable[..., Result], kinds: tuple[object, ...], arguments: tu
 
 
 def _kind(argument: Any) -> object:  # noqa: ANN401 - an array, a number, or a tuple of both
-    """Return what tells apart the types that numba knows, found faster than these."""
+    """Return a key that distinguishes the types numba knows; it is faster to find than the types."""
     kind: object = argument.__class__
     if kind is np.ndarray:
         return _array_kind(argument)

@@ -1,6 +1,6 @@
-"""The linear system of contact on the skin: for its steps, or for its forces where the compliance is known.
+"""The linear system of contact on the skin, in displacement steps or, where the compliance is known, in forces.
 
-First the length of skin that each node of it stands for.
+The module begins with the tributary length of each skin node.
 """
 
 import numpy as np
@@ -19,17 +19,17 @@ from solver.arrays import (
 )
 
 COLUMNS = 4  # of the right-hand side
-ZERO = 1e-15  # pivot, by the largest number on the diagonal, that is nothing but round-off
+ZERO = 1e-15  # a pivot below this, relative to the largest diagonal entry, is round-off
 
-# how the length of skin of an edge's first, middle and last node grows with the positions of the three: Simpson's rule
+# tributary lengths of an edge's first, middle and last node by the positions of the three: Simpson's rule
 LENGTHS = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6.0
 
-STEEP = 1.0  # coefficient of friction from which skin that comes to touch is first thought to slip at the bound
+STEEP = 1.0  # above this coefficient of friction, a node that comes into contact is first assumed to be shear-limited
 
 
 @compile_loop
 def tributary(x: Array, at: Narrow, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin each node stands for, `x` (k,) being positions along the surface.
+    """Fill `out` (k,) with the tributary length of skin of each node, `x` (k,) being positions along the surface.
 
     Simpson's rule on edges of three nodes; `at` (k,) is 0 at edge ends, 1 in the middle. The lengths are linear in x.
     """
@@ -43,7 +43,10 @@ def tributary(x: Array, at: Narrow, out: Array) -> None:
 
 @compile_loop
 def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -> None:
-    """Fill `out` (k,) with the length of skin on which a bound acts: what is fixed, and the `tributary` that `rubs`."""
+    """Fill `out` (k,) with the length of skin on which the traction bound acts at each node.
+
+    It is the skin's `fixed_length` plus the `tributary` length of the edges on which the node `rubs`.
+    """
     for i in range(out.shape[0]):
         out[i] = skin.fixed_length[i]
     for i in range(out.shape[0]):
@@ -56,11 +59,11 @@ def bounded_length(x: Array, skin: Skin, state: Narrow, mu: float, out: Array) -
 
 @compile_loop
 def rubs(state: Narrow, edge: int, node: int, mu: float) -> bool:
-    """Return whether a bound acts on the part of an edge, judged at its middle, that one of its nodes stands for.
+    """Return whether the traction bound acts on a node's tributary part of an edge, judged by the edge's middle node.
 
-    Where friction is steep, skin slips at the bound up to where contact ends, which is where a line of the mesh lies:
-    an edge beyond, whose middle is open, is not rubbed. A node that touches alone stands for what touches, however
-    little that is. Where friction is not, pressure limits it there, and contact may end anywhere.
+    With steep friction, skin slips at the bound up to the end of contact, which is a line of the mesh. So the bound
+    does not act on an edge beyond it, whose middle is open. A node that touches alone keeps its tributary length,
+    however small the contact is. With less friction, pressure limits the traction there, and contact may end anywhere.
     """
     other = 2 * node - edge
     return mu <= STEEP or state[edge] != OPEN or other < 0 or other >= state.shape[0] or state[other] == OPEN
@@ -75,11 +78,11 @@ def assemble_contact_system(
     position: SkinPosition,
     system: ContactSystem,
 ) -> int:
-    """Write down the skin's system of contact: return its size f, and fill its `matrix` (f f,) and `right` (f, 4).
+    """Assemble the skin's system of contact in displacement steps; return its size f.
 
-    `length` is that of `bounded_length`. The columns of `right` are the step to equilibrium, and its derivatives
-    with respect to depth, mu and travel of the surface along +x. `steps` (2 k, 4) is filled where the contact's
-    conditions prescribe displacements; what is unknown is listed in `free` (f,).
+    Fills `matrix` (f f,), `right` (f, 4) and the list of unknowns `free` (f,); `steps` (2 k, 4) where the contact
+    conditions prescribe displacements. The columns are the step to equilibrium, and its derivatives with respect to
+    depth, mu and travel of the surface along +x. `length` is that of `bounded_length`.
     """
     state, sense, _ = states
     free, steps, force = system.free, system.steps, body.force
@@ -91,13 +94,13 @@ def assemble_contact_system(
     for r in range(f):
         i: int = free[r] // 2
         right, share, drag = system.right[r], 0.0, 0.0
-        if state[i] == SLIP:  # the drag is so many times the push, which is the force in the row below
+        if state[i] == SLIP:  # T = s mu N, with the normal force N of the row below
             share, drag = sense[i], sense[i] * load.mu
-        mine, push = body.stiffness[free[r]], body.stiffness[2 * i + 1]
+        row, push = body.stiffness[free[r]], body.stiffness[2 * i + 1]
         right[0], right[1] = drag * force[2 * i + 1] - force[free[r]], 0.0
         right[2], right[3] = share * force[2 * i + 1], 0.0
         for j in range(spot.shape[0]):
-            value = mine[j] - drag * push[j]
+            value = row[j] - drag * push[j]
             if spot[j] >= 0:
                 square[r, spot[j]] = value
             else:
@@ -110,7 +113,7 @@ def assemble_contact_system(
 
 @subroutine
 def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: ContactSystem) -> int:
-    """Fill the `steps` that states of contact prescribe, and list the `free` unknowns; return how many those are."""
+    """Fill the `steps` that contact states prescribe, and list the `free` unknowns; return the number of unknowns."""
     free, steps, held = system.free, system.steps, skin.held
     steps[:, :] = 0.0
     f = 0
@@ -135,9 +138,9 @@ def prescribe(skin: Skin, state: Narrow, position: SkinPosition, system: Contact
 def add_bound(
     i: int, drag: float, mu: float, middle: Narrow, state: Narrow, spot: Indices, system: ContactSystem, square: Array
 ) -> None:
-    """Add to node i's row, `square` (f,), the bound's `drag` [MPa] on the length of skin that the node stands for.
+    """Add the traction bound to the row `square` (f,) of node i: `drag` [MPa] times the node's length of skin.
 
-    `spot` (2 k,) is where an unknown of the skin stands in the system, -1 where its step is prescribed.
+    `spot` (2 k,) is the position of each skin unknown in the system, -1 where its step is prescribed.
     """
     r, steps = spot[2 * i], system.steps
     right = system.right[r]
@@ -157,12 +160,13 @@ def add_bound(
 
 @subroutine
 def solve(matrix: Array, right: Array, size: int) -> bool:
-    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4); False if a pivot is noise.
+    """Solve the system of contact, `matrix` (size size,), in place for `right` (size, 4).
 
-    No pivoting: the rows of contact and friction sit in a matrix that is otherwise the tangent of a stable body.
+    Returns False where a pivot is round-off. There is no pivoting: apart from its rows of contact and friction, the
+    matrix is the tangent of a stable body.
     """
     a = matrix[: size * size].reshape(size, size)
-    over = np.empty(size)  # one over the pivots
+    over = np.empty(size)  # reciprocal pivots
     least = 0.0
     for r in range(size):
         least = max(least, ZERO * abs(a[r, r]))
@@ -182,7 +186,7 @@ def solve(matrix: Array, right: Array, size: int) -> bool:
 
 @compile_loop
 def eliminate_row(r: int, a: Array, right: Array, over: Array) -> None:
-    """Take from row r of a system the rows before it, four at a time, whose pivots are one over `over` (r,)."""
+    """Eliminate the rows before row r from it, four at a time; `over` (r,) holds their reciprocal pivots."""
     row = a[r]
     p = 0
     while p + 4 <= r:
@@ -214,15 +218,15 @@ def assemble_force_system(
     states: ContactStates,
     load: LoadArguments,
     position: SkinPosition,
-    untouched: Array,
+    unloaded_step: Array,
     system: ContactSystem,
     forces: Array,
 ) -> int:
-    """Write down the skin's system of contact for its forces: return its size f, and fill its `matrix` and `right`.
+    """Assemble the skin's system of contact in forces, with a known compliance; return its size f.
 
-    That is what `assemble_contact_system` writes down for steps, where the compliance is known. Unknown are the push on
-    what touches, the drag on what sticks, and the parts of the body's m motions, listed in `free` (f,). `untouched`
-    (2 k + m,) is the step without contact. `forces` (2 k + m, 4) is filled where they are known; no column is by mu.
+    Fills the arrays of `assemble_contact_system`. The unknowns are the normal forces on touching nodes, the tangential
+    forces on sticking nodes, and the body's m rigid motions. `unloaded_step` (2 k + m,) is the step without contact.
+    `forces` (2 k + m, 4) is filled where they are known. The derivatives with respect to mu are not computed.
     """
     state, sense, _ = states
     pushes, f = list_forces(skin.held, states, load.tau, system, forces)
@@ -231,17 +235,17 @@ def assemble_force_system(
     right[:f] = 0.0
     for r in range(f):
         row = free[r]
-        i, mine = row // 2, compliance[row]
+        i, response = row // 2, compliance[row]
         for c in range(f):
-            square[r, c] = mine[free[c]]
+            square[r, c] = response[free[c]]
         for c in range(pushes):
             j = free[c] // 2
             if state[j] == SLIP:
-                square[r, c] += sense[j] * load.mu * mine[2 * j]
-        right[r, 0] = -untouched[row]
+                square[r, c] += sense[j] * load.mu * response[2 * j]
+        right[r, 0] = -unloaded_step[row]
         for j in range(state.shape[0]):
             if state[j] == SHEAR_LIMITED:
-                right[r, 0] -= mine[2 * j] * forces[2 * j, 0]
+                right[r, 0] -= response[2 * j] * forces[2 * j, 0]
         if r < pushes:
             right[r, 0] -= position.above[i]
             right[r, 1] = 1.0
@@ -255,9 +259,9 @@ def assemble_force_system(
 def list_forces(
     held: Narrow, states: ContactStates, tau: float, system: ContactSystem, forces: Array
 ) -> tuple[int, int]:
-    """List what is unknown in `free`, pushes first, fill those `forces` that are known; return how many are pushes.
+    """List the unknown forces in `free`, normal forces first, and fill the known `forces`.
 
-    Then how many are unknown.
+    Returns the number of unknown normal forces, and the number of all unknowns.
     """
     state, sense, _ = states
     forces[:, :] = 0.0

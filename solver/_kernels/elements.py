@@ -1,4 +1,4 @@
-"""Elements: their integrals, forces and tangents. e elements of nine nodes, q = 9 quadrature points."""
+"""Integrals, forces and tangents of e nine-node elements with q = 9 quadrature points."""
 
 import numpy as np
 
@@ -15,29 +15,29 @@ from solver.arrays import (
     ShapeFunctions,
 )
 
-PLAIN = 2.0  # exponent of tissue that does not stiffen
+PLAIN = 2.0  # Ogden's exponent of the neo-Hookean law, which does not stiffen
 
 
 @compile_loop
 def shear_growth(exponent: float, excess: float) -> tuple[float, float]:
-    """Return by how much the shear modulus has grown, and how fast it grows: `hyperelastic.slopes`."""
+    """Return the growth factor f of the shear modulus and df/dQ at Q = `excess`, as `constitutive.slopes` does."""
     if excess > 0.04:
         s = np.arcsinh(0.5 * np.sqrt(excess))
         two = np.sinh(2.0 * s)
-        grown = 2.0 / exponent * np.sinh(exponent * s) / two
-        return grown, (np.cosh(exponent * s) - grown * np.cosh(2.0 * s)) / (2.0 * two * two)
-    x, grown, growth, term = -excess / 4.0, 1.0, 0.0, 1.0
+        value = 2.0 / exponent * np.sinh(exponent * s) / two
+        return value, (np.cosh(exponent * s) - value * np.cosh(2.0 * s)) / (2.0 * two * two)
+    x, value, slope, term = -excess / 4.0, 1.0, 0.0, 1.0
     for n in range(14):
         factor = (1.0 + exponent / 2.0 + n) * (1.0 - exponent / 2.0 + n) / ((1.5 + n) * (n + 1.0))
-        growth -= (n + 1.0) / 4.0 * factor * term
+        slope -= (n + 1.0) / 4.0 * factor * term
         term *= factor * x
-        grown += term
-    return grown, growth
+        value += term
+    return value, slope
 
 
 @compile_loop
 def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[float, float, float, float]:
-    """Return du/dX at a point, xx, xy, yx, yy, of nodal displacements `ux`, `uy` (9,) and gradients `gx`, `gy` (9,)."""
+    """Return du/dX at a point, xx, xy, yx, yy, from nodal values `ux`, `uy` (9,) and gradients `gx`, `gy` (9,)."""
     xx, xy, yx, yy = 0.0, 0.0, 0.0, 0.0
     for i in range(9):
         xx += ux[i] * gx[i]
@@ -49,26 +49,26 @@ def displacement_gradient(ux: Array, uy: Array, gx: Array, gy: Array) -> tuple[f
 
 @compile_loop
 def volume_growth(xx: float, xy: float, yx: float, yy: float) -> float:
-    """Return det F - 1 of a displacement gradient, to its own digits: stiff tissue multiplies them."""
+    """Return det F - 1 of a displacement gradient without cancellation: stiff tissue multiplies its error."""
     return xx + yy + xx * yy - xy * yx
 
 
 @compile_loop
 def excess_of(xx: float, xy: float, yx: float, yy: float, log: float) -> float:
-    """Return F:F - 2 - 2 ln J of a displacement gradient and `log` J, to its own digits."""
+    """Return F:F - 2 - 2 ln J of a displacement gradient and `log` = ln J, without cancellation."""
     return 2.0 * (xx + yy - log) + xx * xx + xy * xy + yx * yx + yy * yy
 
 
 @compile_loop
 def gather(u: Array, nodes: Narrow | Indices, e: int, ux: Array, uy: Array) -> None:
-    """Fill `ux`, `uy` (9,) with the displacements of the nodes of an element."""
+    """Fill `ux`, `uy` (9,) with the nodal displacements of element `e`."""
     for i in range(9):
         ux[i], uy[i] = u[nodes[e, i], 0], u[nodes[e, i], 1]
 
 
 @compile_loop
 def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
-    """Fill the `geometry` of elements whose `nodes` (e, 9) lie at `place` (n, 2); False where one is folded."""
+    """Fill the `geometry` of elements with `nodes` (e, 9) at `place` (n, 2); return False where one is folded."""
     px, py, work = np.empty(9), np.empty(9), np.empty(9)
     for e in range(nodes.shape[0]):
         gather(place, nodes, e, px, py)
@@ -104,7 +104,7 @@ def integrate(place: Array, nodes: Indices, shapes: ShapeFunctions, geometry: El
 
 @compile_loop
 def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: ElementGeometry) -> bool:
-    """Fill gradients and weights of an element with nodes at `px`, `py` (9,), and x, y in place of its modes."""
+    """Fill an element's gradients and weights for nodes at `px`, `py` (9,), and x, y in place of its modes."""
     values, along, up, weights = shapes
     centre = geometry.centre[e]
     centre[0] = centre[1] = 0.0
@@ -129,12 +129,12 @@ def map_points(e: int, px: Array, py: Array, shapes: ShapeFunctions, geometry: E
 
 
 @compile_loop
-def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, system: ElementSystem) -> float:
+def assemble(u: Array, pressure: Array, new_tangent: bool, elements: ElementArrays, system: ElementSystem) -> float:
     """Fill the elements' `system` at displacements `u` (nodes, 2); return the least det F.
 
-    `pressure` (e, 3) are the pressure modes that the tangent sees (the linearised prediction), while the forces follow
-    from `u` alone. Unless `anew`, the tangent is one assembled before. Where det F is not positive, the system is left
-    half filled.
+    `pressure` (e, 3) are the pressure modes in the tangent (the linearised prediction); the forces follow from `u`
+    alone. Without `new_tangent`, the tangent of an earlier call is kept. Where det F is not positive, the system is
+    incomplete.
     """
     system.force[:] = 0.0
     least = np.inf
@@ -144,14 +144,14 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
         np.empty(9), np.empty(9), np.empty((3, 18)), np.empty(18), np.empty((9, 16)), np.empty((9, 16)),
         np.empty((9, 9)), np.empty((18, 5)), np.empty((5, 16)), np.zeros((18, 18)), np.empty((16, 16)),
     )  # fmt: skip
-    relaxes, filled = system.more_tangent.shape[0] > 0, False
+    relaxes, filled = system.overstress_tangent.shape[0] > 0, False
     for e in range(elements.nodes.shape[0]):
         gather(u, elements.nodes, e, ux, uy)
         least = min(least, strain_points(e, ux, uy, elements, work, system.volume))
         if not least > 0.0:
             return least
         sum_forces(e, elements, work, system)
-        if anew:
+        if new_tangent:
             stiffens = elements.stiffening[e] != PLAIN
             deform_gradients(e, stiffens, pressure, elements, work)
             if stiffens:
@@ -172,53 +172,53 @@ def assemble(u: Array, pressure: Array, anew: bool, elements: ElementArrays, sys
 
 @compile_loop
 def strain_points(e: int, ux: Array, uy: Array, elements: ElementArrays, work: ElementWork, volume: Array) -> float:
-    """Fill what an element's quadrature points are strained, and its modes of `volume`; return its least det F."""
-    turned, exceeds, wide, push, more = work.turned, work.exceeds, work.wide, work.push, work.more
+    """Fill the deformation at an element's quadrature points, and its modes of `volume`; return its least det F."""
+    f_inv_t, f_diff, wide, push, shear_slope = work.f_inv_t, work.f_diff, work.wide, work.push, work.shear_slope
     v0 = v1 = v2 = 0.0
     exponent, shear = elements.stiffening[e], elements.shear[e]
     least = np.inf
     for q in range(9):
         h00, f01, f10, h11 = displacement_gradient(ux, uy, elements.grad_x[e, q], elements.grad_y[e, q])
-        grown = volume_growth(h00, f01, f10, h11)
-        f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + grown
+        dilation = volume_growth(h00, f01, f10, h11)
+        f00, f11, j = 1.0 + h00, 1.0 + h11, 1.0 + dilation
         least = min(least, j)
         if not j > 0.0:
             break
         w = elements.weight[e, q]
         w0, w1, w2 = w * elements.modes[e, q, 0], w * elements.modes[e, q, 1], w * elements.modes[e, q, 2]
         wide[q, 0], wide[q, 1], wide[q, 2] = w0, w1, w2
-        log = np.log1p(grown)
+        log = np.log1p(dilation)
         v0 += w0 * log
         v1 += w1 * log
         v2 += w2 * log
         wg = w * shear
         if exponent != PLAIN:
             factor, growth = shear_growth(exponent, excess_of(h00, f01, f10, h11, log))
-            more[q] = 2.0 * growth * wg
+            shear_slope[q] = 2.0 * growth * wg
             wg *= factor
         push[q] = wg
         over = 1.0 / j
         a00, a01, a10, a11 = f11 * over, -f10 * over, -f01 * over, f00 * over
-        turned[q, 0], turned[q, 1], turned[q, 2], turned[q, 3] = a00, a01, a10, a11
-        exceeds[q, 0], exceeds[q, 1] = (h00 - h11 + grown * f00) * over, f01 - a01  # to its own digits
-        exceeds[q, 2], exceeds[q, 3] = f10 - a10, (h11 - h00 + grown * f11) * over
+        f_inv_t[q, 0], f_inv_t[q, 1], f_inv_t[q, 2], f_inv_t[q, 3] = a00, a01, a10, a11
+        f_diff[q, 0], f_diff[q, 1] = (h00 - h11 + dilation * f00) * over, f01 - a01  # without cancellation
+        f_diff[q, 2], f_diff[q, 3] = f10 - a10, (h11 - h00 + dilation * f11) * over
     volume[e, 0], volume[e, 1], volume[e, 2] = v0, v1, v2
     return least
 
 
 @compile_loop
 def sum_forces(e: int, elements: ElementArrays, work: ElementWork, system: ElementSystem) -> None:
-    """Fill an element's forces `f` (18,)."""
-    turned, exceeds, wide, push, f = work.turned, work.exceeds, work.wide, work.push, work.f
-    lam, relaxes = elements.lame[e], system.more_force.shape[0] > 0
+    """Fill an element's internal forces `f` (18,)."""
+    f_inv_t, f_diff, wide, push, f = work.f_inv_t, work.f_diff, work.wide, work.push, work.f
+    lam, relaxes = elements.lame[e], system.overstress_force.shape[0] > 0
     v0, v1, v2 = lam * system.volume[e, 0], lam * system.volume[e, 1], lam * system.volume[e, 2]
     for c in range(18):
-        f[c] = system.more_force[e, c] if relaxes else 0.0
+        f[c] = system.overstress_force[e, c] if relaxes else 0.0
     for q in range(9):
         gx, gy, g = elements.grad_x[e, q], elements.grad_y[e, q], push[q]
         pressure = wide[q, 0] * v0 + wide[q, 1] * v1 + wide[q, 2] * v2
-        p00, p01 = g * exceeds[q, 0] + pressure * turned[q, 0], g * exceeds[q, 1] + pressure * turned[q, 1]
-        p10, p11 = g * exceeds[q, 2] + pressure * turned[q, 2], g * exceeds[q, 3] + pressure * turned[q, 3]
+        p00, p01 = g * f_diff[q, 0] + pressure * f_inv_t[q, 0], g * f_diff[q, 1] + pressure * f_inv_t[q, 1]
+        p10, p11 = g * f_diff[q, 2] + pressure * f_inv_t[q, 2], g * f_diff[q, 3] + pressure * f_inv_t[q, 3]
         for i in range(8):
             f[i] += p00 * gx[i] + p01 * gy[i]
             f[8 + i] += p10 * gx[i] + p11 * gy[i]
@@ -233,9 +233,9 @@ def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementA
     p0, p1, p2 = pressure[e, 0], pressure[e, 1], pressure[e, 2]
     for q in range(9):
         bend[q] = work.push[q] - (wide[q, 0] * p0 + wide[q, 1] * p1 + wide[q, 2] * p2)
-        push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.turned[q], h[q])
+        push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.f_inv_t[q], h[q])
         if stiffens:
-            push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.exceeds[q], s[q])
+            push_forward(elements.grad_x[e, q], elements.grad_y[e, q], work.f_diff[q], s[q])
     for c in range(18):
         d0 = d1 = d2 = 0.0
         for q in range(9):
@@ -248,7 +248,7 @@ def deform_gradients(e: int, stiffens: bool, pressure: Array, elements: ElementA
 
 @compile_loop
 def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
-    """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient: x of all, y of all, centre."""
+    """Fill `out` (18,) with a matrix `by` (xx, xy, yx, yy) times each node's gradient, ordered as in `ElementWork`."""
     for i in range(8):
         out[i], out[8 + i] = by[0] * gx[i] + by[1] * gy[i], by[2] * gx[i] + by[3] * gy[i]
     out[16], out[17] = by[0] * gx[8] + by[1] * gy[8], by[2] * gx[8] + by[3] * gy[8]
@@ -256,7 +256,7 @@ def push_forward(gx: Array, gy: Array, by: Array, out: Array) -> None:
 
 @compile_loop
 def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
-    """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus, which is `push` (q,) by weight."""
+    """Fill `out` (9, 9) with the integrals of grad N_i . grad N_j times a modulus; `push` (q,) holds it by weight."""
     for i in range(9):
         for c in range(9):
             out[i, c] = 0.0
@@ -268,9 +268,9 @@ def sum_laplace(grad_x: Array, grad_y: Array, push: Array, out: Array) -> None:
 
 @compile_loop
 def sum_geometric(work: ElementWork) -> None:
-    """Fill the products of deformed gradients: each node's x, then its y, by all of the outer nodes.
+    """Fill the products of deformed gradients: of each node's x, then its y, with those of all outer nodes.
 
-    Rows of the one go with columns of the other.
+    For a row along x and a column along y, the tangent takes y of the row's node and x of the column's.
     """
     h, bend, by_x, by_y = work.h, work.bend, work.by_x, work.by_y
     for i in range(9):
@@ -285,20 +285,20 @@ def sum_geometric(work: ElementWork) -> None:
 
 @compile_loop
 def sum_dyads(e: int, stiffens: bool, work: ElementWork, system: ElementSystem) -> None:
-    """Fill `own` (18, 18) with what makes an element stiffer as it is strained, and with what relaxing tissue adds."""
-    s, more, own = work.s, work.more, work.own
+    """Fill `own` (18, 18) with the stiffening term of an element's tangent and the tangent of the overstress."""
+    s, shear_slope, own = work.s, work.shear_slope, work.own
     for i in range(18):
         for c in range(18):
-            own[i, c] = system.more_tangent[e, i, c] if system.more_tangent.shape[0] > 0 else 0.0
+            own[i, c] = system.overstress_tangent[e, i, c] if system.overstress_tangent.shape[0] > 0 else 0.0
         for q in range(9 if stiffens else 0):
-            x = more[q] * s[q, i]
+            x = shear_slope[q] * s[q, i]
             for c in range(18):
                 own[i, c] += x * s[q, c]
 
 
 @compile_loop
 def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
-    """Fill what eliminates an element's centre, which meets no other element: in the `system`, `left` and `right`."""
+    """Eliminate an element's centre node, which no other element shares: fill the `system`, `left` and `right`."""
     h, bend, d, own, by_x, by_y = work.h, work.bend, work.d, work.own, work.by_x, work.by_y
     left, right, even, inverse = work.left, work.right, work.laplace, system.condensed_inverse
     xx, yy, xy = even[8, 8] + own[16, 16], even[8, 8] + own[17, 17], own[17, 16]
@@ -330,7 +330,7 @@ def eliminate_centre(e: int, work: ElementWork, system: ElementSystem) -> None:
 
 @compile_loop
 def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
-    """Fill an element's tangent, lower half, its centre eliminated, and how its volume modes follow displacements."""
+    """Fill an element's condensed tangent, lower half, and the derivatives of its volume modes by displacements."""
     left, right, own, even, tangent = work.left, work.right, work.own, work.laplace, system.tangent
     by_x, by_y, product = work.by_x, work.by_y, work.product
     for m in range(3):
@@ -352,7 +352,7 @@ def write_tangent(e: int, work: ElementWork, system: ElementSystem) -> None:
 
 @compile_loop
 def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None:
-    """Add an element's forces `f` (18,), its centre eliminated, and fill what recovers the centre under them."""
+    """Add an element's condensed forces to the system, and fill the share of `f` (18,) in the centre's displacement."""
     recovery_matrix, inverse = system.recovery_matrix, system.condensed_inverse
     for m in range(2):
         recovery_matrix[e, m, 16] = inverse[e, m] * f[16] + inverse[e, m + 1] * f[17]
@@ -368,10 +368,10 @@ def add_forces(e: int, unknown: Narrow, f: Array, system: ElementSystem) -> None
 def advance(
     before: BodyState, step: Array, scale: float, after: BodyState, elements: ElementArrays, system: ElementSystem
 ) -> float:
-    """Fill the state `after` going `scale` times the `step` (n,) of the unknowns; return the largest move.
+    """Fill the state `after` going `scale` times the `step` (n,); return the largest component of the full step.
 
-    The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed
-    integration points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
+    The pressure is the linearised prediction at the end of the full step, approached by `scale`: the mixed integration
+    points of Magisano, Leonetti and Garcea (2017), Int. J. Numer. Meth. Eng. 109, 1237.
     """
     nodes, unknown, lame = elements.nodes, elements.unknown, elements.lame
     recovery_matrix, dilate, volume = system.recovery_matrix, system.dilate, system.volume

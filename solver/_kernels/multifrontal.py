@@ -1,8 +1,8 @@
-"""Elimination of a symmetric body down to its skin, part by part of a `SymbolicFactorization`.
+"""Multifrontal elimination of a symmetric body down to its skin, part by part of a `SymbolicFactorization`.
 
-n unknowns are numbered in the order of their elimination, the m of the skin last. A part's front is a symmetric matrix
-of its inner unknowns (k, eliminated in it) and its border (b, passed on to its parent). The inner rows of its factor
-U = D L^T are kept, (k, k + b) numbers each part, upper half; the border's rows (b, b) wait in `waiting` for the parent.
+The n unknowns are numbered in elimination order, the m of the skin last. A part's front is a symmetric matrix of its
+inner unknowns (k, eliminated here) and its border (b, passed on to the parent). The inner rows of its factor U = D L^T
+are kept: (k, k + b) numbers, upper half. The border's Schur complement (b, b) stays in `waiting` for the parent.
 """
 
 import numpy as np
@@ -10,18 +10,17 @@ import numpy as np
 from solver._kernels.compiling import compile_loop
 from solver.arrays import Array, Factors, Flags, Narrow, SymbolicFactorization
 
-UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # what `eliminate` returns
+UNSOLVABLE, INDEFINITE, DEFINITE = 0, 1, 2  # results of `eliminate`
 
 
 @compile_loop
 def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiting: Array, skin: Array) -> int:
-    """Fill `factors` and the skin's stiffness `skin` (m, m); return UNSOLVABLE where a pivot is zero, else the sign.
+    """Fill `factors` and the skin's condensed stiffness `skin` (m, m); return the sign of the pivots.
 
-    That is DEFINITE where every pivot is positive, as those of a stable body are, else INDEFINITE.
-
-    `tangent` (e, 16, 16), lower half, of the elements; `factors` and `waiting` are memory as large as `plan` says.
-    There is no pivoting: with its skin held, the tissue inside is stable but for what its pressure adds on the way to
-    an equilibrium.
+    It is UNSOLVABLE where a pivot is zero, DEFINITE where all are positive, as in a stable body, else INDEFINITE.
+    `tangent` (e, 16, 16) holds the element tangents, lower half. `plan` gives the sizes of `factors` and `waiting`.
+    There is no pivoting: while the skin is held, only pressure on the way to an equilibrium can make the inside
+    unstable.
     """
     inner, border, factor_at, wait_at = plan.inner, plan.border, plan.factor_at, plan.wait_at
     sign = DEFINITE
@@ -39,7 +38,7 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
                 size, first = border[child], plan.border_at[child]
                 below = waiting[wait_at[child] : wait_at[child] + size * size].reshape(size, size)
                 _add_child(below, plan.place[first : first + size], plan.run[first : first + size], top, rest)
-        if not _factorised(top, rest):
+        if not _factorise(top, rest):
             return UNSOLVABLE
         for i in range(k):
             if not top[i, i] > 0.0:
@@ -54,7 +53,7 @@ def eliminate(tangent: Array, plan: SymbolicFactorization, factors: Array, waiti
 
 @compile_loop
 def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
-    """Add an element's tangent `own` (16, 16), lower half, to a front in which its unknowns stand `at` (16,)."""
+    """Add an element's tangent `own` (16, 16), lower half, to a front; `at` (16,) are its unknowns' positions there."""
     k = top.shape[0]
     for i in range(16):
         for j in range(i + 1):
@@ -67,9 +66,9 @@ def _add_element(own: Array, at: Narrow, top: Array, rest: Array) -> None:
 
 @compile_loop
 def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Array) -> None:
-    """Add what a child passes on, `below` (b, b), to the front in which its border stands `where` (b,).
+    """Add a child's Schur complement `below` (b, b) to the front in which its border has positions `where` (b,).
 
-    Neighbours stay neighbours for long runs, of which `ends` (b,) are the ends.
+    Positions are consecutive over long runs; `ends` (b,) are the ends of these runs.
     """
     k, size = top.shape[0], below.shape[0]
     for i in range(size):
@@ -88,15 +87,15 @@ def _add_child(below: Array, where: Narrow, ends: Narrow, top: Array, rest: Arra
 
 
 @compile_loop
-def _factorised(top: Array, rest: Array) -> bool:
-    """Replace the inner rows `top` (k, k + b) by their factor, and `rest` (b, b) by what it leaves; upper halves.
+def _factorise(top: Array, rest: Array) -> bool:
+    """Factorise a front in place, upper halves only; return False where a pivot is zero.
 
-    Rows are finished two at a time, and those of `rest` updated four at a time, by four finished rows at a time: that
-    keeps most numbers in registers and the nearest cache. What rows updated together hold before their diagonals is of
-    no meaning.
+    The inner rows `top` (k, k + b) become their factor, and `rest` (b, b) the Schur complement. Rows are finished two
+    at a time; those of `rest` are updated four at a time, by four finished rows at a time. That keeps most numbers in
+    registers and the nearest cache. In rows updated together, entries before the diagonal have no meaning.
     """
     k, b = top.shape[0], rest.shape[0]
-    over = np.empty(k)  # one over the pivots
+    over = np.empty(k)  # reciprocal pivots
     for r in range(0, k - 1, 2):
         one, two = top[r, r:], top[r + 1, r:]
         _update_two(top, over, r, r, one, two)
@@ -123,7 +122,7 @@ def _factorised(top: Array, rest: Array) -> bool:
 
 @compile_loop
 def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Array) -> None:
-    """Take from rows r and r + 1 of a front, both given from column r on, what the first `count` rows hold of them."""
+    """Subtract the contributions of the first `count` rows from rows r and r + 1 of a front, given from column r on."""
     size = one.shape[0]
     p = 0
     while p + 4 <= count:
@@ -147,7 +146,7 @@ def _update_two(top: Array, over: Array, count: int, r: int, one: Array, two: Ar
 
 @compile_loop
 def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three: Array, four: Array) -> None:
-    """Take from rows r to r + 3 of a front, all given from column r on, what the rows of `top` hold of them."""
+    """Subtract the contributions of the rows of `top` from rows r to r + 3 of a front, given from column r on."""
     p, count = 0, top.shape[0]
     while p + 4 <= count:
         d0, d1, d2, d3 = over[p], over[p + 1], over[p + 2], over[p + 3]
@@ -177,7 +176,7 @@ def _update_four(top: Array, over: Array, r: int, one: Array, two: Array, three:
 
 @compile_loop
 def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None:
-    """Take from row r of a front, given from column r on, what the first `count` rows hold of it."""
+    """Subtract the contributions of the first `count` rows from row r of a front, given from column r on."""
     for p in range(count):
         s0 = top[p, r:]
         a0 = s0[0] * over[p]
@@ -187,29 +186,29 @@ def _update_one(top: Array, over: Array, count: int, r: int, one: Array) -> None
 
 @compile_loop
 def condense(force: Array, factors: Factors) -> None:
-    """Replace `force` (n,) by L^-1 force inside the body, and at its end by the force that the skin feels."""
+    """Replace `force` (n,) by L^-1 force inside the body and, at its end, by the force condensed to the skin."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors
     for p in range(start.shape[0]):
         k, b, first = inner[p], border[p], start[p]
         top = values[factor_at[p] : factor_at[p] + k * (k + b)].reshape(k, k + b)
-        passed = near[:b]
-        passed[:] = 0.0
+        border_force = near[:b]
+        border_force[:] = 0.0
         for i in range(k):
             row = top[i]
             part = force[first + i] / row[i]
-            mine, across = force[first + i + 1 : first + k], row[i + 1 : k]
+            target, across = force[first + i + 1 : first + k], row[i + 1 : k]
             for j in range(k - i - 1):
-                mine[j] -= across[j] * part
+                target[j] -= across[j] * part
             across = row[k:]
             for j in range(b):
-                passed[j] += across[j] * part
+                border_force[j] += across[j] * part
         for j in range(b):
-            force[numbers[border_at[p] + j]] -= passed[j]
+            force[numbers[border_at[p] + j]] -= border_force[j]
 
 
 @compile_loop
-def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -> None:
-    """Fill the displacements of `out` (n,) which part `p` of the body eliminates; those of its border are there."""
+def back_substitute_part(p: int, condensed_force: Array, factors: Factors, out: Array) -> None:
+    """Fill `out` (n,) with the displacements that part `p` of the body eliminates, from those of its border."""
     start, inner, border, border_at, numbers, factor_at, values, near = factors
     k, b, first = inner[p], border[p], start[p]
     wide = k + b
@@ -218,17 +217,17 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
     for j in range(b):
         near[k + j] = out[beyond[j]]
     i = k
-    while i >= 2:  # two rows at a time, which share what they ask for
+    while i >= 2:  # two rows at a time: they share the reads of `solution`
         i -= 2
-        one, two, known = top[i, i:], top[i + 1, i:], near[i:wide]
-        x, y = carried[first + i], carried[first + i + 1]
+        one, two, solution = top[i, i:], top[i + 1, i:], near[i:wide]
+        x, y = condensed_force[first + i], condensed_force[first + i + 1]
         for j in range(2, wide - i):
-            x += one[j] * known[j]
-            y += two[j] * known[j]
+            x += one[j] * solution[j]
+            y += two[j] * solution[j]
         y = -y / two[1]
         near[i], near[i + 1] = -(x + one[1] * y) / one[0], y
     if i == 1:
-        one, x = top[0], carried[first]
+        one, x = top[0], condensed_force[first]
         for j in range(1, wide):
             x += one[j] * near[j]
         near[0] = -x / one[0]
@@ -237,22 +236,22 @@ def back_substitute_part(p: int, carried: Array, factors: Factors, out: Array) -
 
 
 @compile_loop
-def back_substitute(carried: Array, skin: Array, needed: Flags, out: Array, factors: Factors) -> None:
-    """Fill `out` (n,) with the displacements under -`carried` (n,), of `condense`, when the skin's are `skin` (m,).
+def back_substitute(condensed_force: Array, skin: Array, needed: Flags, out: Array, factors: Factors) -> None:
+    """Fill `out` (n,) with all displacements for the skin's, `skin` (m,), under the loads of -`condensed_force` (n,).
 
-    Parts of the body that are not `needed` (p,) are left out.
+    `condensed_force` is the result of `condense`. Parts of the body that are not `needed` (p,) are skipped.
     """
     first = out.shape[0] - skin.shape[0]
     for i in range(skin.shape[0]):
         out[first + i] = skin[i]
     for p in range(needed.shape[0] - 1, -1, -1):
         if needed[p]:
-            back_substitute_part(p, carried, factors, out)
+            back_substitute_part(p, condensed_force, factors, out)
 
 
 @compile_loop
 def displace(
-    carried: Array,
+    condensed_force: Array,
     skin: Array,
     needed: Flags,
     nodes: Narrow,
@@ -261,13 +260,14 @@ def displace(
     out: Array,
     factors: Factors,
 ) -> None:
-    """Fill the displacements `out` (n, 2, c) of `nodes` (e, 9) by their `unknown` (e, 8, 2), for the skin's (c, m).
+    """Fill `out` (n, 2, c) with the displacements of `nodes` (e, 9) for the skin's (c, m).
 
-    Those of the centres follow from the others by `recovery_matrix` (e, 2, 16).
+    `unknown` (e, 8, 2) are the unknowns of the outer nodes, -1 where fixed. The displacement of a centre follows from
+    those of its outer nodes by `recovery_matrix` (e, 2, 16).
     """
-    inside = np.zeros(carried.shape[0])
+    inside = np.zeros(condensed_force.shape[0])
     for c in range(skin.shape[0]):
-        back_substitute(carried, skin[c], needed, inside, factors)
+        back_substitute(condensed_force, skin[c], needed, inside, factors)
         for e in range(nodes.shape[0]):
             x = y = 0.0
             for i in range(16):

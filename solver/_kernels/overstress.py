@@ -1,4 +1,4 @@
-"""What relaxing tissue adds to the forces and tangents of elements."""
+"""Forces and tangents of elements from the overstress of relaxing tissue."""
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from solver.arrays import Array, ElementArrays
 def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, tangent: Array, points: Array) -> None:
     """Fill `force` (e, 18) and `tangent` (e, 18, 18) of W = 1/2 J^-2/3 T:C at displacements `u` (nodes, 2).
 
-    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. Both are ordered as in `ElementWork`; of the tangent is filled what
-    is of a node and one that is no later. `points` (4, 9) is memory for F T and F^-T times the gradients.
+    `tensor` (e, q, 4) is T: xx, yy, xy, zz [MPa]. Both are ordered as in `ElementWork`. The tangent is filled only
+    where the column's node does not come after the row's. `points` (4, 9) is memory for F T and F^-T times the
+    gradients.
     """
     ux, uy = np.empty(9), np.empty(9)
     mx, my, hx, hy = points[0], points[1], points[2], points[3]
@@ -32,7 +33,7 @@ def overstress(u: Array, tensor: Array, elements: ElementArrays, force: Array, t
             m00, m01 = f00 * t0 + f01 * t2, f00 * t2 + f01 * t1
             m10, m11 = f10 * t0 + f11 * t2, f10 * t2 + f11 * t1
             whole = f00 * m00 + f01 * m01 + f10 * m10 + f11 * m11 + tensor[e, q, 3]
-            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # inverse transposed
+            a00, a01, a10, a11 = f11 / j, -f10 / j, -f01 / j, f00 / j  # F^-T
             part, third = c * 2.0 / 3.0, c * whole / 3.0
             dyadic = part * whole / 3.0
             for i in range(9):

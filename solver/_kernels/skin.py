@@ -1,24 +1,24 @@
-"""The deformed skin as a line: how far it is squeezed, whether it crosses itself."""
+"""Stretch and self-intersection of the deformed skin."""
 
 import numpy as np
 
 from solver._kernels.compiling import OPEN, compile_loop
 from solver.arrays import Array, Flags, Indices, Narrow
 
-SQUEEZED = 0.85  # stretch of skin, on one side at least, in which a kink counts
+SQUEEZED = 0.85  # stretch on at least one side below which a jump of the tangent counts as a kink
 
 
 @compile_loop
 def measure_compression(
     nodes: Array, u: Array, outline: Indices, loose: Flags, state: Narrow, first: int
 ) -> tuple[float, int, float, float]:
-    """Return how far the skin is squeezed where its elements are `loose` (a,), as in `SkinCompression`.
+    """Return the fields of `SkinCompression` for the elements where `loose` (a,) is true.
 
-    `nodes` (n, 2) undeformed, `u` (n, 2) displacements, `outline` (2 a + 1,) the nodes of the skin in order, of which
-    those from number `first` on may touch, as `state` (k,) says.
+    `nodes` (n, 2) are undeformed positions and `u` (n, 2) displacements. `outline` (2 a + 1,) lists the skin's nodes in
+    order. Those from number `first` on may touch; `state` (k,) holds their contact states.
     """
     least, place, lowest, kink = np.inf, 0, np.inf, 0.0
-    before_x, before_y = np.nan, np.nan  # tangent at the end of the element before
+    before_x, before_y = np.nan, np.nan  # tangent at the end of the previous element
     for j in range(loose.shape[0]):
         if not loose[j]:
             before_x, before_y = np.nan, np.nan
@@ -46,7 +46,7 @@ def measure_compression(
 
 @compile_loop
 def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
-    """Return whether the deformed line meets itself other than at the nodes that join its pieces."""
+    """Return whether the deformed skin intersects itself; neighbouring segments that share a node do not count."""
     count = outline.shape[0]
     x, y = np.empty(count), np.empty(count)
     for i in range(count):
@@ -56,7 +56,7 @@ def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
         before = dx * (y[i + 2] - y[i]) - dy * (x[i + 2] - x[i])
         for j in range(i + 2, count - 1):
             side = dx * (y[j + 1] - y[i]) - dy * (x[j + 1] - x[i])
-            if before * side < 0.0:  # the ends of piece j lie on both sides of the line of piece i
+            if before * side < 0.0:  # segment j has its ends on both sides of the line through segment i
                 ex, ey = x[j + 1] - x[j], y[j + 1] - y[j]
                 one = ex * (y[i] - y[j]) - ey * (x[i] - x[j])
                 other = ex * (y[i + 1] - y[j]) - ey * (x[i + 1] - x[j])
@@ -68,8 +68,8 @@ def crosses(nodes: Array, u: Array, outline: Indices) -> bool:
 
 @compile_loop
 def _overlap(at: Array, i: int, j: int) -> bool:
-    """Return whether the pieces that begin at points `i` and `j` share positions along one axis.
+    """Return whether the segments that start at points `i` and `j` overlap along one axis.
 
-    Pieces of a straight line do not; rounding alone decides on which sides of each other they lie.
+    Segments of one straight line do not; on which side of each other they lie is decided by round-off alone.
     """
     return max(at[i], at[i + 1]) >= min(at[j], at[j + 1]) and max(at[j], at[j + 1]) >= min(at[i], at[i + 1])

@@ -200,7 +200,7 @@ class Newton:
         zero = np.zeros(skin, np.int32)
         self._states = ContactStates(zero, zero.copy(), np.zeros((skin, 2)))
         self._active_set = bind_arguments(active_set.solve_active_set, self.system)
-        self._meet = bind_arguments(active_set.meet, self.skin, self.system.length)
+        self._meet = bind_arguments(active_set.update_contact_states, self.skin, self.system.length)
 
     def linearise(
         self,

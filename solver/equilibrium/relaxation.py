@@ -176,7 +176,7 @@ class CondensedRelaxing(CondensedFinite):
         return super().resist(u)
 
     def _add(self, u: Array) -> None:
-        more = self.system.more_force, self.system.more_tangent
+        more = self.system.overstress_force, self.system.overstress_tangent
         overstress_loops.overstress(u, self.tensor, self.body.elements, *more, np.empty((4, 9)))
 
     def excess(self, u: Array) -> Array:

@@ -1,6 +1,6 @@
-"""Elements and meshes: nodes, nine-node quadrilaterals, regions, the skin that may touch and what is driven.
+"""Elements and meshes: nodes, nine-node quadrilaterals, regions, the skin that may touch, and driven nodes.
 
-Any mesh can be halved: every element is divided in four by its own quadratic geometry, the finer mesh nested in it.
+Any mesh can be refined by halves: each element is divided in four by its own quadratic geometry, so the meshes nest.
 """
 
 from dataclasses import dataclass, field, fields
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from solver.arrays import Array, Flags, Indices, determinant, inverse
 
-# Gauss's points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
+# Gauss points and weights on a line from -1 to 1, in closed form: NumPy's polynomials take longer to import
 GAUSS_3 = np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0
 _FAR, _NEAR = (3.0 / 7.0 + 2.0 / 7.0 * 1.2**0.5) ** 0.5, (3.0 / 7.0 - 2.0 / 7.0 * 1.2**0.5) ** 0.5
 GAUSS_4 = np.array([-_FAR, -_NEAR, _NEAR, _FAR]), 0.5 + np.array([-1.0, 1.0, 1.0, -1.0]) * 30.0**0.5 / 36.0
 _ACROSS = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])  # position of each node among -1, 0, +1 along xi
-_UP = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])  # and along eta
+_UP = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])  # along eta
 
 
 def line(s: Array) -> tuple[Array, Array]:
@@ -35,8 +35,8 @@ def line(s: Array) -> tuple[Array, Array]:
 class Q2P1:
     """The nine-node quadrilateral: biquadratic displacements, and a pressure linear in x and y inside each element.
 
-    The pressure is discontinuous between elements, so that it is condensed in the element. Stable and of optimal order
-    up to the incompressible limit (Boffi and Gastaldi 2002, Computing 69, 1-10, with the pressure in true coordinates).
+    Pressure is discontinuous between elements and condensed in each. The element is stable and of optimal order up to
+    the incompressible limit (Boffi and Gastaldi 2002, Computing 69, 1-10, with the pressure in true coordinates).
     """
 
     name = "Q2/P-1"
@@ -65,21 +65,21 @@ _NONE: Indices = np.empty(0, np.int64)
 
 
 def distinct(numbers: NDArray[Numbers]) -> NDArray[Numbers]:
-    """Return the different numbers among these, in order.
+    """Return the distinct numbers in ascending order.
 
     >>> distinct(np.array([3, 1, 3]))
     array([1, 3])
     """
-    # for a few numbers several times as fast as np.unique, which imports masked arrays
+    # several times as fast for few numbers as np.unique, which imports masked arrays
     ordered = np.sort(numbers, axis=None)
     new = np.ones(len(ordered), bool)
     new[1:] = ordered[1:] != ordered[:-1]
     return ordered[new]
 
 
-@dataclass(frozen=True, eq=False)  # without slots: what is held is listed once
+@dataclass(frozen=True, eq=False)  # no slots: cached properties need a dictionary
 class Mesh:
-    """A body as arrays, read-only. Nodes of an element: corners, then mid-sides, then centre.
+    """A body as read-only arrays. Nodes of an element: corners, then mid-sides, then centre.
 
     Corners run counter-clockwise, mid-side k lies between corners k and k+1:
 
@@ -92,14 +92,14 @@ class Mesh:
     elements: Indices  # (e, 9)
     region: Indices  # (e,) number of the material of each element
     skin: Indices  # (2 k + 1,) nodes that may touch, along k edges: end, middle, end, middle, ... end
-    held: Indices  # (h,) nodes that are driven as a whole, in both directions
-    held_x: Indices = field(default_factory=lambda: _NONE)  # nodes that are driven along x alone, and roll along y
-    held_y: Indices = field(default_factory=lambda: _NONE)  # the same along y: rollers, and planes of symmetry
+    held: Indices  # (h,) nodes driven in both directions
+    held_x: Indices = field(default_factory=lambda: _NONE)  # nodes driven along x and free along y
+    held_y: Indices = field(default_factory=lambda: _NONE)  # likewise along y: rollers, and planes of symmetry
 
     def __post_init__(self) -> None:
-        """Make the arrays read-only, and lengths and whole numbers those that loops take; others are left as they are.
+        """Make the arrays read-only, and convert lengths and whole numbers to the types of the loops.
 
-        Those others are refused where a body is made of them (`solver.body.validation`).
+        Other types are left alone; `solver.body.validation` refuses them where a body is made.
         """
         for f in fields(self):
             array = np.asarray(getattr(self, f.name))
@@ -112,25 +112,25 @@ class Mesh:
 
     @cached_property
     def fixed(self) -> Indices:
-        """The numbers of the unknowns that are held, in order: x of node n is 2 n, y is 2 n + 1."""
+        """Numbers of the driven unknowns in ascending order: x of node n is 2 n, y is 2 n + 1."""
         along = np.concatenate([self.held, self.held_x]), np.concatenate([self.held, self.held_y])
         return distinct(np.concatenate([2 * along[0], 2 * along[1] + 1]))
 
     @cached_property
     def driven(self) -> Flags:
-        """Which components of which nodes are held, (n, 2)."""
+        """Flags (n, 2) of the driven components of nodes."""
         out = np.zeros(2 * len(self.nodes), bool)
         out[self.fixed] = True
         return out.reshape(-1, 2)
 
     def assemble(self, local: Array) -> Array:
-        """Return the sums (n, 2) over elements at each node of `local` (e, 18): x, y of an element's nodes in turn."""
+        """Return the nodal sums (n, 2) of `local` (e, 18): x, y of each node of an element in turn."""
         node, along = self.elements.ravel(), local.reshape(-1, 2).T
         return np.stack([np.bincount(node, one, len(self.nodes)) for one in along], axis=1, dtype=np.float64)
 
 
-# offsets along the grid's two directions of an element's nodes, for grids whose first direction turns to the second
-# clockwise (as from proximal to distal, then outwards to the skin)
+# node offsets of an element along the grid's two directions, the first of which turns to the second clockwise
+# (as from proximal to distal, then outwards to the skin)
 ALONG = np.array([0, 0, 2, 2, 0, 1, 2, 1, 1])
 OUT = np.array([0, 2, 2, 0, 1, 2, 1, 0, 1])
 
@@ -142,8 +142,8 @@ class MeshError(ValueError):
 def grid_mesh(points: Array, layers: Indices, skin: slice, held: Indices) -> Mesh:
     """Return the mesh of `points` (2 a + 1, 2 b + 1, 2), whose second direction ends on the skin.
 
-    `layers` (b,) is the region of each layer of elements, `skin` the range of points along the first direction that
-    may touch (from an even one to an even one), `held` node numbers. Node (i, j) has number i (2 b + 1) + j.
+    `layers` (b,) is the region of each layer of elements. `skin` is the range of points along the first direction that
+    may touch; it starts and ends at an even one. `held` are node numbers. Node (i, j) has number i (2 b + 1) + j.
     """
     long, wide = points.shape[0], points.shape[1]
     number: Indices = np.arange(long * wide, dtype=np.int64).reshape(long, wide)
@@ -156,9 +156,9 @@ def grid_mesh(points: Array, layers: Indices, skin: slice, held: Indices) -> Mes
 
 
 def quality(mesh: Mesh) -> dict[str, float]:
-    """Return the least ratio of smallest to largest Jacobian in an element, and the largest aspect of an element.
+    """Return the least ratio of smallest to largest Jacobian in an element, and the largest aspect ratio.
 
-    Raises MeshError where an element is folded (its Jacobian is not positive at every corner and quadrature point).
+    Raises MeshError where the Jacobian is not positive at a corner or quadrature point: the element is folded.
     """
     jacobian, det = jacobians(mesh, np.concatenate([Q2P1.points, Q2P1.corners]))
     sides = np.linalg.norm(jacobian, axis=-2)  # lengths of the two tangents
@@ -169,7 +169,7 @@ def quality(mesh: Mesh) -> dict[str, float]:
 def jacobians(mesh: Mesh, at: Array) -> tuple[Array, Array]:
     """Return the Jacobians (e, p, 2, 2) of all elements at local coordinates `at` (p, 2), and their determinants.
 
-    Raises MeshError where one is not positive: the element is folded there.
+    Raises MeshError where a determinant is not positive: the element is folded there.
     """
     jacobian = np.swapaxes(mesh.nodes[mesh.elements], 1, 2)[:, None] @ Q2P1.shape(at)[1]
     det = determinant(jacobian)
@@ -184,10 +184,10 @@ def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
     local: NDArray[np.float64] = start.copy()
     for _ in range(8):
         values, slopes = Q2P1.shape(local)
-        missing = points - (values[:, None] @ corners)[:, 0]
-        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), missing)
+        residual = points - (values[:, None] @ corners)[:, 0]
+        step = np.einsum("pab,pb->pa", inverse(np.swapaxes(corners, 1, 2) @ slopes), residual)
         local += step
-        if np.abs(step).max(initial=0.0) < 1e-7:  # what is left is the square of this step
+        if np.abs(step).max(initial=0.0) < 1e-7:  # the remaining error is of the order of this step squared
             break
     return local
 
@@ -195,8 +195,8 @@ def local_coordinates(corners: Array, points: Array, start: Array) -> Array:
 def block(x_lines: Array, y_lines: Array, radius: float = np.inf, *, held: bool = True) -> Mesh:
     """Return a block on the surface, with lines between elements at `x_lines` and `y_lines` (from 0 up) [mm].
 
-    Its underside is flat, or a circle of `radius` [mm] that touches the surface at x = 0; it may touch everywhere. Its
-    top is held, or with `held` False nothing is.
+    Its underside may touch: it is flat, or a circle of `radius` [mm] that touches the surface at x = 0. With `held`,
+    its top is driven, else nothing is.
     """
     x, y = with_middles(x_lines), with_middles(y_lines)[::-1]
     bottom = 0.0 * x if np.isinf(radius) else radius - np.sqrt(radius**2 - x**2)
@@ -217,10 +217,10 @@ def with_middles(lines: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Where the lines between a finger's elements lie, in the order of its nodes: proximal to distal, and outwards."""
+    """Positions of the lines between a finger's elements, in the order of nodes: proximal to distal, and outwards."""
 
-    arcs: tuple[float, ...]  # arc positions of those across the tissue [mm]
-    bone: tuple[float, ...]  # of those along it, in a meshed bone: radii, from the core to 1, by the bone's; else none
+    arcs: tuple[float, ...]  # arc positions of the lines across the tissue [mm]
+    bone: tuple[float, ...]  # along it, in a meshed bone: radii from the core to 1, by the bone's radius; else none
     fat: tuple[float, ...]  # heights in the fat, from 0 on the bone to 1
     skin: tuple[float, ...]  # depths in the skin, the outermost last [mm]
 
@@ -230,7 +230,7 @@ class Lines:
         return max(len(self.bone) - 1, 0) + len(self.fat) + len(self.skin) - 2
 
     def divide(self, columns: Indices, rows: Indices) -> "Lines":
-        """Return the lines with each gap between two in so many equal parts: `columns` (a,) and `rows` (b,) of them."""
+        """Return the lines with each gap divided equally: into `columns` (a,) and `rows` (b,) parts."""
         bone, fat = max(len(self.bone) - 1, 0), len(self.fat) - 1
         return Lines(
             _divide(self.arcs, columns),
@@ -245,7 +245,7 @@ def _divide(lines: tuple[float, ...], parts: Indices) -> tuple[float, ...]:
     return (*(a + (b - a) * part / count for (a, b), count in gaps for part in range(count)), *lines[-1:])
 
 
-# A divided element has 5 x 5 nodes, numbered along its first direction, then up: here those of the element's own nine
+# A divided element has 5 x 5 nodes, numbered along its first direction, then up: positions of its original nine
 _OWN: Indices = np.round(2.0 * (Q2P1.positions + 1.0) @ [1.0, 5.0]).astype(np.int64)
 _LOCAL = np.stack([np.tile(np.linspace(-1.0, 1.0, 5), 5), np.repeat(np.linspace(-1.0, 1.0, 5), 5)], axis=-1)
 _SIDES: Indices = np.array([[0, 4, 1], [1, 5, 2], [2, 6, 3], [3, 7, 0]])  # end, middle and end of an element's sides
@@ -255,17 +255,17 @@ _VALUES = Q2P1.shape(_LOCAL)[0]  # (25, 9)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalvedMesh:
-    """A mesh, nested in the one that it was made of; nodes of that keep their numbers."""
+    """A mesh nested in a coarse one, whose nodes keep their numbers."""
 
     mesh: Mesh
     _coarse: Mesh
-    _pairs: Indices  # (q,) end and middle of the half sides that have a new node, as one number, in order
-    _new: Array  # (m, 9) shape functions of each new node's element there
-    _of: Indices  # (m,) that element
+    _pairs: Indices  # (q,) keys of the half sides with a new node, from its end and middle, in ascending order
+    _new: Array  # (m, 9) coarse shape functions at each new node
+    _of: Indices  # (m,) coarse element of each new node
 
     @staticmethod
     def of(mesh: Mesh) -> "HalvedMesh":
-        """Divide every element of a mesh."""
+        """Divide every element of a mesh in four."""
         count, elements = len(mesh.nodes), mesh.elements
         grid: Indices = np.full((len(elements), 25), -1, np.int64)
         grid[:, _OWN] = elements
@@ -279,7 +279,7 @@ class HalvedMesh:
         of = np.concatenate([first // len(ends), np.repeat(np.arange(len(elements)), len(inner))])
         at = np.concatenate([places[first % len(ends)], np.tile(inner, len(elements))])
         new = _VALUES[at]
-        # A new node is held where all nodes are that it lies between: of its side, or of its element.
+        # A new node is driven where all nodes of its side, or of its element, are.
         held = mesh.driven[elements[of]] | (new == 0.0)[..., None]
         driven = np.concatenate([mesh.driven, held.all(axis=1)])
         nodes = np.concatenate([mesh.nodes, np.einsum("mn,mnd->md", new, mesh.nodes[elements[of]])])
@@ -297,7 +297,7 @@ class HalvedMesh:
         return _refine_chain(nodes, self._pairs, len(self._coarse.nodes))
 
     def between(self, values: Array) -> Array:
-        """Return nodal values (n, ...) of the coarse mesh with those of new nodes, interpolated in their elements."""
+        """Return nodal values (n, ...) of the coarse mesh and, interpolated, those of the new nodes."""
         local = values[self._coarse.elements[self._of]]
         return np.concatenate([values, np.einsum("mn,mn...->m...", self._new, local)])
 
@@ -307,7 +307,7 @@ def _pair(end: Indices, middle: Indices, count: int) -> Indices:
 
 
 def _refine_chain(nodes: Indices, pairs: Indices, count: int) -> Indices:
-    """Return a chain of nodes (2 k + 1,) with the new one between each two of them."""
+    """Return a chain of nodes (2 k + 1,) with the new node between each two."""
     ends, middles = nodes[:-1].copy(), nodes[1:].copy()
     ends[1::2], middles[1::2] = nodes[2::2], nodes[1::2]
     out = np.empty(max(2 * len(nodes) - 1, 0), np.int64)
@@ -316,7 +316,7 @@ def _refine_chain(nodes: Indices, pairs: Indices, count: int) -> Indices:
 
 
 def _by_axis(driven: Flags) -> tuple[Indices, Indices, Indices]:
-    """Return the nodes held both ways, along x alone and along y alone, of flags (n, 2)."""
+    """Return the nodes driven both ways, along x alone and along y alone, from flags (n, 2)."""
     x, y = driven.T
     return np.flatnonzero(x & y), np.flatnonzero(x & ~y), np.flatnonzero(y & ~x)
 

@@ -1,8 +1,8 @@
-"""The finger's outline and its mesh: a half-O from the bone to the skin, fine along the skin where it may touch.
+"""The finger's outline and its mesh: a half-O from the bone to the skin, fine along the skin that may touch.
 
-Places are given by arc position along the undeformed skin, from the point of first touch, positive towards the tip, and
-depth below it. In the world the surface is y = 0, the finger above it, first touch at the origin, and +x runs from
-proximal to distal.
+A position is an arc position along the undeformed skin, from the point of first touch and positive towards the tip, and
+a depth below the skin. In the world frame the surface is y = 0 with the finger above it, and first touch is the origin.
++x runs from proximal to distal.
 """
 
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ from solver.scene.tables import Finger, Receptor
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Where things lie on one finger. Arc positions and depths in mm; any shape, broadcast together."""
+    """Geometry of one finger's outline. Arc positions and depths in mm; any shape, broadcast together."""
 
     finger: Finger
     palmar_cut: float  # arc position of the cut's palmar end
-    palmar: float  # where the palmar straight edge meets the tip's arc
-    dorsal: float  # where the tip's arc meets the dorsal straight edge
+    palmar: float  # arc position where the palmar straight edge meets the tip's arc
+    dorsal: float  # arc position where the tip's arc meets the dorsal straight edge
     dorsal_cut: float  # arc position of the cut's dorsal end
     touch: float  # angle of first touch on the tip's arc, finger frame [rad]
 
@@ -49,7 +49,7 @@ class Outline:
         return self.dorsal + self.finger.nail_length
 
     def angle(self, arc: Array) -> Array:
-        """Return the angle on the tip's arc [rad]; on a straight edge, that of its end."""
+        """Return the angle on the tip's arc [rad]; on a straight edge, the angle of its end."""
         return np.asarray(self.touch + np.clip(arc, self.palmar, self.dorsal) / self.finger.tip_radius)
 
     def _course(self, arc: Array) -> tuple[Array, Array]:
@@ -70,7 +70,7 @@ class Outline:
         return self.world(radius * np.cos(angle) - back, radius * np.sin(angle))
 
     def tangent(self, arc: Array) -> Array:
-        """Return the directions (..., 2) of the skin at `arc`, towards the tip: unit vectors in the world.
+        """Return the unit vectors (..., 2) along the skin at `arc`, towards the tip, in the world frame.
 
         >>> Outline.of(Finger()).tangent(np.array([0.0, -20.0])).round(4)  # at first touch, and on the palmar side
         array([[ 1.    ,  0.    ],
@@ -82,7 +82,7 @@ class Outline:
     def bone(self, arc: Array, part: Array | float = 1.0) -> Array:
         """Return the points (..., 2) of the bone's outline that the mesh pairs with `arc` on the skin.
 
-        With `part`, those inside the bone at this part of its radius.
+        With `part`, return those at this fraction of the bone's radius.
         """
         angle, back = self._course(arc)
         (x, y), length = self.finger.bone_centre, self.finger.shaft_length
@@ -90,18 +90,19 @@ class Outline:
         return self.world(x + r * np.cos(angle) - back * (x + length) / length, y + r * np.sin(angle))
 
     def world(self, x: Array, y: Array) -> Array:
-        """Return the points (..., 2) of the world for finger coordinates `x`, `y`."""
+        """Return the points (..., 2) in the world frame for finger coordinates `x`, `y`."""
         return self._rotate(x, y) + np.array([0.0, self.finger.tip_radius])
 
     def _rotate(self, x: Array, y: Array) -> Array:
-        """Return vectors (..., 2) of the finger frame in the world."""
+        """Return vectors (..., 2) of the finger frame in the world frame."""
         angle = radians(self.finger.contact_angle)
         return np.stack([x * cos(angle) + y * sin(angle), y * cos(angle) - x * sin(angle)], axis=-1)
 
     def along(self, arc: Array | float, depth: float, distance: Array | float) -> Array:
-        """Return the arc positions that lie `distance` from `arc`, measured at `depth` below the skin.
+        """Return the arc positions at `distance` from `arc`, measured at `depth` below the skin.
 
-        On the tip's arc a length at depth 1.9 is 3.1/5 of the skin's above it; on straight skin they are equal.
+        On the tip's arc, a length at depth 1.9 is 3.1/5 of the length on the skin above; on straight skin they are
+        equal.
 
         >>> Outline.of(Finger()).along(0.0, 1.9, np.array([-0.5, 0.5])).round(4)
         array([-0.8065,  0.8065])
@@ -115,34 +116,34 @@ class Outline:
 
 
 EPIDERMIS, DERMIS, FAT, BONE = 0, 1, 2, 3  # numbers of the regions
-CORE = 1.0 / 3.0  # radius of a meshed bone's core, which is driven, by the bone's [-]
-FOLD = (0.015, 0.1)  # where the skin folds: of the tip radius, and of the epidermis if that is less
-FINEST = 1e-3  # smallest element by tip radius: thinner ones across the whole finger would drown in round-off [-]
+CORE = 1.0 / 3.0  # radius of a meshed bone's driven core, by the bone's [-]
+FOLD = (0.015, 0.1)  # element size where the skin folds: the smaller part, of the tip radius or of the epidermis
+FINEST = 1e-3  # smallest element by tip radius: round-off swamps thinner ones across the whole finger [-]
 
 
 @dataclass(frozen=True, slots=True)
 class ElementSizes:
     """Sizes of elements, by tip radius over fineness; chosen on random scenes at finite strain."""
 
-    anywhere: float = 0.5  # along the skin that may touch
-    palmar_growth: float = 1.0  # outside the contact: skin behind a contact is squeezed, and may fold
+    in_contact: float = 0.5  # along the skin that may touch
+    palmar_growth: float = 1.0  # outside the contact: skin behind it is compressed, and may fold
     dorsal_growth: float = 1.9  # likewise
-    tall: float = 1.7  # across the skin at the surface, by that along it
+    aspect: float = 1.7  # across the skin at the surface, by the size along it
     bulk: float = 1.5  # across the tissue, at most
-    at_bone: float = 0.45  # across at the bone, where fat is sheared most
-    from_bone: float = 6.0  # growth from there, by tip radius
-    ending: float = 0.7  # the same for the ending
+    at_bone: float = 0.45  # across the tissue at the bone, where fat is sheared most
+    from_bone: float = 6.0  # growth from the bone, by tip radius
+    at_ending: float = 0.7  # across the tissue at the ending
     from_ending: float = 3.0  # likewise
-    point_across: float = 0.02  # endings smaller across the skin, by tip radius, are hardly more than points
+    point_across: float = 0.02  # endings smaller across the skin, by tip radius, count as points
     point_along: float = 0.1  # likewise along it
-    at_point: float = 0.1  # the element that has them in its middle
-    from_point: float = 0.5  # growth from there [-]
-    growth: float = 0.2  # of elements smaller than that, at the surface, with the depth below it [-]
-    short: float = 0.56  # half overlaps shorter than that, by tip radius, have smaller elements
-    around: float = 4.0  # so many of these elements to each side are as small
-    from_fold: float = 0.5  # growth from there [-]
-    thin: float = 2.0 / 3.0  # across the skin there, by that along it
-    apart: float = 0.1  # skin nearer to where it is held is squeezed without bound, by tip radius
+    at_point: float = 0.1  # size of the element around a point
+    from_point: float = 0.5  # growth from that element [-]
+    growth: float = 0.2  # growth of elements at the surface with the depth below it [-]
+    short_overlap: float = 0.56  # half overlaps shorter than this, by tip radius, have smaller elements
+    fold_elements: float = 4.0  # number of elements of that size to each side of a fold
+    from_fold: float = 0.5  # growth from these [-]
+    fold_aspect: float = 2.0 / 3.0  # across the skin at a fold, by the size along it
+    held_distance: float = 0.1  # skin closer to held skin is compressed without bound, by tip radius
 
 
 SIZES = ElementSizes()
@@ -150,19 +151,19 @@ SIZES = ElementSizes()
 
 @dataclass(frozen=True, slots=True)
 class Sizing:
-    """How fine the mesh is, and where."""
+    """Element sizes of a mesh and where they apply."""
 
-    fineness: float | Lines  # elements to a tip radius, or where lines lie
-    indentation: float  # the skin that lies lower than this may touch [mm]
+    fineness: float | Lines  # elements to a tip radius, or the lines themselves
+    indentation: float  # skin lower than this may touch [mm]
     shift: bool = False  # move the mesh along the skin by half an element
-    margin: float = 1.0  # contact is looked for where undeformed skin lies lower than (1 + margin/4) indentation
-    fold: float | None = None  # arc position where the skin is squeezed most, where it is to be seen folding
+    margin: float = 1.0  # undeformed skin lower than (1 + margin/4) indentation may touch
+    fold: float | None = None  # arc position of the largest compression, where a fold is to be resolved
     halved: bool = False  # whether every element is divided in four
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FingerMesh:
-    """The mesh of a finger, with the lines it was made of."""
+    """The mesh of a finger, with its lines."""
 
     mesh: Mesh
     outline: Outline
@@ -170,9 +171,9 @@ class FingerMesh:
     lines: Lines  # before elements are halved
     arcs: Array  # (a + 1,) arc positions of the lines between elements [mm]
     depths: Array  # (b + 1,) depths of the lines between the elements of the skin, outermost last; bone not included
-    fat: int  # elements below the dermis: of the fat, and of the bone where it is meshed
-    whole: Indices  # (2 a + 1,) nodes of all the skin, those that may touch and those that may not
-    loose: NDArray[np.bool_]  # (a,) elements along the skin that are not near where it is held
+    fat: int  # number of elements below the dermis: of the fat, and of a meshed bone
+    whole: Indices  # (2 a + 1,) nodes of all the skin, whether they may touch or not
+    loose: NDArray[np.bool_]  # (a,) elements along the skin that are not close to held skin
 
     @property
     def skin_arcs(self) -> Array:
@@ -181,11 +182,10 @@ class FingerMesh:
 
 
 def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMesh:
-    """Return the mesh of `finger`, its bone left out and its bone's surface held, or the core of a meshed bone.
+    """Return the mesh of `finger`, without its bone, whose surface is held, or with a meshed bone whose core is held.
 
-    Where the cut is driven with the bone, and where a nail plate is fixed to it, the nodes there are held too.
-    Lines between elements frame the reference ending: averages over whole elements converge faster than over parts.
-    Raises MeshError where the outline cannot be meshed.
+    Nodes of a driven cut, and of a nail plate, are held too. Lines between elements frame the reference ending, since
+    averages over whole elements converge faster than over parts. Raises MeshError where the outline cannot be meshed.
     """
     outline = Outline.of(finger)
     base = sizing.fineness if isinstance(sizing.fineness, Lines) else _lines(outline, receptor, sizing, sizing.fineness)
@@ -225,12 +225,13 @@ def finger_mesh(finger: Finger, receptor: Receptor, sizing: Sizing) -> FingerMes
 
 
 def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float) -> Lines:
-    """Return the lines that a `fineness` asks for."""
+    """Return the lines for a `fineness`."""
     finger = outline.finger
     fine, size = _fine(outline, sizing.indentation, fineness), finger.tip_radius / fineness
     row = _Row.of(outline, fine, receptor, sizing, 1.0 / fineness)
     arcs = row.lines(row.gaps(), shift=sizing.shift)
-    skin, fat = _layers(finger, fine, size, receptor, np.inf if sizing.fold is None else SIZES.thin * _fold(finger))
+    thin = np.inf if sizing.fold is None else SIZES.fold_aspect * _fold(finger)
+    skin, fat = _layers(finger, fine, size, receptor, thin)
     bone = np.empty(0)
     if finger.bone == "meshed":
         count = max(2, ceil((1.0 - CORE) * finger.bone_radius / (SIZES.bulk * size)))
@@ -239,18 +240,18 @@ def _lines(outline: Outline, receptor: Receptor, sizing: Sizing, fineness: float
 
 
 def _far(arcs: Array, start: float, stop: float, finger: Finger) -> NDArray[np.bool_]:
-    """Return which elements (a,) between the lines at `arcs` lie apart from skin held between `start` and `stop`."""
-    apart = SIZES.apart * finger.tip_radius
+    """Return the elements (a,) between the lines at `arcs` that are apart from skin held between `start` and `stop`."""
+    apart = SIZES.held_distance * finger.tip_radius
     return (arcs[1:] < start - apart) | (arcs[:-1] > stop + apart)
 
 
 def _fold(finger: Finger) -> float:
-    """Return the size along the skin of elements where it folds [mm]."""
+    """Return the size along the skin of elements at a fold [mm]."""
     return max(min(FOLD[0] * finger.tip_radius, FOLD[1] * finger.epidermis), 2.0 * FINEST * finger.tip_radius)
 
 
 def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
-    """Return the arc positions between which the undeformed skin lies lower than `height` [mm]."""
+    """Return the arc positions between which the undeformed skin is lower than `height` [mm]."""
     side = np.geomspace(1e-9, 1.0, 2001)
     ends: list[float] = []
     for end in (outline.palmar_cut, outline.dorsal):
@@ -260,7 +261,7 @@ def _lower_than(outline: Outline, height: float) -> tuple[float, float]:
 
 
 def _touchable(outline: Outline, arcs: Array, sizing: Sizing) -> tuple[int, int]:
-    """Return the first and last of the lines at `arcs` between which the skin may touch."""
+    """Return the indices in `arcs` of the first and last line between which the skin may touch."""
     first, last = _lower_than(outline, sizing.indentation * (1.0 + 0.25 * sizing.margin))
     low = max(int(np.searchsorted(arcs, first)) - 1, 0)
     return low, min(int(np.searchsorted(arcs, last)), len(arcs) - 1)
@@ -270,8 +271,8 @@ def _fine(outline: Outline, indentation: float, fineness: float) -> float:
     """Return the size of the smallest elements along the skin [mm]."""
     low, high = _lower_than(outline, indentation)
     radius = outline.finger.tip_radius
-    overlap = min(1.0, (high - low) / 2.0 / (SIZES.short * radius))
-    return max(radius / fineness * SIZES.anywhere * overlap, FINEST * radius)
+    overlap = min(1.0, (high - low) / 2.0 / (SIZES.short_overlap * radius))
+    return max(radius / fineness * SIZES.in_contact * overlap, FINEST * radius)
 
 
 def _middles(lines: Array) -> Array:
@@ -279,26 +280,26 @@ def _middles(lines: Array) -> Array:
 
 
 def _cumulative_count(place: Array, size: Array) -> Array:
-    """Return how many elements of `size` at `place` (n,) lie before each of these places (n,)."""
+    """Return the number of elements before each position `place` (n,), for the element `size` (n,) there."""
     return np.concatenate([[0.0], np.cumsum((1.0 / size[1:] + 1.0 / size[:-1]) / 2.0 * np.diff(place))])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Row:
-    """Elements in a row: how many are asked for before each place, and where lines between them must lie."""
+    """A row of elements: the required number before each position, and the positions that need a line."""
 
     place: Array  # (n,)
-    number: Array  # (n,) of elements before it
+    number: Array  # (n,) elements before it, fractions included
     ends: tuple[float, ...]
-    least: tuple[int, ...]  # elements between each two of them
-    spare: float  # part of an element that is spread over the others
+    least: tuple[int, ...]  # least number of elements between each two of them
+    spare: float  # fraction of an element that is spread over the others
 
     @staticmethod
     def of(outline: Outline, fine: float, receptor: Receptor, sizing: Sizing, scale: float) -> "_Row":
-        """Return the row along the skin: fine in the contact, coarser with the distance from it.
+        """Return the row along the skin: fine in the contact, and coarser with the distance from it.
 
-        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature, and at
-        the ends of the ending and of a nail plate.
+        Lines always lie where straight edge and arc meet, since an element cannot follow a jump in curvature. They also
+        lie at the ends of the nerve ending and of a nail plate.
         """
         low, high = _lower_than(outline, sizing.indentation)
         away = np.concatenate([[0.0], np.geomspace(1e-9, 1.0, 1000)])
@@ -313,7 +314,7 @@ class _Row:
         )
         if sizing.fold is not None:
             least = _fold(outline.finger)
-            from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.around * least, 0.0)
+            from_fold = np.maximum(np.abs(arc - sizing.fold) - SIZES.fold_elements * least, 0.0)
             sizes = np.minimum(sizes, least + SIZES.from_fold * from_fold)
         near, far = outline.along(0.0, receptor.depth, receptor.ending[1] * np.array([-0.5, 0.5])).tolist()
         if receptor.ending[1] < SIZES.point_along * outline.finger.tip_radius:
@@ -327,20 +328,20 @@ class _Row:
         return _Row(arc, _cumulative_count(arc, sizes), ends, least, 0.2)
 
     def sizes(self) -> Array:
-        """Return how many elements, and which part of one, are asked for between each two of the ends."""
+        """Return the required number of elements between each two ends, fractions included."""
         return np.diff(np.interp(self.ends, self.place, self.number))
 
     def gaps(self) -> tuple[int, ...]:
-        """Return how many elements there are between each two of the ends."""
-        return tuple(max(few, ceil(n - self.spare)) for few, n in zip(self.least, self.sizes().tolist(), strict=True))
+        """Return the number of elements between each two ends."""
+        return tuple(max(low, ceil(n - self.spare)) for low, n in zip(self.least, self.sizes().tolist(), strict=True))
 
     def lines(self, gaps: Sequence[int], *, shift: bool = False) -> Array:
-        """Return the lines between elements, so many between each two ends; with `shift` half an element further."""
+        """Return the lines for `gaps` elements between each two ends; `shift` moves them half an element."""
         out: list[Array] = []
         at = np.interp(self.ends, self.place, self.number)
         for (first, last), (start, stop), count in zip(pairwise(at), pairwise(self.ends), gaps, strict=True):
             steps = np.arange(count + 1.0)
-            if shift:  # save the ends
+            if shift:  # except the ends
                 steps = np.concatenate([[0.0], steps[:-1] + 0.5, [float(count)]])
             lines = np.interp(first + (last - first) * steps / count, self.number, self.place)
             lines[0], lines[-1] = start, stop
@@ -349,18 +350,18 @@ class _Row:
 
 
 def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: float) -> tuple[Array, Array]:
-    """Return the depths of the lines in the skin, from the fat outwards, and those in the fat from 0 (bone) to 1.
+    """Return the depths of the lines in the skin, from the fat outwards, and heights of those in the fat.
 
-    Elements at the surface are no taller than `thin` [mm].
+    Heights run from 0 at the bone to 1. Elements at the surface are no taller than `thin` [mm].
     """
     skin = finger.epidermis + finger.dermis
     thick = finger.pulp_thickness() - skin
     depth = np.concatenate([[0.0], np.geomspace(1e-6, 1.0, 1000)]) * (skin + thick)
     depth = distinct(np.concatenate([depth, np.linspace(0.0, skin + thick, 1000)]))
     of_bone = SIZES.at_bone + SIZES.from_bone * (skin + thick - depth) / finger.tip_radius
-    of_ending = SIZES.ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
+    of_ending = SIZES.at_ending + SIZES.from_ending * np.abs(depth - receptor.depth) / finger.tip_radius
     sizes = np.minimum(
-        size * np.minimum(SIZES.bulk, np.minimum(of_bone, of_ending)), SIZES.tall * (fine + SIZES.growth * depth)
+        size * np.minimum(SIZES.bulk, np.minimum(of_bone, of_ending)), SIZES.aspect * (fine + SIZES.growth * depth)
     )
     sizes = np.minimum(sizes, thin + SIZES.from_fold * depth)
     near, far = receptor.depth - receptor.ending[0] / 2.0, receptor.depth + receptor.ending[0] / 2.0
@@ -370,7 +371,7 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
         near, far = min(near, max(above, top)), max(far, min(below, bottom))
         sizes = np.minimum(sizes, largest)
     ends = _distinct(0.0, finger.epidermis, skin, skin + thick, near, far)
-    # one element between epidermis and ending would be too stiff in shear whatever its size
+    # a single element between epidermis and ending is too stiff in shear, whatever its size
     least = [2 if end < near <= after and end > 0.0 else 1 for end, after in pairwise(ends[:-1])]
     row = _Row(depth, _cumulative_count(depth, sizes), ends, (*least, 2), 0.1)
     gaps = row.gaps()
@@ -380,11 +381,10 @@ def _layers(finger: Finger, fine: float, size: float, receptor: Receptor, thin: 
 
 
 def _around_point(place: Array, near: float, far: float, size: float) -> tuple[float, float, Array]:
-    """Return what lines frame around an ending between `near` and `far`, and how large elements may be (n,) [mm].
+    """Return the lines that frame an ending between `near` and `far`, and the largest element sizes (n,) [mm].
 
-    Averages over whole elements smooth what they have wrong. In an ending that is hardly more than a point nothing is
-    smoothed: it lies in the middle of an element of `size`, where strains are truer than at its ends, and elements grow
-    from there.
+    Averages over whole elements smooth their errors. A point-like ending averages nothing: it lies in the middle of an
+    element of `size`, where strains are more accurate than at its ends. Elements grow from there.
     """
     middle, size = (near + far) / 2.0, max(far - near, size)
     largest = size + SIZES.from_point * np.maximum(np.abs(place - middle) - size / 2.0, 0.0)
@@ -392,6 +392,6 @@ def _around_point(place: Array, near: float, far: float, size: float) -> tuple[f
 
 
 def _distinct(*ends: float) -> tuple[float, ...]:
-    """Return the ends in order, leaving out those that repeat another to a thousandth of a millimetre."""
+    """Return the ends in order, without those that repeat another to a thousandth of a millimetre."""
     ordered = sorted(ends)
     return (ordered[0], *(b for a, b in pairwise(ordered) if b - a > 1e-3))

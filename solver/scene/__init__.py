@@ -1,7 +1,6 @@
-"""Scene: all that defines one run of the solver, frozen, checked when made.
+"""Scene: all input of one run of the solver, frozen and checked when made.
 
-Each of its tables (`scene.tables`) checks itself; here is what several decide together, and the other scenes that one
-scene leads to.
+Each table (`scene.tables`) checks itself. This module checks combinations of tables, and derives other scenes from one.
 """
 
 import math
@@ -9,12 +8,12 @@ from dataclasses import dataclass, field, replace
 
 from solver.scene.tables import LAWS_OF, TISSUES, Finger, Friction, Loading, Materials, Receptor, SceneError, Solve
 
-STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond, round-off swallows the softer one
+STIFFNESSES = 1e10  # largest ratio of two tissues' stiffnesses: beyond it, round-off swamps the softer one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """One run of the solver. Friction and loading have no default that anybody could mean."""
+    """One run of the solver. Friction and loading have no sensible default."""
 
     title: str = ""
     finger: Finger = field(default_factory=Finger)
@@ -25,7 +24,7 @@ class Scene:
     solve: Solve = field(default_factory=Solve)
 
     def __post_init__(self) -> None:
-        """Check what several tables decide together."""
+        """Check combinations of tables. Raises SceneError."""
         self._check_laws()
         self._check_stiffnesses()
         skin = self.finger.epidermis + self.finger.dermis
@@ -70,22 +69,22 @@ class Scene:
 
     @property
     def normal_force(self) -> float | None:
-        """The normal force asked for [N/mm], None where a depth is."""
+        """The prescribed normal force [N/mm], None where a depth is prescribed."""
         return self._per_mm(self.loading.normal_force)
 
     @property
     def loading_group(self) -> tuple[float, float, str]:
-        """How deep [mm] or hard [N/mm] the finger is pressed, and which way it slides: what like scenes share."""
+        """Depth [mm], normal force [N/mm] and slide, which similar scenes share."""
         return self.loading.indentation or 0.0, self.normal_force or 0.0, str(self.loading.slide)
 
     @property
     def viscoelastic(self) -> bool:
-        """Whether the course is marched in time while the tissues relax."""
+        """Whether the load path is marched in time while the tissues relax."""
         return self.materials.relax and self.solve.course == "history"
 
     @property
     def tangential_force(self) -> float | None:
-        """The drag asked for, opposing the slide [N/mm], None where the bone slides until nothing changes."""
+        """The prescribed drag, opposing the slide [N/mm], None where the bone slides until the state is steady."""
         return self._per_mm(self.loading.tangential_force)
 
     def _per_mm(self, force: float | None) -> float | None:
@@ -98,28 +97,28 @@ class Scene:
         return replace(self.loading, **forces, force_unit="N/mm")
 
     def frictionless_press(self, depth: float) -> "Scene":
-        """Return the same finger pressed to a `depth` [mm] without friction: meshes depend on nothing more."""
+        """Return the scene of the finger pressed to a `depth` [mm] without friction: meshes depend on nothing else."""
         bare = replace(self, title="", friction=Friction(0.0), loading=Loading(depth))
         return replace(bare, solve=Solve(self.solve.kinematics))
 
     def without_drag(self) -> "Scene":
-        """Return the scene that slides on, where a drag was asked for."""
+        """Return the scene that slides on, in place of a prescribed drag."""
         return replace(self, loading=replace(self.loading, tangential_force=None))
 
     def earlier_slides(self) -> tuple["Scene", ...]:
-        """Return the settled slides on the way to the last one that go the other way, as scenes of their own."""
+        """Return the steady slides before the last one that go the other way, a scene each."""
         opposite = set(self.loading.directions[:-1]) - {self.loading.direction}
         way = {1: "+x", -1: "-x"}
         solve = replace(self.solve, course="steady")
         return tuple(replace(self, loading=replace(self.loading, slide=way[d]), solve=solve) for d in opposite)
 
     def press_only(self) -> "Scene":
-        """Return the scene up to the end of its pre-indentation, as a scene of its own."""
+        """Return the scene up to the end of the press."""
         loading = replace(self.loading, slide="none", tangential_force=None)
         return replace(self, loading=loading, solve=replace(self.solve, course="steady"))
 
     def driven(self, depth: float) -> "Scene":
-        """Return the scene with its bone driven to `depth` [mm], where a normal force was asked for."""
+        """Return the scene with its bone driven to `depth` [mm], in place of a prescribed normal force."""
         loading = self.loading
         if loading.indentation is not None:
             return self

@@ -1,7 +1,7 @@
-"""The published finger and its ten surfaces (the paper's Tables 1 and 2), with both readings of its traction bound.
+"""The published finger and its ten surfaces (the paper's Tables 1 and 2), with both readings of the traction bound.
 
-The tables head the bound "x 10^-4 (MPa)". It was computed as largest tangential force by 1 cm2 of contact; read as
-printed it would be a force of some millinewtons, below the transducer's resolution, so the power of ten must belong to
+The tables head the bound "x 10^-4 (MPa)". It was computed as the largest tangential force on 1 cm2 of contact. As
+printed, that force would be some millinewtons, below the transducer's resolution. So the power of ten must belong to
 pascals: 0.8033e4 Pa, not 0.8033e-4 MPa. "computed" takes that reading, "as-printed" the other.
 """
 
@@ -22,7 +22,7 @@ class Surface:
     descriptor: str
     index: int
     mu: float
-    printed_bound: float  # tau_max as printed, in whatever unit it is
+    printed_bound: float  # tau_max as printed, in its unclear unit
     speed: float  # [mm/s]
 
 

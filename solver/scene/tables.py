@@ -1,7 +1,7 @@
 """The tables of a scene: finger, materials, friction, loading, receptor, solve; each checks itself when made.
 
-Field names are the keys of a scene file. Lengths in mm, stresses in MPa, angles in degrees. In the finger's own frame
-X points distally along the finger axis, -Y is palmar, and the origin is the centre of the tip's arc.
+Field names are the keys of a scene file. Lengths in mm, stresses in MPa, angles in degrees. In the finger's own frame X
+points distally along the finger axis, -Y is palmar, and the origin is the centre of the tip's arc.
 """
 
 import math
@@ -11,17 +11,17 @@ from typing import Literal
 Slide = Literal["+x", "-x", "none"]
 Law = Literal["hooke", "neo-hookean", "ogden"]
 TISSUES = ("epidermis", "dermis", "fat", "bone")  # in the order of the mesh's regions
-STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one on: steeper ones contradicted themselves
-SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as what there is to find
-FEEBLE = 1e-12  # least friction that is not none [-, MPa]: below, round-off is as large as the drag
-LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # that each kinematics has
+STIFFENING = 2.0, 14.0  # exponents of Ogden's law, from the neo-Hookean one; steeper laws gave inconsistent results
+SHALLOW = 1e-6  # least indentation [mm]: below, round-off is as large as the response
+FEEBLE = 1e-12  # least nonzero friction [-, MPa]: below, round-off is as large as the drag
+LAWS_OF = {"small": ("hooke",), "finite": ("neo-hookean", "ogden")}  # of each kinematics
 
 
 class SceneError(ValueError):
-    """A scene that cannot be run as it stands: the key, its value, and what is allowed."""
+    """A scene that cannot be run: the key, its value, and what is allowed."""
 
     def __init__(self, key: str, value: object, allowed: str) -> None:
-        """Name the dotted `key`, the `value` found there, and what is `allowed`."""
+        """Name the dotted `key`, its `value`, and what is `allowed`."""
         super().__init__(f"{key} = {value!r} is not allowed: {allowed}.")
         self.key = key
         self.value = value
@@ -29,7 +29,7 @@ class SceneError(ValueError):
 
 
 def _within(key: str, value: float, low: float, high: float, unit: str = "", *, zero: bool = False) -> None:
-    """Raise SceneError unless low <= value <= high (nan is never within); `zero` says that 0 is allowed beside."""
+    """Raise SceneError unless low <= value <= high, which is false for nan; with `zero`, the message allows 0 too."""
     if not low <= value <= high:
         allowed = f"it must {'be 0 or ' if zero else ''}lie between {low:g} and {high:g}{unit and ' ' + unit}"
         raise SceneError(key, value, allowed)
@@ -46,13 +46,13 @@ class Finger:
     bone_radius: float = 1.5  # [mm]
     bone_centre: tuple[float, float] = (-1.0, 0.75)  # centre of the bone's arc, finger frame [mm]
     contact_angle: float = 45.0  # between finger axis and surface, tip down [degrees]
-    width: float = 15.0  # used only where forces in N meet forces per mm [mm]; assumed
-    bone: Literal["rigid", "meshed"] = "rigid"  # "meshed": of its own material, driven at its core
+    width: float = 15.0  # used only to convert forces in N to forces per mm [mm]; assumed
+    bone: Literal["rigid", "meshed"] = "rigid"  # "meshed": with its own material, driven at its core
     cut: Literal["free", "driven"] = "free"  # "driven": the cut through the soft tissues moves with the bone
     nail_length: float = 0.0  # of a nail plate fixed to the bone, on the dorsal skin back from the tip's arc [mm]
 
     def __post_init__(self) -> None:
-        """Check ranges, and that some fat is left between dermis and bone everywhere."""
+        """Check ranges, and that some fat lies between dermis and bone everywhere. Raises SceneError."""
         _within("finger.tip_radius", self.tip_radius, 0.5, 50.0, "mm")
         for name in ("epidermis", "dermis"):
             _within(f"finger.{name}", getattr(self, name), 0.01 * self.tip_radius, 0.8 * self.tip_radius, "mm")
@@ -84,7 +84,7 @@ class Finger:
         return self.tip_radius - self.epidermis - self.dermis
 
     def fat_thickness(self) -> float:
-        """Return the least distance from bone to dermis [mm]; negative where the bone sticks out of the fat.
+        """Return the least distance from bone to dermis [mm]; negative where the bone reaches through the fat.
 
         The reference finger's bone is nearest to the dermis along its dorsal edge:
 
@@ -113,24 +113,24 @@ class Finger:
 
 @dataclass(frozen=True, slots=True)
 class Relaxation:
-    """One term of a Prony series: this part of the shear modulus relaxes with this time."""
+    """One term of a Prony series: a part of the shear modulus that relaxes with one time constant."""
 
-    g: float  # by the modulus at once [-]
-    tau: float  # [s]
+    g: float  # part of the instantaneous modulus [-]
+    tau: float  # relaxation time [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
     """An isotropic tissue."""
 
-    E: float  # Young's modulus, of the undeformed tissue, at once [MPa]
-    nu: float  # Poisson's ratio, likewise [-]
+    E: float  # instantaneous Young's modulus of the undeformed tissue [MPa]
+    nu: float  # instantaneous Poisson's ratio [-]
     law: Law | None = None  # None: Hooke at small strain, neo-Hookean at finite strain
     stiffening: float | None = None  # exponent of Ogden's law [-]; None: that of human skin
     prony: tuple[Relaxation, ...] = ()  # of the shear modulus; the bulk modulus does not relax
 
     def check(self, key: str) -> None:
-        """Raise SceneError where a value is not allowed; `key` is how the scene calls the tissue."""
+        """Raise SceneError where a value is not allowed; `key` is the tissue's key in the scene."""
         _within(f"{key}.E", self.E, 1e-6, 1e12, "MPa")
         if not 0.0 <= self.nu <= 0.4999999:
             why = ", since at 0.5 a material has no strain energy of volume change to compute" if self.nu > 0.0 else ""
@@ -158,7 +158,7 @@ class Materials:
     bone: Material = Material(200.0, 0.3)
 
     def __post_init__(self) -> None:
-        """Check each tissue: here, where it has a name."""
+        """Check each tissue under its key. Raises SceneError."""
         for name in TISSUES:
             self.of(name).check(f"materials.{name}")
 
@@ -178,26 +178,26 @@ class Materials:
 
     @property
     def longest_creep(self) -> float:
-        """In how long a held load deforms the slowest tissue, at most [s]: the less stays, the slower it yields.
+        """Longest retardation time of any tissue under a constant load [s].
 
-        For one term of a series tau / (1 - g) exactly (the retardation time of Zener's solid: Findley, Lai and Onaran
-        1976, chapter 5); for several none is longer than the longest tau by what stays.
+        It is tau / (1 - g) exactly for one term (Zener's solid: Findley, Lai and Onaran 1976, chapter 5). For several
+        terms, the longest tau by the long-term part is an upper bound.
         """
         series = [tissue.prony for tissue in self.by_region if tissue.prony]
         return max((max(t.tau for t in terms) / (1.0 - sum(t.g for t in terms)) for terms in series), default=0.0)
 
     @property
     def relax(self) -> bool:
-        """Whether any of the tissues relaxes."""
+        """Whether any tissue relaxes."""
         return self.longest_relaxation > 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Coulomb friction whose traction never exceeds a bound: its size is at most min(mu p, tau_max)."""
+    """Coulomb friction with a traction bound: the traction is at most min(mu p, tau_max)."""
 
     mu: float  # coefficient of friction [-]
-    tau_max: float | None = None  # traction bound [MPa]; None: there is none
+    tau_max: float | None = None  # traction bound [MPa]; None: no bound
 
     def __post_init__(self) -> None:
         """Check ranges."""
@@ -208,7 +208,7 @@ class Friction:
 
     @property
     def cap(self) -> float:
-        """The traction bound [MPa], infinite where there is none."""
+        """The traction bound [MPa], infinite without one."""
         return math.inf if self.tau_max is None else self.tau_max
 
     @property
@@ -221,19 +221,19 @@ class Friction:
 class Loading:
     """How the bone is driven: down within 1 s, by an indentation or a force, then along the surface.
 
-    Instead of a slide until nothing changes, a drag can be given: after the press it grows within 1 s, and how far the
-    bone shifts is found.
+    A drag can be given in place of a slide to the steady state. It grows within 1 s after the press, and the shift of
+    the bone is part of the solution.
     """
 
-    indentation: float | None = None  # [mm]; left out where a normal force is given
+    indentation: float | None = None  # [mm]; None for a prescribed normal force
     slide: Slide | tuple[Literal["+x", "-x"], ...] = "+x"  # "+x": proximal to distal; several: one after the other
-    speed: float = 15.0  # [mm/s]; rescales time and nothing else in an elastic finger
+    speed: float = 15.0  # [mm/s]; in an elastic finger it only scales time
     normal_force: float | None = None  # in place of the indentation
-    tangential_force: float | None = None  # in place of sliding on: a drag opposing the slide, positive
+    tangential_force: float | None = None  # in place of a slide to the steady state: drag opposing the slide, positive
     force_unit: Literal["N/mm", "N"] = "N/mm"  # of both forces; "N": of the whole finger, by its width
 
     def __post_init__(self) -> None:
-        """Check ranges, and that depth or force says how far the bone goes down, and one thing only."""
+        """Check ranges, and that exactly one of depth and force is prescribed. Raises SceneError."""
         if (self.indentation is None) == (self.normal_force is None):
             allowed = "give either an indentation or a normal force"
             raise SceneError("loading.indentation", self.indentation, allowed)
@@ -264,18 +264,18 @@ class Loading:
 
     @property
     def directions(self) -> tuple[int, ...]:
-        """+1 for every slide along +x, -1 along -x, in their order; none when the bone is pressed only."""
+        """+1 for every slide along +x, -1 along -x, in their order; empty without a slide."""
         way = self.slide if isinstance(self.slide, tuple) else (self.slide,)
         return tuple({"+x": 1, "-x": -1}[leg] for leg in way if leg != "none")
 
     @property
     def direction(self) -> int:
-        """+1 when the bone slides along +x at last, -1 along -x, 0 when it is pressed only."""
+        """+1 when the last slide is along +x, -1 along -x, 0 without a slide."""
         return self.directions[-1] if self.directions else 0
 
     @property
     def depth(self) -> float:
-        """The indentation [mm] of a loading that gives one. Raises ValueError where a force is given instead."""
+        """The prescribed indentation [mm]. Raises ValueError where a force is prescribed instead."""
         if self.indentation is None:
             raise ValueError("a force is given: the depth must be found first")
         return self.indentation
@@ -285,7 +285,7 @@ class Loading:
 class Receptor:
     """The nerve ending: a patch of tissue on the inward normal through the point of first touch."""
 
-    depth: float = 1.9  # of its middle below the skin [mm]
+    depth: float = 1.9  # depth of its middle below the skin [mm]
     ending: tuple[float, float] = (0.2, 1.0)  # its size across and along the skin [mm]
 
     def __post_init__(self) -> None:
@@ -297,20 +297,20 @@ class Receptor:
 
 @dataclass(frozen=True, slots=True)
 class Solve:
-    """How the scene is to be solved.
+    """How to solve the scene.
 
-    Evidence: "quick" is what comes with the answer, "estimated" marches what tissues would still hold as well,
+    Evidence: "quick" comes with the solution, "estimated" also marches the overstress that tissues would still hold,
     "measured" solves the scene again in several ways.
     """
 
     kinematics: Literal["small", "finite"] = "small"  # small strain (the paper's), or finite strain
-    course: Literal["steady", "history"] = "steady"  # "steady": the settled state alone; "history": all the way to it
-    tolerance: float | None = None  # relative error asked for in the ending-averaged SED [-]; None: the solver's own
-    evidence: Literal["quick", "estimated", "measured"] = "estimated"  # that what was left out could be
-    contrast_tolerance: float | None = None  # error asked for in SED's differences between surfaces, by their range [-]
+    course: Literal["steady", "history"] = "steady"  # "steady": the steady state alone; "history": all the way to it
+    tolerance: float | None = None  # required relative error of the ending-averaged SED [-]; None: the solver's own
+    evidence: Literal["quick", "estimated", "measured"] = "estimated"  # of the size of omitted effects
+    contrast_tolerance: float | None = None  # required error of differences of SED between surfaces, by their range [-]
 
     def __post_init__(self) -> None:
-        """Check that we can do what is asked for."""
+        """Check the options. Raises SceneError."""
         if self.kinematics not in ("small", "finite"):
             raise SceneError("solve.kinematics", self.kinematics, 'it must be "small" or "finite"')
         if self.course not in ("steady", "history"):
